@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-cpp/plugin.hpp: the C ABI's boilerplate for plugins written in C++20. Header-only; it adds
+// nothing to the ABI. A plugin is a class, made known by one macro:
+//
+//   class Grey {
+//   public:
+//       Grey(const arhost::Host &host, const arhost::Options &options);
+//       void start(const arhost_tracker_setup &setup);
+//       void track(const arhost_frame &frame, arhost_tracker_result &result);
+//   };
+//   ARHOST_TRACKER(Grey, descriptor)
+//
+// Members throw arhost::Failure (or any std::exception) with a message for the user; the adapters below
+// log it and turn it into a status, so nothing is thrown across the ABI.
+#pragma once
+
+#include <arhost/arhost.h>
+
+#include <algorithm>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace arhost {
+
+// An error for the user: which ARHOST_ERROR_…, and a sentence that names what to mend.
+class Failure : public std::runtime_error {
+public:
+    Failure(arhost_status status, const std::string &message) : std::runtime_error(message), status_(status) {}
+    arhost_status status() const { return status_; }
+
+private:
+    arhost_status status_;
+};
+
+// The host's callbacks. Cheap to copy; every function may be called on any thread.
+class Host {
+public:
+    explicit Host(const arhost_host *host) : host_(host) {}
+    void log(arhost_severity severity, const std::string &text) const { host_->log(host_, severity, text.c_str()); }
+    void info(const std::string &text) const { log(ARHOST_INFO, text); }
+    void warn(const std::string &text) const { log(ARHOST_WARNING, text); }
+    void error(const std::string &text) const { log(ARHOST_ERROR, text); }
+    void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
+    bool cancelled() const { return host_->cancelled(host_) != 0; }
+
+private:
+    const arhost_host *host_;
+};
+
+// The option values handed to `create`. A key that the descriptor does not declare is a defect.
+class Options {
+public:
+    explicit Options(std::span<const arhost_option> options) : options_(options) {}
+    bool boolean(std::string_view key) const { return find(key).integer != 0; }
+    std::int64_t integer(std::string_view key) const { return find(key).integer; }
+    double real(std::string_view key) const { return find(key).real; }
+    std::string text(std::string_view key) const { return find(key).text; }
+
+private:
+    const arhost_option &find(std::string_view key) const {
+        for (const arhost_option &option : options_)
+            if (key == option.key)
+                return option;
+        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the option '" + std::string(key) + "' was not passed");
+    }
+    std::span<const arhost_option> options_;
+};
+
+// A descriptor's option, with the fields in the order that they are read in.
+constexpr arhost_option_descriptor option(arhost_option_type type, const char *key, const char *default_value,
+                                          const char *help, double minimum = 0, double maximum = 0,
+                                          const char *const *choices = nullptr) {
+    return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
+}
+
+namespace detail {
+
+// What arhost_instance is for a plugin written as the class T.
+template <class T> struct Instance {
+    Host host;
+    T plugin;
+    Instance(const arhost_host *h, const Options &options) : host(h), plugin(host, options) {}
+};
+
+template <class T> Instance<T> &instance_of(arhost_instance *instance) {
+    return *reinterpret_cast<Instance<T> *>(instance);
+}
+
+// Runs `call` and turns what it throws into a logged message and a status.
+template <class Call> arhost_status guarded(const Host &host, Call &&call) noexcept {
+    try {
+        return call();
+    } catch (const Failure &failure) {
+        host.error(failure.what());
+        return failure.status();
+    } catch (const std::bad_alloc &) {
+        host.log(ARHOST_ERROR, "out of memory");
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    } catch (const std::exception &error) {
+        host.error(error.what());
+        return ARHOST_ERROR_INTERNAL;
+    } catch (...) {
+        host.log(ARHOST_ERROR, "an exception of unknown type");
+        return ARHOST_ERROR_INTERNAL;
+    }
+}
+
+template <class T, class Call> arhost_status with(arhost_instance *instance, Call &&call) noexcept {
+    Instance<T> &self = instance_of<T>(instance);
+    return guarded(self.host, [&] { return call(self.plugin); });
+}
+
+template <class T>
+arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
+                     arhost_instance **instance) {
+    return guarded(Host(host), [&] {
+        *instance = reinterpret_cast<arhost_instance *>(new Instance<T>(host, Options({options, count})));
+        return ARHOST_OK;
+    });
+}
+
+template <class T> void destroy(arhost_instance *instance) { delete &instance_of<T>(instance); }
+
+inline const void *no_extension(const char *) { return nullptr; }
+
+// Members that a class may leave out.
+template <class T> void stop(T &plugin) {
+    if constexpr (requires { plugin.stop(); })
+        plugin.stop();
+}
+template <class T> void stop_instance(arhost_instance *instance) {
+    with<T>(instance, [](T &plugin) { return stop(plugin), ARHOST_OK; });
+}
+template <class T> const void *get_extension(const char *id) {
+    if constexpr (requires { T::get_extension(id); })
+        return T::get_extension(id);
+    else
+        return no_extension(id);
+}
+
+// The kinds' function tables. `read` and `write` return an arhost_status, since ARHOST_END is no error.
+template <class T>
+inline constexpr arhost_source source_functions = {
+    sizeof(arhost_source),
+    [](arhost_instance *i, const arhost_source_setup *setup, arhost_source_properties *properties) {
+        return with<T>(i, [&](T &p) { return p.start(*setup, *properties), ARHOST_OK; });
+    },
+    [](arhost_instance *i, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
+        return with<T>(i, [&](T &p) -> arhost_status { return p.read(*buffer, *info); });
+    },
+    stop_instance<T>};
+
+template <class T>
+inline constexpr arhost_tracker tracker_functions = {
+    sizeof(arhost_tracker),
+    [](arhost_instance *i, const arhost_tracker_setup *setup) {
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+    },
+    [](arhost_instance *i, const arhost_frame *frame, arhost_tracker_result *result) {
+        return with<T>(i, [&](T &p) { return p.track(*frame, *result), ARHOST_OK; });
+    },
+    stop_instance<T>};
+
+template <class T>
+inline constexpr arhost_raytracer raytracer_functions = {
+    sizeof(arhost_raytracer),
+    [](arhost_instance *i, const arhost_raytracer_setup *setup) {
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+    },
+    [](arhost_instance *i, const arhost_render_request *request, const arhost_image *image,
+       arhost_render_info *info) {
+        return with<T>(i, [&](T &p) { return p.render(*request, *image, *info), ARHOST_OK; });
+    },
+    stop_instance<T>};
+
+template <class T> constexpr arhost_sink make_sink_functions() {
+    arhost_sink sink{};
+    sink.struct_size = sizeof(arhost_sink);
+    sink.start = [](arhost_instance *i, const arhost_sink_setup *setup) {
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+    };
+    sink.write = [](arhost_instance *i, const arhost_output *output) {
+        return with<T>(i, [&](T &p) -> arhost_status { return p.write(*output); });
+    };
+    if constexpr (requires(T &p) { p.idle(); })
+        sink.idle = [](arhost_instance *i) { return with<T>(i, [](T &p) -> arhost_status { return p.idle(); }); };
+    sink.stop = [](arhost_instance *i) { return with<T>(i, [](T &p) { return stop(p), ARHOST_OK; }); };
+    return sink;
+}
+template <class T> inline constexpr arhost_sink sink_functions = make_sink_functions<T>();
+
+} // namespace detail
+
+// Answers a loader's offer for `plugin`; what ARHOST_SOURCE and its like define negotiate with.
+inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer, const arhost_plugin &plugin) {
+    const std::uint32_t spoken = ARHOST_ABI_VERSION;
+    if (std::clamp(spoken, offer->oldest_abi_version, offer->newest_abi_version) != spoken)
+        return ARHOST_ERROR_UNSUPPORTED;
+    answer->abi_version = spoken;
+    answer->plugin = &plugin;
+    return ARHOST_OK;
+}
+
+} // namespace arhost
+
+// Defines arhost_entry for a class and its arhost_descriptor. Once a library, outside any namespace.
+#define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                         \
+    static constexpr arhost_plugin arhost_plugin_object = {sizeof(arhost_plugin),                                 \
+                                                           &(descriptor_object),                                  \
+                                                           &arhost::detail::functions_object<Class>,              \
+                                                           arhost::detail::create<Class>,                         \
+                                                           arhost::detail::destroy<Class>,                        \
+                                                           arhost::detail::get_extension<Class>};                 \
+    extern "C" ARHOST_EXPORT const arhost_entry_point arhost_entry = {                                            \
+        sizeof(arhost_entry_point), [](const arhost_offer *offer, arhost_answer *answer) {                        \
+            return arhost::negotiate(offer, answer, arhost_plugin_object);                                        \
+        }};
+
+#define ARHOST_SOURCE(Class, descriptor) ARHOST_PLUGIN_OF_KIND(Class, descriptor, source_functions)
+#define ARHOST_TRACKER(Class, descriptor) ARHOST_PLUGIN_OF_KIND(Class, descriptor, tracker_functions)
+#define ARHOST_RAYTRACER(Class, descriptor) ARHOST_PLUGIN_OF_KIND(Class, descriptor, raytracer_functions)
+#define ARHOST_SINK(Class, descriptor) ARHOST_PLUGIN_OF_KIND(Class, descriptor, sink_functions)

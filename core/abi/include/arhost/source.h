@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * arhost/source.h: gives frames: a camera, a file, a synthetic sequence.
+ */
+#ifndef ARHOST_SOURCE_H
+#define ARHOST_SOURCE_H
+
+#include "camera.h"
+#include "frame.h"
+#include "plugin.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct arhost_source_setup {
+    uint32_t struct_size;
+    uint32_t reserved;       /* 0 */
+    uint64_t first_sequence; /* 0, or where a restarted source goes on; a live one ignores it */
+    double fps;              /* asked for by the configuration; 0: the source's own */
+    int32_t paced;           /* non-zero (mode live): a source that is no camera gives its frames in real
+                                time, at its fps; 0 (lockstep): as fast as they are asked for */
+    /* The camera that the configuration names, or NULL. A synthetic source takes it as its own; a real
+     * one may check that its frames have that size. */
+    const arhost_intrinsics *intrinsics;
+} arhost_source_setup;
+
+typedef struct arhost_source_properties {
+    uint32_t struct_size;       /* set by the worker; all else comes zeroed */
+    int32_t has_intrinsics;     /* non-zero where the source knows its own camera */
+    arhost_frame_format format; /* with its struct_size set; laid out by arhost_frame_layout */
+    arhost_intrinsics intrinsics;
+    uint64_t frame_count;       /* of the whole sequence; 0: unknown or endless */
+} arhost_source_properties;
+
+/* Where `read` puts a frame. Bytes that it does not write keep an older frame's value. */
+typedef struct arhost_frame_buffer {
+    uint32_t struct_size;
+    uint32_t reserved;
+    const arhost_frame_format *format;
+    uint8_t *plane[ARHOST_MAX_PLANES];
+    uint8_t *grey; /* full-range luma for trackers. The worker fills it after read, unless the source
+                      sets has_grey, or it is plane 0 */
+    uint64_t sequence; /* the number that this frame will bear; a seekable source gives this frame */
+} arhost_frame_buffer;
+
+/* What `read` tells of the frame. Comes zeroed but for struct_size. */
+typedef struct arhost_frame_info {
+    uint32_t struct_size;
+    arhost_clock clock; /* must be set */
+    int64_t capture_ns; /* never smaller than that of the frame before */
+    uint32_t skipped;   /* frames that the device lost since the one before */
+    int32_t has_grey;   /* non-zero: `grey` has been written */
+    int32_t has_truth;  /* non-zero: `true_mt` is set */
+    int32_t truth_id;   /* the marker that true_mt belongs to */
+    double true_mt[16]; /* the exact marker-to-camera matrix, as arhost_marker.mt (synthetic sources) */
+} arhost_frame_info;
+
+typedef struct arhost_source {
+    uint32_t struct_size;
+
+    /* [worker] Once after create: opens the device or file. */
+    arhost_status (*start)(arhost_instance *instance, const arhost_source_setup *setup,
+                           arhost_source_properties *properties);
+
+    /* [worker] The next frame; waits for it, asking host->cancelled meanwhile. ARHOST_OK, ARHOST_END
+     * (and again ARHOST_END if asked again), or an error. A file that is cut short gives ARHOST_END
+     * after what could be read, and a log message of severity WARNING. */
+    arhost_status (*read)(arhost_instance *instance, const arhost_frame_buffer *buffer,
+                          arhost_frame_info *info);
+
+    /* [worker] Once before destroy, if start succeeded. */
+    void (*stop)(arhost_instance *instance);
+} arhost_source;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

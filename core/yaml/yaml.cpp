@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "yaml/yaml.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+namespace arhost::yaml {
+namespace {
+
+std::string listed(std::span<const std::string_view> words) {
+    std::string text;
+    for (const std::string_view word : words)
+        text += (text.empty() ? "" : ", ") + std::string(word);
+    return text;
+}
+
+std::string child_path(const std::string &parent, std::string_view key) {
+    return parent.empty() ? std::string(key) : parent + "." + std::string(key);
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j)
+        row[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0]++;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const std::size_t substituted = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+        }
+    }
+    return row.back();
+}
+
+// "outputs[0].path" → "outputs", 0, "path"; an index is a key of digits.
+std::vector<std::string> split_path(const std::string &path) {
+    std::vector<std::string> parts(1);
+    for (const char c : path) {
+        if (c == '.' || c == '[')
+            parts.emplace_back();
+        else if (c != ']')
+            parts.back() += c;
+    }
+    return parts;
+}
+
+} // namespace
+
+std::string nearest(std::string_view word, std::span<const std::string_view> candidates) {
+    std::string_view best;
+    std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
+    for (const std::string_view candidate : candidates)
+        if (const std::size_t distance = edit_distance(word, candidate); distance < best_distance) {
+            best = candidate;
+            best_distance = distance;
+        }
+    return std::string(best);
+}
+
+Node Node::load(const std::filesystem::path &file) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(file, ignored))
+        throw Error(file.string() + ": is a folder, not a YAML file");
+    std::ifstream stream(file, std::ios::binary);
+    std::ostringstream text;
+    if (!stream || !(text << stream.rdbuf()))
+        throw Error(file.string() + ": can't be read: " + std::strerror(errno ? errno : EIO));
+    return parse(text.str(), file.string());
+}
+
+Node Node::parse(const std::string &text, const std::string &name) {
+    auto document = std::make_shared<Document>(Document{name, {}});
+    try {
+        YAML::Node root = YAML::Load(text);
+        return Node(root, "", document);
+    } catch (const YAML::Exception &error) {
+        throw Error(name + ":" + std::to_string(error.mark.line + 1) + ":" + std::to_string(error.mark.column + 1) +
+                    ": YAML syntax: " + error.msg);
+    }
+}
+
+void Node::override_value(const std::string &path, const std::string &value) {
+    YAML::Node parsed;
+    try {
+        parsed = YAML::Load(value);
+    } catch (const YAML::Exception &error) {
+        throw Error("--set " + path + "=" + value + ": YAML syntax: " + error.msg);
+    }
+    YAML::Node at = node_;
+    const std::vector<std::string> parts = split_path(path);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const bool last = i + 1 == parts.size();
+        const auto refuse = [&](const std::string &why) {
+            throw Error("--set " + path + "=" + value + ": " + why);
+        };
+        if (parts[i].empty())
+            refuse("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
+        YAML::Node next;
+        if (at.IsSequence()) {
+            std::size_t index = 0;
+            const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), index);
+            if (error != std::errc() || *end != '\0' || index >= at.size())
+                refuse("'" + parts[i] + "' is no index of a list of " + std::to_string(at.size()));
+            if (last)
+                at[index] = parsed;
+            else
+                next.reset(at[index]);
+        } else if (at.IsMap() || at.IsNull() || !at.IsDefined()) {
+            if (last)
+                at[parts[i]] = parsed;
+            else
+                next.reset(at[parts[i]]);
+        } else {
+            refuse("there is a plain value above '" + parts[i] + "', which can't have keys");
+        }
+        if (!last)
+            at.reset(next);
+    }
+    document_->overrides[path] = value;
+}
+
+bool Node::is_overridden() const {
+    for (const auto &[path, value] : document_->overrides)
+        if (path_.starts_with(path) &&
+            (path_.size() == path.size() || path_[path.size()] == '.' || path_[path.size()] == '['))
+            return true;
+    return false;
+}
+
+std::filesystem::path Node::file() const { return document_->name; }
+
+std::string Node::where() const {
+    if (is_overridden())
+        return "--set";
+    const YAML::Mark mark = node_.Mark();
+    if (mark.is_null())
+        return document_->name;
+    return document_->name + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1);
+}
+
+void Node::fail(const std::string &message) const {
+    throw Error(where() + ": " + (path_.empty() ? "" : path_ + ": ") + message);
+}
+
+void Node::allow_keys(std::span<const std::string_view> keys) const {
+    std::set<std::string> seen;
+    for (const auto &[key, value] : entries()) {
+        const std::string_view known[] = {key};
+        if (std::find(keys.begin(), keys.end(), known[0]) == keys.end()) {
+            const std::string near = nearest(key, keys);
+            value.fail("unknown key; " + (near.empty() ? "known here: " + listed(keys) : "did you mean '" + near + "'?"));
+        }
+        if (!seen.insert(key).second)
+            value.fail("the key stands here twice; keep one of them");
+    }
+}
+
+std::optional<Node> Node::find(std::string_view key) const {
+    for (const auto &[name, value] : entries())
+        if (name == key)
+            return value;
+    return std::nullopt;
+}
+
+Node Node::require(std::string_view key) const {
+    if (auto found = find(key))
+        return *found;
+    fail("the key '" + std::string(key) + "' is missing");
+}
+
+std::vector<std::pair<std::string, Node>> Node::entries() const {
+    if (!node_.IsMap())
+        fail(is_null() ? "is empty, a map of keys is needed" : "must be a map of keys");
+    std::vector<std::pair<std::string, Node>> found;
+    for (const auto &entry : node_) {
+        if (!entry.first.IsScalar())
+            fail("a key must be plain text");
+        const std::string key = entry.first.Scalar();
+        found.emplace_back(key, Node(entry.second, child_path(path_, key), document_));
+    }
+    return found;
+}
+
+std::vector<Node> Node::items() const {
+    if (!node_.IsSequence())
+        fail("must be a list");
+    std::vector<Node> found;
+    for (std::size_t i = 0; i < node_.size(); ++i)
+        found.push_back(Node(node_[i], path_ + "[" + std::to_string(i) + "]", document_));
+    return found;
+}
+
+std::string Node::scalar(const char *wanted) const {
+    if (!node_.IsScalar())
+        fail(std::string("must be ") + wanted + (node_.IsNull() ? ", is empty" : ""));
+    return node_.Scalar();
+}
+
+bool Node::boolean() const {
+    const std::string text = scalar("true or false");
+    if (text == "true")
+        return true;
+    if (text == "false")
+        return false;
+    fail("must be true or false, is '" + text + "'");
+}
+
+std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
+    const std::string text = scalar("a whole number");
+    std::int64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size())
+        fail("must be a whole number, is '" + text + "'");
+    if (value < minimum || value > maximum)
+        fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", is " + text);
+    return value;
+}
+
+double Node::real(double minimum, double maximum) const {
+    const std::string text = scalar("a number");
+    double value = 0;
+    const char *begin = text.data() + (text.starts_with('+') ? 1 : 0);
+    const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+        fail("must be a number, is '" + text + "'");
+    if (value < minimum || value > maximum) {
+        std::ostringstream range;
+        if (std::isinf(maximum))
+            range << "must be at least " << minimum;
+        else if (std::isinf(minimum))
+            range << "must be at most " << maximum;
+        else
+            range << "must be " << minimum << " to " << maximum;
+        fail(range.str() + ", is " + text);
+    }
+    return value;
+}
+
+std::string Node::text() const {
+    std::string value = scalar("text");
+    if (value.empty())
+        fail("must not be empty");
+    return value;
+}
+
+std::string Node::choice(std::span<const std::string_view> choices) const {
+    const std::string value = text();
+    if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
+        const std::string near = nearest(value, choices);
+        fail("'" + value + "' is not one of " + listed(choices) + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    }
+    return value;
+}
+
+std::vector<double> Node::reals() const {
+    std::vector<double> values;
+    for (const Node &item : items())
+        values.push_back(item.real());
+    return values;
+}
+
+std::vector<double> Node::reals(std::size_t count) const {
+    std::vector<double> values = reals();
+    if (values.size() != count)
+        fail("must be a list of " + std::to_string(count) + " numbers, has " + std::to_string(values.size()));
+    return values;
+}
+
+std::filesystem::path Node::input_path() const {
+    const std::filesystem::path value = text();
+    const std::filesystem::path base = is_overridden() ? std::filesystem::path() : file().parent_path();
+    return std::filesystem::absolute(base / value).lexically_normal();
+}
+
+} // namespace arhost::yaml

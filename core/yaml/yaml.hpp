@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// YAML that knows where it stands: every error names file, line, column and key, and says what to mend.
+// Used for configurations, scenes and calibrations.
+#pragma once
+
+#include <yaml-cpp/node/node.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace arhost::yaml {
+
+// what() is one line for the user: "lab.yaml:12:5: tracker.markers[0].side_mm: must be …".
+class Error : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+// A value in a document. Cheap to copy; keeps its document alive.
+class Node {
+public:
+    // Reads a file. An Error tells why it can't be read or where its syntax is wrong.
+    static Node load(const std::filesystem::path &file);
+    // `name` stands for the file in messages.
+    static Node parse(const std::string &text, const std::string &name);
+
+    // Replaces or adds the value at a path of keys ("tracker.options.dictionary", "outputs[0].path"):
+    // for `--set`. Errors about it then name `--set` instead of a line. Call it on the root.
+    void override_value(const std::string &path, const std::string &value);
+
+    bool is_map() const { return node_.IsMap(); }
+    bool is_sequence() const { return node_.IsSequence(); }
+    bool is_scalar() const { return node_.IsScalar(); }
+    bool is_null() const { return node_.IsNull(); }
+    bool is_overridden() const;             // by `--set`, itself or a node above it
+    const std::string &path() const { return path_; } // from the root, "" for the root itself
+    std::filesystem::path file() const;
+    std::string where() const;                         // "file:line:column"
+    [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
+
+    // Maps. `allow_keys` refuses keys that are not in the list (naming the nearest one) or come twice;
+    // call it before the look-ups.
+    void allow_keys(std::span<const std::string_view> keys) const;
+    void allow_keys(std::initializer_list<std::string_view> keys) const {
+        allow_keys(std::span(keys.begin(), keys.size()));
+    }
+    std::optional<Node> find(std::string_view key) const;
+    Node require(std::string_view key) const;
+    std::vector<std::pair<std::string, Node>> entries() const; // in the file's order
+
+    std::vector<Node> items() const; // of a sequence
+
+    // Scalars, with a range where one is given (inclusive).
+    bool boolean() const;
+    std::int64_t integer(std::int64_t minimum = std::numeric_limits<std::int64_t>::min(),
+                         std::int64_t maximum = std::numeric_limits<std::int64_t>::max()) const;
+    double real(double minimum = -std::numeric_limits<double>::infinity(),
+                double maximum = std::numeric_limits<double>::infinity()) const; // finite
+    std::string text() const; // not empty
+    // One of `choices`; the message lists them and names the nearest.
+    std::string choice(std::span<const std::string_view> choices) const;
+    std::string choice(std::initializer_list<std::string_view> choices) const {
+        return choice(std::span(choices.begin(), choices.size()));
+    }
+    std::vector<double> reals() const;                  // a sequence of finite numbers
+    std::vector<double> reals(std::size_t count) const; // exactly so many
+
+    // A path relative to the folder of the document's file (to the working directory after `--set`).
+    std::filesystem::path input_path() const;
+
+private:
+    struct Document {
+        std::string name;
+        std::map<std::string, std::string> overrides; // path of keys → text after `--set`
+    };
+    Node(YAML::Node node, std::string path, std::shared_ptr<Document> document)
+        : node_(std::move(node)), path_(std::move(path)), document_(std::move(document)) {}
+    std::string scalar(const char *wanted) const;
+
+    YAML::Node node_;
+    std::string path_;
+    std::shared_ptr<Document> document_;
+};
+
+// "dictionary" for "dictionry" out of the candidates, or "" where none is near.
+std::string nearest(std::string_view word, std::span<const std::string_view> candidates);
+
+} // namespace arhost::yaml

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Loads a plugin of this build into the test's own process and calls it as arhost-worker would, without
+// processes and shared memory. For tests of one plugin; tests/system tests the chain.
+#pragma once
+
+#include <arhost/arhost.h>
+
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace arhost::test {
+
+// Real photos and meshes, which are not part of the project. A test that needs them begins with
+// ARHOST_REQUIRE_SHARED_DATA("markers/julia").
+inline std::filesystem::path shared_data(const std::string &relative) {
+    return std::filesystem::path(ARHOST_SHARED_DATA) / relative;
+}
+#define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                      \
+    if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                          \
+    GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is not here"
+
+// A folder that is empty at the test's start and gone after it.
+class ScratchFolder {
+public:
+    ScratchFolder() {
+        std::string pattern = (std::filesystem::temp_directory_path() / "arhost-test-XXXXXX").string();
+        if (!mkdtemp(pattern.data()))
+            throw std::runtime_error("mkdtemp " + pattern);
+        path_ = pattern;
+    }
+    ~ScratchFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    ScratchFolder(const ScratchFolder &) = delete;
+    ScratchFolder &operator=(const ScratchFolder &) = delete;
+    const std::filesystem::path &path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+// A frame or image buffer, 64-byte aligned, with guard bytes behind it that must stay as they are.
+class GuardedBuffer {
+public:
+    explicit GuardedBuffer(std::size_t size) : size_(size), bytes_(static_cast<uint8_t *>(std::aligned_alloc(64, (size + guard + 63) / 64 * 64))) {
+        std::memset(bytes_.get(), 0xa5, size + guard);
+    }
+    uint8_t *data() const { return bytes_.get(); }
+    std::size_t size() const { return size_; }
+    bool intact() const {
+        for (std::size_t i = size_; i < size_ + guard; ++i)
+            if (bytes_.get()[i] != 0xa5)
+                return false;
+        return true;
+    }
+
+private:
+    static constexpr std::size_t guard = 256;
+    struct Free {
+        void operator()(uint8_t *p) const { std::free(p); }
+    };
+    std::size_t size_;
+    std::unique_ptr<uint8_t, Free> bytes_;
+};
+
+class PluginUnderTest {
+public:
+    explicit PluginUnderTest(const std::string &id) {
+        const std::string file = std::string(ARHOST_PLUGIN_DIRECTORY) + "/" + id + ".so";
+        library_ = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!library_)
+            throw std::runtime_error(dlerror());
+        const auto *entry = static_cast<const arhost_entry_point *>(dlsym(library_, "arhost_entry"));
+        if (!entry)
+            throw std::runtime_error(file + " exports no arhost_entry");
+        const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
+        arhost_answer answer{sizeof answer, 0, nullptr};
+        if (entry->negotiate(&offer, &answer) != ARHOST_OK)
+            throw std::runtime_error("negotiate failed");
+        plugin_ = answer.plugin;
+        host_ = {sizeof host_, ARHOST_ABI_VERSION, "arhost-test", "0", this, &on_log, &on_progress, &on_cancelled,
+                 &on_extension};
+    }
+    ~PluginUnderTest() {
+        destroy(); // the library stays loaded: sanitizers want its symbols at exit
+    }
+    PluginUnderTest(const PluginUnderTest &) = delete;
+    PluginUnderTest &operator=(const PluginUnderTest &) = delete;
+
+    // `overrides`: option values as they would stand in the YAML; all others take their defaults.
+    arhost_status create(const std::map<std::string, std::string> &overrides = {}) {
+        const arhost_descriptor &descriptor = *plugin_->descriptor;
+        std::vector<arhost_option> options;
+        std::vector<std::string> texts(descriptor.option_count);
+        std::size_t used = 0;
+        for (uint32_t i = 0; i < descriptor.option_count; ++i) {
+            const arhost_option_descriptor &declared = descriptor.options[i];
+            const auto given = overrides.find(declared.key);
+            used += given != overrides.end();
+            if (given == overrides.end() && !declared.default_value)
+                throw std::runtime_error(std::string("option '") + declared.key + "' must be given");
+            texts[i] = given != overrides.end() ? given->second : declared.default_value;
+            arhost_option value{sizeof value, declared.type, declared.key, 0, 0.0, texts[i].c_str()};
+            if (declared.type == ARHOST_OPTION_BOOL)
+                value.integer = texts[i] == "true";
+            else if (declared.type == ARHOST_OPTION_INTEGER)
+                value.integer = std::stoll(texts[i]);
+            else if (declared.type == ARHOST_OPTION_REAL)
+                value.real = std::stod(texts[i]);
+            options.push_back(value);
+        }
+        if (used != overrides.size())
+            throw std::runtime_error("an option that the descriptor does not declare");
+        return plugin_->create(&host_, options.data(), static_cast<uint32_t>(options.size()), &instance_);
+    }
+    void destroy() {
+        if (instance_)
+            plugin_->destroy(instance_);
+        instance_ = nullptr;
+    }
+
+    template <class Functions> const Functions &functions() const {
+        return *static_cast<const Functions *>(plugin_->functions);
+    }
+    const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
+    arhost_instance *instance() const { return instance_; }
+    void cancel() { cancelled_ = true; }
+
+    // All messages so far, a line each, "severity text".
+    std::string log() const {
+        std::lock_guard lock(mutex_);
+        return log_;
+    }
+
+private:
+    static PluginUnderTest &self(const arhost_host *host) { return *static_cast<PluginUnderTest *>(host->context); }
+    static void on_log(const arhost_host *host, arhost_severity severity, const char *text) {
+        std::lock_guard lock(self(host).mutex_);
+        self(host).log_ += std::to_string(severity) + " " + text + "\n";
+    }
+    static void on_progress(const arhost_host *, double, const char *) {}
+    static int32_t on_cancelled(const arhost_host *host) { return self(host).cancelled_; }
+    static const void *on_extension(const arhost_host *, const char *) { return nullptr; }
+
+    void *library_ = nullptr;
+    const arhost_plugin *plugin_ = nullptr;
+    arhost_host host_{};
+    arhost_instance *instance_ = nullptr;
+    mutable std::mutex mutex_;
+    std::string log_;
+    std::atomic<bool> cancelled_{false};
+};
+
+} // namespace arhost::test
