@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml/yaml.hpp"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>

@@ -4,7 +4,7 @@
 // Used for configurations, scenes and calibrations.
 #pragma once
 
-#include <yaml-cpp/node/node.h>
+#include <yaml-cpp/yaml.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -31,6 +31,15 @@ public:
 // A value in a document. Cheap to copy; keeps its document alive.
 class Node {
 public:
+    Node(const Node &) = default;
+    // YAML::Node's own assignment would change the document that this node stands in.
+    Node &operator=(const Node &other) {
+        node_.reset(other.node_);
+        path_ = other.path_;
+        document_ = other.document_;
+        return *this;
+    }
+
     // Reads a file. An Error tells why it can't be read or where its syntax is wrong.
     static Node load(const std::filesystem::path &file);
     // `name` stands for the file in messages.

@@ -78,3 +78,11 @@ TEST(Yaml, RefusesNumbersThatAreNotFinite) {
         EXPECT_THAT(error_of([&] { node.require(key).real(); }), HasSubstr("must be a number")) << key;
     EXPECT_EQ(node.require("d").real(), 2.5);
 }
+
+TEST(Yaml, AssigningANodeLeavesTheDocumentAsItIs) {
+    const Node root = sample();
+    Node node = root.require("mode");
+    node = root.require("tracker").require("side_mm");
+    EXPECT_EQ(node.text(), "-3");
+    EXPECT_EQ(root.require("mode").text(), "lockstep");
+}

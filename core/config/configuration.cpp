@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/configuration.hpp"
+
+#include "camera/calibration.hpp"
+#include "config/schema.hpp"
+
+#include <charconv>
+#include <limits>
+#include <set>
+
+namespace arhost::config {
+namespace {
+
+// The table's default of a key that holds a whole number.
+std::int64_t default_of(std::string_view path) {
+    const std::string_view text = key_at(path).default_value;
+    std::int64_t value = 0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+}
+
+std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum, std::int64_t maximum) {
+    const std::string_view name = path.substr(path.rfind('.') == std::string_view::npos ? 0 : path.rfind('.') + 1);
+    const auto found = map.find(name);
+    return found ? found->integer(minimum, maximum) : default_of(path);
+}
+
+constexpr std::int64_t longest_ms = 3'600'000;
+
+supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
+    supervise::RestartLimits limits;
+    if (!node)
+        return limits;
+    node->allow_keys(keys_of("restart"));
+    limits.proven_after_frames =
+        static_cast<std::uint32_t>(integer_or_default(*node, "restart.proven_after_frames", 1, 1'000'000));
+    limits.quarantine_after =
+        static_cast<std::uint32_t>(integer_or_default(*node, "restart.quarantine_after", 1, 1'000'000));
+    limits.first_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, longest_ms));
+    limits.longest_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, longest_ms));
+    return limits;
+}
+
+ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path,
+                                       const PluginPath &plugin_path, const supervise::RestartLimits &restart) {
+    node.allow_keys(keys_of(schema_path));
+    ComponentConfiguration component{node, {plugin_path.resolve(node.require("plugin"))}, node.find("path"),
+                                     node.find("options"), {}};
+    if (const auto fallback = node.find("fallback"))
+        component.plugins.push_back(plugin_path.resolve(*fallback));
+    // "options:" with nothing behind it is an empty map.
+    if (component.options && component.options->is_null())
+        component.options.reset();
+    component.limits.frame =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, longest_ms));
+    component.limits.start =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, longest_ms));
+    component.limits.restart = restart;
+    return component;
+}
+
+TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plugin_path,
+                                   const supervise::RestartLimits &restart) {
+    TrackerConfiguration tracker{parse_component(node, "tracker", plugin_path, restart), {}, 0};
+    const yaml::Node markers = node.require("markers");
+    std::set<std::int64_t> ids;
+    for (const yaml::Node &marker : markers.items()) {
+        marker.allow_keys(keys_of("tracker.markers[]"));
+        const yaml::Node id = marker.require("id");
+        const std::int64_t number = id.integer(0, std::numeric_limits<std::int32_t>::max());
+        if (!ids.insert(number).second)
+            id.fail("the marker " + std::to_string(number) + " is listed twice; keep one of them");
+        tracker.markers.push_back({sizeof(arhost_marker_config), static_cast<std::int32_t>(number),
+                                   marker.require("side_mm").real(0.01, 1e6)});
+    }
+    if (tracker.markers.empty() || tracker.markers.size() > ARHOST_MAX_MARKERS)
+        markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) + " markers, as in [{id: 0, side_mm: 80}]");
+    tracker.hold_frames = static_cast<std::uint32_t>(integer_or_default(node, "tracker.hold_frames", 0, 1'000'000));
+    return tracker;
+}
+
+} // namespace
+
+Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins) {
+    root.allow_keys(keys_of(""));
+    if (const yaml::Node version = root.require("version"); version.integer() != 1)
+        version.fail("must be 1: this arhost reads no other version");
+
+    std::vector<std::filesystem::path> folders;
+    if (const auto node = root.find("plugin_path"))
+        for (const yaml::Node &folder : node->items())
+            folders.push_back(folder.input_path());
+    const PluginPath plugin_path(folders, built_in_plugins);
+    const supervise::RestartLimits restart = parse_restart(root.find("restart"));
+
+    const yaml::Node source_node = root.require("source");
+    SourceConfiguration source{parse_component(source_node, "source", plugin_path, restart)};
+    if (const auto fps = source_node.find("fps"))
+        source.fps = fps->real(0, 10'000);
+
+    Configuration configuration{.node = root, .source = std::move(source)};
+    if (const auto mode = root.find("mode"))
+        configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
+    configuration.frames =
+        static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
+    if (const auto node = root.find("camera")) {
+        node->allow_keys(keys_of("camera"));
+        configuration.camera = camera::parse_camera(*node);
+        configuration.camera_node = node;
+    }
+    if (const auto node = root.find("tracker"))
+        configuration.tracker = parse_tracker(*node, plugin_path, restart);
+    if (const auto node = root.find("raytracer")) {
+        const yaml::Node scene = node->require("scene");
+        configuration.raytracer =
+            RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart), scene.input_path(), scene};
+        if (!configuration.tracker)
+            node->fail("a ray tracer needs a 'tracker' that tells where the camera is");
+        if (!std::filesystem::exists(configuration.raytracer->scene))
+            scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
+    }
+    if (const auto node = root.find("coordinates")) {
+        node->allow_keys(keys_of("coordinates"));
+        configuration.coordinates = camera::parse_coordinates(*node);
+    }
+    if (const auto node = root.find("outputs"))
+        for (const yaml::Node &output : node->items())
+            configuration.outputs.push_back(parse_component(output, "outputs[]", plugin_path, restart));
+    if (const auto node = root.find("live")) {
+        node->allow_keys(keys_of("live"));
+        configuration.max_latency =
+            std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
+    }
+    if (const auto node = root.find("stats"))
+        configuration.stats = std::filesystem::absolute(node->text());
+    return configuration;
+}
+
+} // namespace arhost::config

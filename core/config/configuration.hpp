@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A configuration, read and checked as far as it can be without its plugins (docs/config.md).
+#pragma once
+
+#include "camera/coordinates.hpp"
+#include "config/plugin_path.hpp"
+#include "supervise/component.hpp"
+#include "yaml/yaml.hpp"
+
+#include <arhost/camera.h>
+#include <arhost/tracker.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace arhost::config {
+
+enum class Mode { lockstep, live };
+
+// What every component has.
+struct ComponentConfiguration {
+    yaml::Node node; // its map, for errors
+    std::vector<std::filesystem::path> plugins; // the shared object, then its fallback
+    std::optional<yaml::Node> path, options;
+    supervise::Limits limits;
+};
+
+struct SourceConfiguration : ComponentConfiguration {
+    double fps = 0;
+};
+
+struct TrackerConfiguration : ComponentConfiguration {
+    std::vector<arhost_marker_config> markers;
+    std::uint32_t hold_frames = 0;
+};
+
+struct RaytracerConfiguration : ComponentConfiguration {
+    std::filesystem::path scene;
+    yaml::Node scene_node;
+};
+
+struct Configuration {
+    yaml::Node node;
+    Mode mode = Mode::lockstep;
+    std::uint64_t frames = 0; // 0: all
+    SourceConfiguration source;
+    std::optional<arhost_intrinsics> camera{};
+    std::optional<yaml::Node> camera_node{};
+    std::optional<TrackerConfiguration> tracker{};
+    std::optional<RaytracerConfiguration> raytracer{};
+    std::optional<camera::Coordinates> coordinates{};
+    std::vector<ComponentConfiguration> outputs{};
+    std::chrono::milliseconds max_latency{500};
+    std::optional<std::filesystem::path> stats{}; // absolute
+};
+
+// Reads the whole; throws yaml::Error at the first fault. `built_in_plugins` is where arhost's own are.
+Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins);
+
+} // namespace arhost::config

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/options.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+namespace arhost::config {
+namespace {
+
+ring::OptionValue value_of(const ring::OptionDeclaration &declared, const yaml::Node &node) {
+    ring::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
+    const bool bounded = declared.minimum != 0 || declared.maximum != 0;
+    const auto as_integer = [](double bound) { return static_cast<std::int64_t>(std::clamp(bound, -9e18, 9e18)); };
+    switch (declared.type) {
+    case ARHOST_OPTION_BOOL:
+        value.integer = node.boolean();
+        break;
+    case ARHOST_OPTION_INTEGER:
+        value.integer = bounded ? node.integer(as_integer(declared.minimum), as_integer(declared.maximum)) : node.integer();
+        break;
+    case ARHOST_OPTION_REAL:
+        value.real = bounded ? node.real(declared.minimum, declared.maximum) : node.real();
+        break;
+    case ARHOST_OPTION_INPUT_PATH:
+        value.text = node.input_path().string();
+        break;
+    case ARHOST_OPTION_OUTPUT_PATH:
+        value.text = std::filesystem::absolute(node.text()).lexically_normal().string();
+        break;
+    default:
+        if (declared.choices.empty()) {
+            value.text = node.text();
+        } else {
+            const std::vector<std::string_view> choices(declared.choices.begin(), declared.choices.end());
+            value.text = node.choice(choices);
+        }
+    }
+    return value;
+}
+
+// A default that the plugin declares badly is the plugin's fault, and is reported as such.
+ring::OptionValue default_of(const ring::OptionDeclaration &declared, const std::string &plugin) {
+    if (declared.default_value->empty())
+        return {declared.key, declared.type, 0, 0.0, ""};
+    const yaml::Node node = yaml::Node::parse("\"" + *declared.default_value + "\"", plugin + "'s default of '" + declared.key + "'");
+    return value_of(declared, node);
+}
+
+} // namespace
+
+std::vector<ring::OptionValue> resolve_options(const ring::PluginDescription &plugin,
+                                               const std::optional<yaml::Node> &options,
+                                               const std::optional<yaml::Node> &path, const yaml::Node &owner) {
+    std::vector<std::string_view> keys;
+    for (const ring::OptionDeclaration &declared : plugin.options)
+        keys.push_back(declared.key);
+    if (options)
+        options->allow_keys(keys);
+    if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
+        path->fail(plugin.id + " takes no path");
+
+    std::vector<ring::OptionValue> values;
+    for (const ring::OptionDeclaration &declared : plugin.options) {
+        std::optional<yaml::Node> given = options ? options->find(declared.key) : std::nullopt;
+        if (declared.key == "path" && path) {
+            if (given)
+                given->fail("the path stands beside 'plugin' already; keep one of them");
+            given = path;
+        }
+        if (given)
+            values.push_back(value_of(declared, *given));
+        else if (declared.default_value)
+            values.push_back(default_of(declared, plugin.id));
+        else
+            owner.fail(plugin.id + " needs '" + declared.key + "': " + declared.help);
+    }
+    return values;
+}
+
+} // namespace arhost::config

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/commands.hpp"
+
+#include "config/options.hpp"
+#include "config/schema.hpp"
+#include "host/probe.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+
+namespace arhost::host {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path own_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
+fs::path built_in_plugins() { return (own_folder() / "../lib/arhost").lexically_normal(); }
+
+supervise::Context make_context(ring::Reactor &reactor, supervise::Launcher &launcher, Console &console) {
+    return {reactor, launcher, own_folder() / "arhost-worker",
+            [&console](arhost_severity severity, const std::string &component, const std::string &text) {
+                console.log(severity, component, text);
+            }};
+}
+
+// The options of the dissertation's figure 7 stand above the file's `coordinates:`.
+std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
+    const bool any = arguments.ar || arguments.rt || arguments.g1 || arguments.g2;
+    if (!any)
+        return std::nullopt;
+    camera::Coordinates coordinates;
+    coordinates.ar = arguments.ar.value_or(coordinates.ar);
+    coordinates.rt = arguments.rt.value_or(coordinates.rt);
+    const auto axis = [](const double (&a)[3]) { return glm::dvec3(a[0], a[1], a[2]); };
+    if (arguments.g1)
+        coordinates.rotations.push_back({*arguments.g1, axis(arguments.axis1)});
+    if (arguments.g2)
+        coordinates.rotations.push_back({*arguments.g2, axis(arguments.axis2)});
+    if (arguments.g2 && !arguments.g1)
+        throw yaml::Error("--g2 needs --g1: the first rotation comes first");
+    if (const std::string problem = camera::problem_with(coordinates); !problem.empty())
+        throw yaml::Error("--ar … --z2: " + problem);
+    return coordinates;
+}
+
+config::Configuration read_configuration(const Arguments &arguments) {
+    yaml::Node root = yaml::Node::load(arguments.file);
+    for (const std::string &setting : arguments.settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals == 0 || equals == std::string::npos)
+            throw yaml::Error("--set " + setting + ": must be key.path=value, as in --set source.fps=30");
+        root.override_value(setting.substr(0, equals), setting.substr(equals + 1));
+    }
+    config::Configuration configuration = config::parse(root, built_in_plugins());
+    if (arguments.frames)
+        configuration.frames = *arguments.frames;
+    if (const auto coordinates = coordinates_of(arguments))
+        configuration.coordinates = coordinates;
+    return configuration;
+}
+
+double cpu_seconds_of_host() {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Whole under its name, or not there: written beside it and renamed.
+void write_statistics(const fs::path &file, const std::string &text) {
+    std::error_code ignored;
+    fs::create_directories(file.parent_path(), ignored);
+    const fs::path temporary = file.string() + ".tmp";
+    std::ofstream stream(temporary);
+    stream << text << std::flush;
+    stream.close();
+    if (!stream || ::rename(temporary.c_str(), file.c_str()) != 0) {
+        const std::string why = std::strerror(errno);
+        fs::remove(temporary, ignored);
+        throw yaml::Error("stats: can't write " + file.string() + ": " + why);
+    }
+}
+
+} // namespace
+
+int run(const Arguments &arguments, supervise::Launcher &launcher) {
+    Console console(arguments.verbose);
+    const config::Configuration configuration = read_configuration(arguments);
+
+    ring::Reactor reactor;
+    Pipeline *running = nullptr;
+    Pipeline pipeline(configuration, make_context(reactor, launcher, console),
+                      [&](const Progress &progress) { console.show(progress, running->statistics()); });
+    running = &pipeline;
+
+    sigset_t signals;
+    ::sigemptyset(&signals);
+    ::sigaddset(&signals, SIGINT);
+    ::sigaddset(&signals, SIGTERM);
+    ::sigprocmask(SIG_BLOCK, &signals, nullptr);
+    const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
+    bool stopped_by_signal = false;
+    const auto watch = reactor.watch(signal_fd.get(), [&] {
+        signalfd_siginfo info;
+        while (::read(signal_fd.get(), &info, sizeof info) > 0) {
+            stopped_by_signal = true;
+            console.log(ARHOST_INFO, "arhost", "stopping: the frames under way and the files are finished first");
+            pipeline.interrupt();
+        }
+    });
+
+    const bool whole = pipeline.run();
+    if (configuration.stats && pipeline.statistics().frames_in > 0)
+        write_statistics(*configuration.stats,
+                         report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host()).dump(2) + "\n");
+    if (!whole) {
+        console.log(ARHOST_ERROR, "arhost", pipeline.failure());
+        return pipeline.failed_by_configuration() ? bad_configuration : run_failed;
+    }
+    return stopped_by_signal ? interrupted : success;
+}
+
+int check(const Arguments &arguments, supervise::Launcher &launcher) {
+    Console console(arguments.verbose);
+    const config::Configuration configuration = read_configuration(arguments);
+    ring::Reactor reactor;
+    supervise::Context context = make_context(reactor, launcher, console);
+
+    const auto check_component = [&](const config::ComponentConfiguration &component, arhost_kind kind) {
+        for (std::size_t i = 0; i < component.plugins.size(); ++i) {
+            const ProbeResult result = probe(context, component.plugins[i]);
+            const yaml::Node node = component.node.require(i == 0 ? "plugin" : "fallback");
+            if (const auto *reason = std::get_if<std::string>(&result))
+                node.fail(*reason);
+            const auto &plugin = std::get<ring::PluginDescription>(result);
+            if (plugin.kind != kind)
+                node.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " + ring::to_text(kind));
+            config::resolve_options(plugin, i == 0 ? component.options : std::nullopt, component.path, component.node);
+        }
+    };
+    check_component(configuration.source, ARHOST_KIND_SOURCE);
+    if (configuration.tracker)
+        check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
+    if (configuration.raytracer)
+        check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
+    for (const config::ComponentConfiguration &output : configuration.outputs)
+        check_component(output, ARHOST_KIND_SINK);
+
+    if (configuration.raytracer) {
+        std::optional<std::string> outcome;
+        const SceneLoading loading(context, configuration.raytracer->scene,
+                                   {[&](const ring::SharedMemory &) { outcome = ""; },
+                                    [&](const std::string &reason) { outcome = reason; }});
+        while (!outcome)
+            reactor.run_once();
+        if (!outcome->empty())
+            throw yaml::Error(*outcome);
+    }
+    std::printf("%s: fine\n", arguments.file.c_str());
+    return success;
+}
+
+int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher) {
+    Console console(verbose);
+    ring::Reactor reactor;
+    supervise::Context context = make_context(reactor, launcher, console);
+    const std::vector<fs::path> files = config::PluginPath({}, built_in_plugins()).all();
+    int status = success;
+    for (const fs::path &file : files) {
+        const ProbeResult result = probe(context, file);
+        if (const auto *reason = std::get_if<std::string>(&result)) {
+            std::printf("%-18s can't be used: %s\n", file.stem().c_str(), reason->c_str());
+            status = run_failed;
+            continue;
+        }
+        const auto &plugin = std::get<ring::PluginDescription>(result);
+        std::printf("%-18s %-10s %-8s %s\n", plugin.id.c_str(), ring::to_text(plugin.kind), plugin.version.c_str(), file.c_str());
+        std::printf("%-18s %s\n", "", plugin.description.c_str());
+        if (!with_options)
+            continue;
+        for (const ring::OptionDeclaration &option : plugin.options) {
+            const std::string standard = option.default_value ? "default '" + *option.default_value + "'" : "required";
+            std::printf("    %-20s %s (%s)\n", option.key.c_str(), option.help.c_str(), standard.c_str());
+            if (!option.choices.empty()) {
+                std::printf("    %-20s one of:", "");
+                for (const std::string &choice : option.choices)
+                    std::printf(" %s", choice.c_str());
+                std::printf("\n");
+            }
+        }
+    }
+    if (files.empty())
+        std::printf("no plugins in %s\n", built_in_plugins().c_str());
+    return status;
+}
+
+int print_schema(bool markdown) {
+    const std::string text = markdown ? config::schema_as_markdown() : config::schema_as_json_schema();
+    std::fputs(text.c_str(), stdout);
+    return success;
+}
+
+} // namespace arhost::host

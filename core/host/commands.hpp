@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What `arhost` can be told to do; each returns the exit status (docs/config.md lists them).
+#pragma once
+
+#include "camera/coordinates.hpp"
+#include "host/console.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace arhost::host {
+
+enum ExitStatus { success = 0, run_failed = 1, bad_configuration = 2, interrupted = 130 };
+
+// The command line, as far as it is about a configuration.
+struct Arguments {
+    std::string file;
+    std::vector<std::string> settings; // "key.path=value"
+    std::optional<std::uint64_t> frames;
+    std::optional<int> ar, rt;
+    std::optional<double> g1, g2;
+    double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
+    bool verbose = false;
+};
+
+// All take a launcher that was forked before any thread.
+int run(const Arguments &arguments, supervise::Launcher &launcher);
+int check(const Arguments &arguments, supervise::Launcher &launcher);
+int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher);
+int print_schema(bool markdown);
+
+} // namespace arhost::host

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/console.hpp"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+#include <cstdio>
+#include <unistd.h>
+
+namespace arhost::host {
+namespace {
+
+// Whatever a component logs, it stays one line and can't steer the terminal.
+std::string one_line(const std::string &text) {
+    std::string line = text;
+    for (char &c : line)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            c = ' ';
+    return line;
+}
+
+} // namespace
+
+Console::Console(bool verbose)
+    : terminal_(::isatty(STDERR_FILENO) != 0),
+      logger_(std::make_shared<spdlog::logger>("arhost", std::make_shared<spdlog::sinks::stderr_color_sink_st>())) {
+    logger_->set_pattern("%^%l%$: %v");
+    logger_->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
+}
+
+Console::~Console() { clear_line(); }
+
+void Console::clear_line() {
+    if (line_shown_)
+        std::fputs("\r\033[K", stderr);
+    line_shown_ = false;
+}
+
+void Console::log(arhost_severity severity, const std::string &component, const std::string &text) {
+    const auto level = severity >= ARHOST_ERROR       ? spdlog::level::err
+                       : severity == ARHOST_WARNING ? spdlog::level::warn
+                       : severity == ARHOST_INFO    ? spdlog::level::info
+                                                    : spdlog::level::debug;
+    if (!logger_->should_log(level))
+        return;
+    clear_line();
+    const char *blame = severity == ARHOST_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
+                        : severity == ARHOST_HOST_MISBEHAVING ? "the host misbehaves: "
+                                                              : "";
+    logger_->log(level, "{}: {}{}", component, blame, one_line(text));
+}
+
+void Console::show(const Progress &progress, const Statistics &statistics) {
+    const auto now = std::chrono::steady_clock::now();
+    const auto patience = terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(5000);
+    if (last_shown_ == std::chrono::steady_clock::time_point{})
+        last_shown_ = now;
+    if (now - last_shown_ < patience && !progress.finishing)
+        return;
+    const double seconds = std::chrono::duration<double>(now - last_shown_).count();
+    const double fps = seconds > 0 ? static_cast<double>(progress.frame - last_frame_) / seconds : 0;
+    const std::string total = progress.frame_count ? "/" + std::to_string(progress.frame_count) : "";
+    std::string line = fmt::format("frame {}{}", progress.frame, total);
+    if (progress.finishing)
+        line += fmt::format("  {:.1f} fps  finishing the outputs", statistics.fps());
+    else
+        line += fmt::format("  {:.1f} fps", fps);
+    for (const char *stage : {"source", "tracker", "raytracer", "composite"})
+        if (const auto timing = statistics.stages.find(stage); timing != statistics.stages.end())
+            line += fmt::format("  {} {:.1f} ms", stage, timing->second.percentile_ms(0.5));
+    if (terminal_) {
+        std::fprintf(stderr, "\r\033[K%s", line.c_str());
+        line_shown_ = true;
+    } else {
+        std::fprintf(stderr, "%s\n", line.c_str());
+    }
+    last_shown_ = now;
+    last_frame_ = progress.frame;
+}
+
+} // namespace arhost::host

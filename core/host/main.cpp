@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost: the command line.
+#include "host/commands.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+int main(int argc, char **argv) {
+    using namespace arhost::host;
+
+    CLI::App app("arhost lays ray-traced objects over live video. Its trackers, ray tracers, sources and outputs are\n"
+                 "plugins, each in a process of its own; a YAML file says which run.");
+    app.set_version_flag("--version", "arhost " ARHOST_VERSION);
+    app.require_subcommand(0, 1);
+    app.get_formatter()->column_width(34);
+
+    Arguments arguments;
+    const auto add_configuration_options = [&](CLI::App &command) {
+        command.add_option("--set", arguments.settings, "Override a value: key.path=value (again for more)")
+            ->type_name("KEY=VALUE")
+            ->allow_extra_args(false);
+        command.add_flag("-v,--verbose", arguments.verbose, "Log what components say in detail");
+    };
+    app.add_option("--config", arguments.file, "The configuration to run (docs/config.md)")->type_name("FILE");
+    add_configuration_options(app);
+    app.add_option("--frames", arguments.frames, "Stop after so many frames")->type_name("N");
+    CLI::Option_group &axes = *app.add_option_group(
+        "Coordinates", "The dissertation's options (docs/camera.md); they stand above 'coordinates:' in the file");
+    axes.add_option("--ar", arguments.ar, "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");
+    axes.add_option("--rt", arguments.rt, "Profile of the scene, likewise");
+    axes.add_option("--g1,--g", arguments.g1, "First rotation, degrees");
+    axes.add_option("--x1,--x", arguments.axis1[0], "Its axis");
+    axes.add_option("--y1,--y", arguments.axis1[1]);
+    axes.add_option("--z1,--z", arguments.axis1[2]);
+    axes.add_option("--g2", arguments.g2, "Second rotation, degrees");
+    axes.add_option("--x2", arguments.axis2[0], "Its axis");
+    axes.add_option("--y2", arguments.axis2[1]);
+    axes.add_option("--z2", arguments.axis2[2]);
+
+    CLI::App *check_command = app.add_subcommand("check", "Check a configuration, its plugins' options and its scene");
+    check_command->add_option("FILE", arguments.file, "The configuration")->required();
+    add_configuration_options(*check_command);
+
+    bool with_options = false;
+    CLI::App *plugins_command = app.add_subcommand("plugins", "List the plugins, or why one can't be used");
+    plugins_command->add_flag("--options", with_options, "With their options");
+
+    bool markdown = false;
+    CLI::App *schema_command = app.add_subcommand("schema", "Print the JSON Schema of configurations, for editors");
+    schema_command->add_flag("--markdown", markdown, "As the table of docs/config.md");
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &error) {
+        return app.exit(error) == 0 ? success : bad_configuration;
+    }
+    try {
+        if (*schema_command)
+            return print_schema(markdown);
+        arhost::supervise::Launcher launcher; // before any thread
+        if (*check_command)
+            return check(arguments, launcher);
+        if (*plugins_command)
+            return list_plugins(with_options, arguments.verbose, launcher);
+        if (arguments.file.empty()) {
+            std::fputs(app.help().c_str(), stderr);
+            return bad_configuration;
+        }
+        return run(arguments, launcher);
+    } catch (const arhost::yaml::Error &error) {
+        std::fprintf(stderr, "error: %s\n", error.what());
+        return bad_configuration;
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "error: %s\n", error.what());
+        return run_failed;
+    }
+}

@@ -1,0 +1,644 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/pipeline.hpp"
+
+#include "camera/calibration.hpp"
+#include "camera/mapping.hpp"
+#include "compositor/compositor.hpp"
+#include "config/options.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace arhost::host {
+
+using namespace ring;
+using supervise::Component;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4, output_slot_count = 6;
+constexpr std::size_t reads_in_flight = 2;
+constexpr std::size_t live_sink_depth = 3;
+constexpr std::uint32_t max_tries = 2; // a frame that was in a worker's hands at two deaths is suspect
+
+std::shared_ptr<SlotPool> pool_of(const Component &component) {
+    return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
+}
+
+} // namespace
+
+Pipeline::Pipeline(const config::Configuration &configuration, supervise::Context context,
+                   std::function<void(const Progress &)> on_progress)
+    : configuration_(configuration), context_(std::move(context)), on_progress_(std::move(on_progress)),
+      live_(configuration.mode == config::Mode::live) {}
+
+bool Pipeline::run() {
+    make_source();
+    source_->start();
+    if (configuration_.raytracer) {
+        SceneLoading::Hooks hooks;
+        hooks.loaded = [this](SharedMemory arena) {
+            arena_ = std::move(arena);
+            scene_loading_.reset();
+        };
+        hooks.failed = [this](const std::string &reason) {
+            fail(reason, true);
+            scene_loading_.reset();
+        };
+        scene_loading_ = std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene, std::move(hooks));
+    }
+    while (phase_ != Phase::over) {
+        context_.reactor.run_once();
+        pump();
+    }
+    return failure_.empty();
+}
+
+// ---- components ------------------------------------------------------------------------------------
+
+Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &node) {
+    Component::Hooks hooks;
+    hooks.ready = [](const Json &) { return SlotLayout{}; };
+    hooks.running = [] {};
+    hooks.ended = [] {};
+    hooks.stopped = [this, name](arhost_status status, const std::string &text) {
+        if (status != ARHOST_OK)
+            fail(name + ": " + (text.empty() ? status_text(status) : text), false);
+    };
+    hooks.given_up = [this, name, node](const std::string &reason, bool by_configuration) {
+        give_up(name, node, reason, by_configuration);
+    };
+    return hooks;
+}
+
+namespace {
+
+void check_kind(const PluginDescription &plugin, arhost_kind kind, const yaml::Node &node) {
+    if (plugin.kind != kind)
+        node.require("plugin").fail("'" + plugin.id + "' is a " + to_text(plugin.kind) + ", not a " + to_text(kind));
+}
+
+// Options for the plugin as configured; a fallback takes its defaults.
+Json options_for(const PluginDescription &plugin, const config::ComponentConfiguration &component,
+                 std::size_t candidate) {
+    const bool configured = candidate == 0;
+    return to_json(config::resolve_options(plugin, configured ? component.options : std::nullopt, component.path,
+                                           component.node));
+}
+
+} // namespace
+
+void Pipeline::make_source() {
+    const config::SourceConfiguration &source = configuration_.source;
+    Component::Hooks hooks = hooks_for("source", source.node);
+    hooks.hello = [this, &source](const PluginDescription &plugin, std::size_t candidate) {
+        check_kind(plugin, ARHOST_KIND_SOURCE, source.node);
+        Json setup = {{"first_sequence", next_read_}, {"fps", source.fps}, {"paced", live_}};
+        if (configuration_.camera)
+            setup["intrinsics"] = to_json(*configuration_.camera);
+        return Component::Create{{{"options", options_for(plugin, source, candidate)}, {"setup", setup}}, {}};
+    };
+    hooks.ready = [this, &source](const Json &ready) {
+        const arhost_frame_format format = format_from_json(ready.at("format"));
+        if (format_ && (format.pixel_format != format_->pixel_format || format.width != format_->width ||
+                        format.height != format_->height))
+            throw std::runtime_error("the restarted source gives frames of another format");
+        format_ = format;
+        frame_count_ = ready.at("frame_count").get<std::uint64_t>();
+        if (configuration_.camera)
+            intrinsics_ = *configuration_.camera;
+        else if (ready.contains("intrinsics"))
+            intrinsics_ = intrinsics_from_json(ready["intrinsics"]);
+        else if (configuration_.tracker)
+            source.node.fail("this source does not know its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
+        if (configuration_.tracker) {
+            try {
+                camera::check_size(intrinsics_, format.width, format.height);
+            } catch (const std::runtime_error &error) {
+                configuration_.camera_node.value_or(source.node).fail(error.what());
+            }
+        }
+        return SlotLayout{format.byte_size, source_slot_count};
+    };
+    hooks.running = [this] { source_slots_ = pool_of(*source_); };
+    hooks.result = [this](const Command &command, const Result &result) { on_read(command, result); };
+    hooks.lost = [this](const std::vector<Command> &unanswered) {
+        reads_.clear();
+        source_slots_.reset();
+        if (!unanswered.empty())
+            next_read_ = std::min(next_read_, unanswered.front().sequence);
+        const std::uint32_t capabilities = source_->description().capabilities;
+        if (next_read_ > 0 && !(capabilities & (ARHOST_CAN_SEEK | ARHOST_IS_LIVE)) && !ended_) {
+            ended_ = true;
+            fail("source: " + source_->description().id + " died, and can't go on in the middle", false);
+        }
+    };
+    source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, std::move(hooks));
+}
+
+void Pipeline::make_tracker() {
+    const config::TrackerConfiguration &tracker = *configuration_.tracker;
+    for (const arhost_marker_config &marker : tracker.markers)
+        marker_ids_.insert(marker.id);
+    Component::Hooks hooks = hooks_for("tracker", tracker.node);
+    hooks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
+        check_kind(plugin, ARHOST_KIND_TRACKER, tracker.node);
+        Json markers = Json::array();
+        for (const arhost_marker_config &marker : tracker.markers)
+            markers.push_back({{"id", marker.id}, {"side_mm", marker.side_mm}});
+        return Component::Create{
+            {{"options", options_for(plugin, tracker, candidate)},
+             {"setup", {{"format", to_json(*format_)}, {"intrinsics", to_json(intrinsics_)}, {"markers", markers}}}},
+            {}};
+    };
+    hooks.ready = [](const Json &) { return SlotLayout{sizeof(arhost_tracker_result), stage_slot_count}; };
+    hooks.running = [this] { tracker_slots_ = pool_of(*tracker_); };
+    hooks.result = [this](const Command &command, const Result &result) { on_tracked(command, result); };
+    hooks.lost = [this](const std::vector<Command> &unanswered) {
+        on_stage_lost(unanswered, Frame::Stage::to_track, "tracker");
+    };
+    tracker_ = std::make_unique<Component>(context_, "tracker", tracker.plugins, tracker.limits, std::move(hooks));
+}
+
+void Pipeline::make_raytracer() {
+    const config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
+    Component::Hooks hooks = hooks_for("raytracer", raytracer.node);
+    hooks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
+        check_kind(plugin, ARHOST_KIND_RAYTRACER, raytracer.node);
+        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS))
+            context_.log(ARHOST_WARNING, "raytracer",
+                         plugin.id + " can't trace through a distorted lens; the overlay will be off towards the corners");
+        return Component::Create{
+            {{"options", options_for(plugin, raytracer, candidate)},
+             {"setup", {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(intrinsics_)}}}},
+            {arena_.fd()}};
+    };
+    hooks.ready = [this](const Json &) {
+        return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
+    };
+    hooks.running = [this] { raytracer_slots_ = pool_of(*raytracer_); };
+    hooks.result = [this](const Command &command, const Result &result) { on_rendered(command, result); };
+    hooks.lost = [this](const std::vector<Command> &unanswered) {
+        on_stage_lost(unanswered, Frame::Stage::to_render, "raytracer");
+    };
+    raytracer_ = std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits, std::move(hooks));
+}
+
+void Pipeline::make_outputs() {
+    output_slots_ = std::make_shared<SlotPool>(supervise::make_host_region(
+        "arhost-outputs", {OutputSlot::byte_size(format_->width, format_->height), output_slot_count}));
+    for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
+        const config::ComponentConfiguration &output = configuration_.outputs[i];
+        std::string name = output.plugins.front().stem().string();
+        if (std::any_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return sink->component->name() == name; }))
+            name += "#" + std::to_string(i);
+        sinks_.push_back(std::make_unique<SinkQueue>(live_ ? live_sink_depth : 0, statistics_));
+        SinkQueue *sink = sinks_.back().get();
+        Component::Hooks hooks = hooks_for(name, output.node);
+        hooks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
+            check_kind(plugin, ARHOST_KIND_SINK, output.node);
+            const double fps = configuration_.source.fps > 0 ? configuration_.source.fps : format_->fps;
+            return Component::Create{{{"options", options_for(plugin, output, candidate)},
+                                      {"setup",
+                                       {{"width", format_->width},
+                                        {"height", format_->height},
+                                        {"fps", fps},
+                                        {"first_sequence", sink->first_sequence()}}}},
+                                     {}};
+        };
+        hooks.result = [this, sink, name](const Command &command, const Result &result) {
+            sink->on_result(command, result);
+            if (result.status == ARHOST_END)
+                interrupt();
+            if (result.status >= 0 || sink->failed)
+                return;
+            // A full disk does not mend itself: what is whole is kept, the video goes on elsewhere.
+            sink->failed = true;
+            sink->clear();
+            fail(name + ": can't write frame " + std::to_string(command.sequence) + ": " + status_text(result.status) +
+                     "; its messages above say more",
+                 false);
+            sink->component->stop();
+        };
+        hooks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
+        hooks.ended = [this] { interrupt(); };
+        hooks.given_up = [this, sink, name, &output](const std::string &reason, bool by_configuration) {
+            sink->failed = true;
+            sink->clear();
+            give_up(name, output.node, reason, by_configuration);
+        };
+        sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, std::move(hooks));
+        sink->component->start();
+    }
+}
+
+std::vector<Component *> Pipeline::components() const {
+    std::vector<Component *> all;
+    for (const auto *component : {&source_, &tracker_, &raytracer_})
+        if (*component)
+            all.push_back(component->get());
+    for (const auto &sink : sinks_)
+        all.push_back(sink->component.get());
+    return all;
+}
+
+// ---- the run ---------------------------------------------------------------------------------------
+
+void Pipeline::pump() {
+    if (abandoned_) {
+        for (Component *component : components())
+            component->kill();
+        phase_ = Phase::over;
+        return;
+    }
+    if (phase_ < Phase::running)
+        enter_next_phase();
+    if (phase_ == Phase::running) {
+        while (read() || track() || render() || compose()) {
+        }
+        bool sinks_empty = true;
+        for (const auto &sink : sinks_) {
+            sink->pump();
+            sinks_empty = sinks_empty && (sink->empty() || sink->failed);
+        }
+        if (ended_ && reads_.empty() && frames_.empty() && sinks_empty)
+            stop_components();
+    }
+    if (phase_ == Phase::stopping) {
+        for (const auto &sink : sinks_)
+            sink->pump();
+        const auto all = components();
+        if (std::all_of(all.begin(), all.end(),
+                        [](const Component *component) { return component->state() == Component::State::stopped; }))
+            phase_ = Phase::over;
+    }
+}
+
+void Pipeline::enter_next_phase() {
+    const auto settled = [](const std::unique_ptr<Component> &component) { return !component || component->running(); };
+    if (phase_ == Phase::source && source_->running() && !scene_loading_ &&
+        (!configuration_.raytracer || arena_)) {
+        if (configuration_.tracker) {
+            make_tracker();
+            tracker_->start();
+        }
+        if (configuration_.raytracer) {
+            coordinates_ = configuration_.coordinates.value_or(
+                camera::default_for(arena_.map(Access::read_only).as<const arhost_scene>().axes));
+            make_raytracer();
+            raytracer_->start();
+        }
+        phase_ = Phase::stages;
+    }
+    if (phase_ == Phase::stages && settled(tracker_) && settled(raytracer_)) {
+        make_outputs(); // last, so that no file is touched by a run that can't begin
+        phase_ = Phase::outputs;
+    }
+    if (phase_ == Phase::outputs && std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) {
+            return settled(sink->component);
+        }))
+        phase_ = Phase::running;
+}
+
+bool Pipeline::read() {
+    const std::uint64_t limit = configuration_.frames;
+    if (limit && next_read_ >= limit)
+        ended_ = true;
+    if (ended_ || !source_->running() || reads_.size() >= reads_in_flight)
+        return false;
+    std::optional<Lease> slot = source_slots_->acquire();
+    if (!slot)
+        return false;
+    Command command{};
+    command.kind = CommandKind::read;
+    command.slot = slot->index();
+    command.sequence = next_read_++;
+    reads_.push_back(std::move(*slot));
+    source_->submit(command);
+    return true;
+}
+
+void Pipeline::on_read(const Command &command, const Result &result) {
+    Lease pixels = std::move(reads_.front());
+    reads_.pop_front();
+    if (command.sequence >= next_read_) // the frame before it failed, and comes first
+        return;
+    if (result.status == ARHOST_END || (ended_ && result.status < 0)) {
+        ended_ = true;
+        return;
+    }
+    if (ended_ && interrupted_ && live_)
+        return;
+    if (result.status < 0) {
+        next_read_ = command.sequence; // it is tried again after the restart
+        return source_->end_process(std::string("gave no frame: ") + status_text(result.status));
+    }
+    auto frame = std::make_unique<Frame>();
+    frame->record.struct_size = sizeof(arhost_record);
+    frame->record.sequence = command.sequence;
+    frame->record.overlay = ARHOST_OVERLAY_NONE;
+    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, frame->record)) {
+        next_read_ = command.sequence;
+        return source_->end_process(std::string("broke the contract: ") + problem);
+    }
+    last_capture_ns_ = result.frame.capture_ns;
+    frame->received = Clock::now();
+    frame->pixels = std::move(pixels);
+    if (statistics_.frames_in++ == 0)
+        statistics_.first_frame = frame->received;
+    statistics_.dropped["source"] += result.frame.skipped;
+    statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
+    Frame &added = *(frames_[command.sequence] = std::move(frame));
+    if (!tracker_)
+        added.stage = Frame::Stage::done;
+    else if (live_ && is_behind())
+        pass(added, "latency");
+    else
+        wait_for(added, Frame::Stage::to_track);
+}
+
+bool Pipeline::track() {
+    Frame *frame = next_waiting(Frame::Stage::to_track);
+    if (!frame)
+        return false;
+    if (may_pass(tracker_.get())) {
+        pass(*frame, "tracker");
+        return true;
+    }
+    if (!tracker_->running() || tracker_->in_flight() >= (live_ ? 1u : 2u))
+        return false;
+    std::optional<Lease> slot = tracker_slots_->acquire();
+    if (!slot)
+        return false;
+    frame->result = std::move(*slot);
+    frame->stage = Frame::Stage::tracking;
+    Command command{};
+    command.kind = CommandKind::track;
+    command.slot = frame->result.index();
+    command.input_slot = frame->pixels.index();
+    command.sequence = frame->record.sequence;
+    command.capture_ns = frame->record.capture_ns;
+    command.clock = frame->record.clock;
+    tracker_->submit(command, frame->pixels.region());
+    return true;
+}
+
+void Pipeline::on_tracked(const Command &command, const Result &result) {
+    statistics_.stages["tracker"].add(std::chrono::nanoseconds(result.busy_ns));
+    const auto found = frames_.find(command.sequence);
+    if (found == frames_.end())
+        return;
+    Frame &frame = *found->second;
+    if (frame.overtaken) {
+        ++statistics_.dropped["late"];
+        frames_.erase(found);
+        return;
+    }
+    frame.tries = 0;
+    if (result.status < 0) {
+        context_.log(ARHOST_WARNING, "tracker", "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        return pass(frame, "tracker");
+    }
+    const char *problem = take_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
+    frame.result = Lease();
+    if (problem) {
+        pass(frame, "tracker");
+        return tracker_->end_process(std::string("broke the contract: ") + problem);
+    }
+    // The first in the order of the configuration; trackers report in that order.
+    const std::span markers(frame.record.markers, frame.record.marker_count);
+    const auto anchor =
+        std::find_if(markers.begin(), markers.end(), [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
+    if (anchor != markers.end()) {
+        ++statistics_.tracked;
+        last_camera_ = {command.sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
+    }
+    const std::uint32_t hold = configuration_.tracker->hold_frames;
+    if (!last_camera_ || command.sequence - last_camera_->first > hold) {
+        frame.stage = Frame::Stage::done;
+        return;
+    }
+    frame.held = last_camera_->first != command.sequence;
+    frame.record.camera = last_camera_->second;
+    frame.record.has_camera = 1;
+    if (raytracer_)
+        wait_for(frame, Frame::Stage::to_render);
+    else
+        frame.stage = Frame::Stage::done;
+}
+
+bool Pipeline::render() {
+    Frame *frame = next_waiting(Frame::Stage::to_render);
+    if (!frame)
+        return false;
+    if (may_pass(raytracer_.get())) {
+        pass(*frame, "raytracer");
+        return true;
+    }
+    if (!raytracer_->running() || raytracer_->in_flight() >= (live_ ? 1u : 2u))
+        return false;
+    std::optional<Lease> slot = raytracer_slots_->acquire();
+    if (!slot)
+        return false;
+    frame->overlay = std::move(*slot);
+    frame->stage = Frame::Stage::rendering;
+    Command command{};
+    command.kind = CommandKind::render;
+    command.slot = frame->overlay.index();
+    command.sequence = frame->record.sequence;
+    command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
+    command.camera = frame->record.camera;
+    raytracer_->submit(command);
+    return true;
+}
+
+void Pipeline::on_rendered(const Command &command, const Result &result) {
+    statistics_.stages["raytracer"].add(std::chrono::nanoseconds(result.busy_ns));
+    const auto found = frames_.find(command.sequence);
+    if (found == frames_.end())
+        return;
+    Frame &frame = *found->second;
+    if (frame.overtaken) {
+        ++statistics_.dropped["late"];
+        frames_.erase(found);
+        return;
+    }
+    if (result.status < 0) {
+        context_.log(ARHOST_WARNING, "raytracer",
+                     "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        return pass(frame, "raytracer");
+    }
+    frame.render = result.render;
+    frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
+    frame.stage = Frame::Stage::done;
+}
+
+void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stage waiting, const char *stage) {
+    (waiting == Frame::Stage::to_track ? tracker_slots_ : raytracer_slots_).reset();
+    for (const Command &command : unanswered) {
+        const auto found = frames_.find(command.sequence);
+        if (found == frames_.end())
+            continue;
+        Frame &frame = *found->second;
+        frame.result = Lease();
+        frame.overlay = Lease();
+        // Only the oldest was in the worker's hands when it died.
+        const bool worked_on = &command == &unanswered.front();
+        if (frame.overtaken)
+            frames_.erase(found);
+        else if (live_ || (worked_on && ++frame.tries >= max_tries))
+            pass(frame, stage);
+        else
+            frame.stage = waiting;
+    }
+}
+
+bool Pipeline::may_pass(const Component *stage) const {
+    return live_ ? !stage->running() : stage->state() == Component::State::given_up;
+}
+
+bool Pipeline::is_behind() const {
+    const Clock::time_point limit = Clock::now() - configuration_.max_latency;
+    return std::any_of(frames_.begin(), frames_.end(), [&](const auto &entry) {
+        return entry.second->in_worker() && entry.second->received < limit;
+    });
+}
+
+void Pipeline::pass(Frame &frame, const char *stage) {
+    frame.result = Lease();
+    frame.overlay = Lease();
+    frame.record.overlay = ARHOST_OVERLAY_NONE;
+    frame.stage = Frame::Stage::done;
+    ++statistics_.passed[stage];
+}
+
+// In mode live a frame that waits takes the place of an older one that waits for the same stage.
+void Pipeline::wait_for(Frame &frame, Frame::Stage stage) {
+    if (live_)
+        for (auto it = frames_.begin(); it != frames_.end();) {
+            const bool replaced = it->second->stage == stage && it->second.get() != &frame;
+            if (replaced)
+                ++statistics_.dropped[stage == Frame::Stage::to_track ? "tracker" : "raytracer"];
+            it = replaced ? frames_.erase(it) : std::next(it);
+        }
+    frame.stage = stage;
+}
+
+Frame *Pipeline::next_waiting(Frame::Stage stage) {
+    for (const auto &[sequence, frame] : frames_)
+        if (frame->stage == stage)
+            return frame.get();
+    return nullptr;
+}
+
+bool Pipeline::compose() {
+    // In lockstep the oldest frame; in live the newest one that is done.
+    auto ready = frames_.begin();
+    if (live_)
+        for (auto it = frames_.begin(); it != frames_.end(); ++it)
+            if (it->second->stage == Frame::Stage::done)
+                ready = it;
+    if (ready == frames_.end() || ready->second->stage != Frame::Stage::done)
+        return false;
+    const bool wanted = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->failed; });
+    if (wanted) {
+        std::optional<Lease> slot = output_slots_->acquire();
+        if (!slot && !live_)
+            return false; // the outputs are behind; the source waits for them in turn
+        if (slot) {
+            auto output = std::make_shared<OutputFrame>(ready->first, std::move(*slot));
+            compose(*ready->second, output->slot.bytes());
+            for (const auto &sink : sinks_)
+                sink->offer(output);
+            for (const auto &sink : sinks_)
+                sink->pump();
+        } else {
+            ++statistics_.dropped["output"];
+        }
+    }
+    const std::uint64_t shown = ready->first;
+    ++statistics_.composited;
+    statistics_.augmented += ready->second->record.overlay != ARHOST_OVERLAY_NONE;
+    statistics_.last_frame = Clock::now();
+    statistics_.stages["latency"].add(statistics_.last_frame - ready->second->received);
+    frames_.erase(ready);
+    if (live_)
+        forget_overtaken(shown);
+    on_progress_({statistics_.composited, configuration_.frames ? configuration_.frames : frame_count_, false});
+    return true;
+}
+
+void Pipeline::compose(const Frame &frame, std::span<std::byte> slot) {
+    const Clock::time_point begin = Clock::now();
+    const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
+    for (std::uint32_t i = 0; i < format_->plane_count; ++i)
+        planes[i] = pixels + format_->offset[i];
+    ImageView overlay;
+    Region region;
+    if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
+        overlay = {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
+        region = region_of(frame.render, format_->width, format_->height);
+    }
+    // The markers past marker_count are left as they are: they carry no meaning.
+    const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
+    std::memcpy(slot.data(), &frame.record, used);
+    composite(*format_, planes, overlay, region,
+              {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset, OutputSlot::stride(format_->width)});
+    statistics_.stages["composite"].add(Clock::now() - begin);
+}
+
+void Pipeline::forget_overtaken(std::uint64_t shown) {
+    for (auto it = frames_.begin(); it != frames_.end() && it->first < shown;) {
+        it->second->overtaken = it->second->in_worker();
+        statistics_.dropped["late"] += !it->second->in_worker();
+        it = it->second->in_worker() ? std::next(it) : frames_.erase(it);
+    }
+}
+
+// ---- the end ---------------------------------------------------------------------------------------
+
+void Pipeline::interrupt() {
+    // Before the first frame nothing has been written: there is nothing to finish.
+    abandoned_ = interrupted_ || phase_ < Phase::running;
+    interrupted_ = ended_ = true;
+    source_->cancel_call();
+}
+
+void Pipeline::stop_components() {
+    if (phase_ >= Phase::stopping)
+        return;
+    phase_ = Phase::stopping;
+    scene_loading_.reset();
+    on_progress_({statistics_.composited, statistics_.composited, true});
+    for (Component *stage : {source_.get(), tracker_.get(), raytracer_.get()})
+        if (stage)
+            stage->running() ? stage->stop() : stage->kill();
+    // A sink that is down is started once more, to finish its files.
+    for (const auto &sink : sinks_)
+        if (sink->component->state() != Component::State::stopped)
+            sink->component->stop();
+}
+
+void Pipeline::fail(const std::string &reason, bool by_configuration) {
+    context_.log(ARHOST_DEBUG, "arhost", reason);
+    if (failure_.empty()) {
+        failure_ = reason;
+        failed_by_configuration_ = by_configuration;
+    }
+    abandoned_ = abandoned_ || phase_ < Phase::running;
+}
+
+void Pipeline::give_up(const std::string &name, const yaml::Node &node, const std::string &reason, bool by_configuration) {
+    // What the configuration's own check said begins with its place in the file.
+    const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--set");
+    fail(located ? reason : node.where() + ": " + name + ": " + reason, by_configuration);
+    if (phase_ != Phase::running)
+        return;
+    context_.log(ARHOST_ERROR, name, reason + "; the video goes on without it");
+    if (name == "source")
+        ended_ = true;
+}
+
+} // namespace arhost::host

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Asks a plugin, in a worker of its own, who it is: for `arhost plugins` and `arhost check`.
+#pragma once
+
+#include "ring/json_abi.hpp"
+#include "supervise/process.hpp"
+
+#include <filesystem>
+#include <string>
+#include <variant>
+
+namespace arhost::host {
+
+// The description, or the reason why the plugin can't be used.
+using ProbeResult = std::variant<ring::PluginDescription, std::string>;
+
+ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin);
+
+} // namespace arhost::host

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/scene_loading.hpp"
+
+#include "scene/arena.hpp"
+
+namespace arhost::host {
+
+using namespace ring;
+
+SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, Hooks hooks)
+    : context_(context), hooks_(std::move(hooks)) {
+    supervise::Process::Events events;
+    events.message = [this](Message &message) {
+        const std::string type = message.body.at("type").get<std::string>();
+        if (type == "failed")
+            failure_ = message.body.at("text").get<std::string>();
+        else if (type == "loaded" && message.fds.size() == 1)
+            arena_ = std::move(message.fds[0]);
+        else if (type == "progress")
+            context_.log(ARHOST_DEBUG, "scene", message.body.at("what").get<std::string>());
+    };
+    events.result = [](const Result &) {};
+    events.died = [this](const supervise::Death &death) { on_died(death); };
+    process_ = std::make_unique<supervise::Process>(context, "scene", std::move(events),
+                                                    Json{{"type", "load"}, {"scene", scene.string()}});
+}
+
+void SceneLoading::on_died(const supervise::Death &death) {
+    const Hooks hooks = std::move(hooks_);
+    if (!death.clean || !arena_)
+        return hooks.failed(failure_.empty() ? "the scene loader was " + death.how : failure_);
+    try {
+        // The loader is gone, so nobody maps it writable; where somebody does, this throws.
+        SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
+        const Mapping mapping = arena.map(Access::read_only);
+        if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
+            return hooks.failed("the loaded scene is not valid: " + fault);
+        hooks.loaded(std::move(arena));
+    } catch (const std::exception &error) {
+        hooks.failed(std::string("the scene loader's memory can't be used: ") + error.what());
+    }
+}
+
+} // namespace arhost::host

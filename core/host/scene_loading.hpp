@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Has a scene loaded by a worker of its own, since parsers of meshes are attack surface, and checks what
+// comes back before anyone else sees it.
+#pragma once
+
+#include "supervise/process.hpp"
+
+#include <arhost/scene.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+namespace arhost::host {
+
+class SceneLoading {
+public:
+    // Exactly one of the two is called, from the reactor; the SceneLoading may be destroyed in it.
+    struct Hooks {
+        std::function<void(ring::SharedMemory arena)> loaded; // frozen and valid
+        std::function<void(const std::string &reason)> failed;
+    };
+    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, Hooks hooks);
+
+private:
+    void on_died(const supervise::Death &death);
+
+    supervise::Context &context_;
+    Hooks hooks_;
+    std::string failure_;
+    ring::UniqueFd arena_;
+    std::unique_ptr<supervise::Process> process_;
+};
+
+} // namespace arhost::host

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/sink_queue.hpp"
+
+namespace arhost::host {
+
+using namespace ring;
+
+void SinkQueue::offer(OutputFramePointer frame) {
+    if (failed)
+        return;
+    waiting_.push_back(std::move(frame));
+    if (depth_ > 0 && waiting_.size() > depth_) {
+        waiting_.pop_front();
+        ++statistics_.dropped[component->name()];
+    }
+}
+
+void SinkQueue::pump() {
+    while (!failed && component->running() && !waiting_.empty() && component->in_flight() < in_flight_limit) {
+        const OutputFramePointer frame = waiting_.front();
+        waiting_.pop_front();
+        unconfirmed_.push_back(frame);
+        Command command{};
+        command.kind = CommandKind::write;
+        command.input_slot = frame->slot.index();
+        command.sequence = frame->sequence;
+        component->submit(command, frame->slot.region());
+    }
+}
+
+void SinkQueue::on_result(const Command &command, const Result &result) {
+    next_sequence_ = command.sequence + 1;
+    if (!unconfirmed_.empty())
+        unconfirmed_.pop_front();
+    statistics_.stages[component->name()].add(std::chrono::nanoseconds(result.busy_ns));
+}
+
+void SinkQueue::on_lost() {
+    waiting_.insert(waiting_.begin(), unconfirmed_.begin(), unconfirmed_.end());
+    unconfirmed_.clear();
+}
+
+void SinkQueue::clear() {
+    waiting_.clear();
+    unconfirmed_.clear();
+}
+
+std::uint64_t SinkQueue::first_sequence() const {
+    if (next_sequence_ == 0)
+        return 0; // nothing has been written: a fresh start
+    if (!unconfirmed_.empty())
+        return unconfirmed_.front()->sequence;
+    return waiting_.empty() ? next_sequence_ : waiting_.front()->sequence;
+}
+
+} // namespace arhost::host

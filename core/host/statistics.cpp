@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace arhost::host {
+
+using Json = nlohmann::ordered_json;
+
+double Timing::percentile_ms(double share) const {
+    if (samples_ns_.empty())
+        return 0;
+    std::vector<std::int64_t> sorted = samples_ns_;
+    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(sorted.size())));
+    const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(std::clamp<std::size_t>(rank, 1, sorted.size()) - 1);
+    std::nth_element(sorted.begin(), nth, sorted.end());
+    return static_cast<double>(*nth) * 1e-6;
+}
+
+Json Timing::to_json() const {
+    return {{"count", count()},
+            {"p50_ms", percentile_ms(0.50)},
+            {"p95_ms", percentile_ms(0.95)},
+            {"p99_ms", percentile_ms(0.99)},
+            {"max_ms", percentile_ms(1.0)}};
+}
+
+double Statistics::fps() const {
+    const double seconds = std::chrono::duration<double>(last_frame - first_frame).count();
+    return composited > 1 && seconds > 0 ? static_cast<double>(composited - 1) / seconds : 0;
+}
+
+Json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
+             double host_cpu_seconds) {
+    Json json = {{"frames",
+                  {{"in", statistics.frames_in},
+                   {"tracked", statistics.tracked},
+                   {"augmented", statistics.augmented},
+                   {"composited", statistics.composited},
+                   {"dropped", statistics.dropped},
+                   {"passed_unaugmented", statistics.passed}}},
+                 {"fps", statistics.fps()}};
+    for (const auto &[name, timing] : statistics.stages)
+        json["stages"][name] = timing.to_json();
+    double total = host_cpu_seconds;
+    json["cpu_seconds"]["host"] = host_cpu_seconds;
+    for (const supervise::Component *component : components) {
+        json["cpu_seconds"][component->name()] = component->cpu_seconds();
+        total += component->cpu_seconds();
+    }
+    json["cpu_seconds"]["total"] = total;
+    json["restarts"] = Json::object();
+    json["crashes"] = Json::array();
+    for (const supervise::Component *component : components) {
+        json["restarts"][component->name()] = component->restarts();
+        for (const supervise::Component::Crash &crash : component->crashes()) {
+            Json entry = {{"component", component->name()}, {"plugin", component->description().id}, {"how", crash.how}};
+            if (crash.frame != supervise::Component::Crash::no_frame)
+                entry["frame"] = crash.frame;
+            entry["log_tail"] = crash.log_tail;
+            json["crashes"].push_back(std::move(entry));
+        }
+    }
+    return json;
+}
+
+} // namespace arhost::host

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// ABI structs in control messages. Reading throws nlohmann::json::exception or std::runtime_error on
+// anything malformed: what comes from a worker is not trusted.
+#pragma once
+
+#include "ring/channel.hpp"
+#include "ring/memory.hpp"
+
+#include <arhost/arhost.h>
+
+#include <string>
+#include <vector>
+
+namespace arhost::ring {
+
+// A descriptor and its options with strings of its own, as it comes out of a worker's hello.
+struct OptionDeclaration {
+    std::string key;
+    arhost_option_type type = 0;
+    std::optional<std::string> default_value;
+    double minimum = 0, maximum = 0;
+    std::vector<std::string> choices;
+    std::string help;
+};
+struct PluginDescription {
+    arhost_kind kind = 0;
+    std::string id, name, version, vendor, licence, description;
+    std::uint32_t capabilities = 0;
+    std::vector<OptionDeclaration> options;
+    std::vector<std::string> devices;
+};
+struct OptionValue {
+    std::string key;
+    arhost_option_type type = 0;
+    std::int64_t integer = 0;
+    double real = 0;
+    std::string text;
+};
+
+Json to_json(const arhost_descriptor &descriptor);
+PluginDescription description_from_json(const Json &json);
+
+Json to_json(const std::vector<OptionValue> &options);
+std::vector<OptionValue> options_from_json(const Json &json);
+
+Json to_json(const arhost_intrinsics &intrinsics);
+arhost_intrinsics intrinsics_from_json(const Json &json);
+
+// Only the fields that a source sets; the layout is computed anew on reading.
+Json to_json(const arhost_frame_format &format);
+arhost_frame_format format_from_json(const Json &json);
+
+Json to_json(const SlotLayout &layout);
+SlotLayout layout_from_json(const Json &json);
+
+const char *to_text(arhost_kind kind);
+const char *status_text(arhost_status status);
+
+} // namespace arhost::ring

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "supervise/component.hpp"
+
+#include <algorithm>
+
+namespace arhost::supervise {
+
+using namespace ring;
+
+RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
+    auto region = std::make_shared<Region>();
+    region->memory = SharedMemory::create(name, layout.byte_size());
+    region->layout = layout;
+    region->mapping = region->memory.map(Access::read_write);
+    region->memory.seal_future_writes();
+    region->generation = 1;
+    return region;
+}
+
+Component::Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
+                     const Limits &limits, Hooks hooks)
+    : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
+      hooks_(std::move(hooks)), policy_(limits.restart) {}
+
+void Component::start() { spawn(); }
+
+void Component::spawn() {
+    state_ = State::starting;
+    stop_sent_ = false;
+    configuration_error_.clear();
+    Process::Events events;
+    events.message = [this](Message &message) { on_message(message); };
+    events.result = [this](const Result &result) { on_result(result); };
+    events.died = [this](const Death &death) { on_died(death); };
+    process_ = std::make_unique<Process>(context_, name_, std::move(events),
+                                         Json{{"type", "open"}, {"plugin", plugin().string()}});
+    watch_start(limits_.start, "did not start");
+}
+
+void Component::stop() {
+    stop_requested_ = true;
+    if (state_ == State::running)
+        stop_when_idle();
+    else if (state_ == State::idle || state_ == State::given_up) {
+        state_ = State::stopped;
+        hooks_.stopped(ARHOST_OK, "");
+    }
+}
+
+void Component::kill() {
+    stop_requested_ = true;
+    restart_timer_.cancel();
+    deadline_.cancel();
+    if (process_) {
+        cpu_seconds_of_dead_ += process_->cpu_seconds();
+        process_.reset();
+    }
+    state_ = State::stopped;
+}
+
+void Component::cancel_call() {
+    if (process_)
+        process_->ask_to_cancel();
+}
+
+void Component::end_process(const std::string &reason) {
+    if (process_)
+        process_->end(reason);
+}
+
+void Component::submit(Command command, const RegionPointer &input) {
+    if (input && attached_inputs_.try_emplace(input->generation, input).second)
+        process_->send_in_turn({{"type", "attach"},
+                                {"role", "input"},
+                                {"generation", input->generation},
+                                {"layout", to_json(input->layout)}},
+                               {input->memory.fd()});
+    std::erase_if(attached_inputs_, [this](const auto &entry) {
+        if (!entry.second.expired())
+            return false;
+        process_->send_in_turn({{"type", "detach"}, {"generation", entry.first}});
+        return true;
+    });
+    command.ticket = next_ticket_++;
+    if (input)
+        command.input_generation = input->generation;
+    in_flight_.push_back(command);
+    if (in_flight_.size() == 1)
+        watch_frame();
+    process_->submit(command);
+}
+
+void Component::on_message(Message &message) {
+    const std::string type = message.body.at("type").get<std::string>();
+    if (type == "progress") {
+        if (state_ == State::starting)
+            watch_start(limits_.start, "did not start");
+        else if (stop_sent_)
+            watch_start(limits_.stop, "did not stop");
+    } else if (type == "hello" && state_ == State::starting) {
+        on_hello(message.body);
+    } else if (type == "ready" && state_ == State::starting) {
+        on_ready(message.body);
+    } else if (type == "attached") {
+        on_attached(message.body);
+    } else if (type == "failed") {
+        const auto status = message.body.at("status").get<arhost_status>();
+        const std::string text = message.body.at("text").get<std::string>();
+        if (status == ARHOST_ERROR_CONFIGURATION || status == ARHOST_ERROR_UNSUPPORTED)
+            configuration_error_ = text;
+    } else if (type == "stopped" && stop_sent_) {
+        stop_answer_ = {message.body.at("status").get<arhost_status>(), message.body.at("text").get<std::string>()};
+    } else if (type == "end") {
+        hooks_.ended();
+    } else if (type != "detached") {
+        process_->end("broke the contract: unexpected message '" + type + "'");
+    }
+}
+
+void Component::on_hello(const Json &body) {
+    try {
+        description_ = description_from_json(body.at("descriptor"));
+        Create create = hooks_.hello(description_, candidate_);
+        create.body["type"] = "create";
+        if (create.fds.empty())
+            process_->send(create.body);
+        else
+            process_->send(create.body, {create.fds.front()});
+        watch_start(limits_.start, "did not start");
+    } catch (const std::runtime_error &error) {
+        configuration_error_ = error.what();
+        process_->kill_now();
+    }
+}
+
+void Component::on_ready(const Json &body) {
+    SlotLayout layout;
+    try {
+        layout = hooks_.ready(body);
+    } catch (const std::exception &error) {
+        configuration_error_ = error.what();
+        return process_->kill_now();
+    }
+    if (layout.count == 0)
+        return run();
+    output_being_attached_ = std::make_shared<Region>();
+    Region &region = *output_being_attached_;
+    region.layout = layout;
+    region.generation = next_generation_++;
+    region.memory = SharedMemory::create(("arhost-" + name_).c_str(), layout.byte_size());
+    process_->send_in_turn({{"type", "attach"},
+                            {"role", "output"},
+                            {"generation", region.generation},
+                            {"layout", to_json(layout)}},
+                           {region.memory.fd()});
+}
+
+void Component::on_attached(const Json &body) {
+    if (body.at("role") != "output" || !output_being_attached_)
+        return;
+    // The worker has its writable mapping now: nobody else gets one.
+    Region &region = *output_being_attached_;
+    region.memory.seal_future_writes();
+    region.mapping = region.memory.map(Access::read_only);
+    output_ = std::move(output_being_attached_);
+    run();
+}
+
+void Component::run() {
+    deadline_.cancel();
+    state_ = State::running;
+    hooks_.running();
+    if (stop_requested_)
+        stop_when_idle();
+}
+
+void Component::stop_when_idle() {
+    if (state_ != State::running || !in_flight_.empty() || stop_sent_)
+        return;
+    stop_sent_ = true;
+    process_->send_in_turn({{"type", "stop"}});
+    watch_start(limits_.stop, "did not stop");
+}
+
+void Component::on_result(const Result &result) {
+    if (in_flight_.empty() || result.ticket != in_flight_.front().ticket)
+        return process_->end("broke the contract: it answered what it was not asked");
+    if (result.status == 0 || result.status > ARHOST_END || result.status < ARHOST_ERROR_INTERNAL)
+        return process_->end("broke the contract: its status is " + std::to_string(result.status));
+    const Command command = in_flight_.front();
+    in_flight_.pop_front();
+    watch_frame();
+    policy_.frame_done();
+    hooks_.result(command, result);
+    if (stop_requested_)
+        stop_when_idle();
+}
+
+void Component::on_died(const Death &death) {
+    const std::unique_ptr<Process> dead = std::move(process_);
+    cpu_seconds_of_dead_ += death.cpu_seconds;
+    deadline_.cancel();
+    output_.reset();
+    output_being_attached_.reset();
+    attached_inputs_.clear();
+    const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());
+    in_flight_.clear();
+
+    if (death.clean && stop_answer_) {
+        state_ = State::stopped;
+        return hooks_.stopped(stop_answer_->first, stop_answer_->second);
+    }
+    if (!configuration_error_.empty())
+        return give_up(configuration_error_, true);
+    if (description_.id.empty()) // it never even said hello: its library can't be used
+        return give_up(plugin().string() + ": " + death.how, true);
+
+    const std::uint64_t frame = unanswered.empty() ? Crash::no_frame : unanswered.front().sequence;
+    crashes_.push_back({death.how, death.log_tail, frame});
+    const auto delay = policy_.died(std::uniform_real_distribution<double>(0, 1)(jitter_));
+    std::string report = death.how;
+    if (frame != Crash::no_frame)
+        report += ", at frame " + std::to_string(frame);
+    if (delay)
+        report += delay->count() ? "; starting it again in " + std::to_string(delay->count()) + " ms" : "; starting it again";
+    context_.log(ARHOST_WARNING, name_, report);
+    state_ = State::waiting;
+    hooks_.lost(unanswered);
+    if (!delay)
+        return give_up(death.how + "; it failed " + std::to_string(policy_.failures()) + " times in a row", false);
+    ++restarts_;
+    restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
+}
+
+void Component::give_up(const std::string &reason, bool by_configuration) {
+    if (candidate_ + 1 < plugins_.size()) {
+        context_.log(ARHOST_WARNING, name_, reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
+        ++candidate_;
+        policy_ = RestartPolicy(limits_.restart);
+        ++restarts_;
+        state_ = State::waiting;
+        restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
+        return;
+    }
+    state_ = stop_requested_ ? State::stopped : State::given_up;
+    hooks_.given_up(reason, by_configuration);
+    if (stop_requested_)
+        hooks_.stopped(ARHOST_ERROR_INTERNAL, reason);
+}
+
+void Component::watch_start(std::chrono::milliseconds limit, const char *what) {
+    deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit, what] {
+        process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms");
+    });
+}
+
+void Component::watch_frame() {
+    deadline_.cancel();
+    if (in_flight_.empty())
+        return;
+    deadline_ = context_.reactor.at(Reactor::Clock::now() + limits_.frame, [this] {
+        process_->end("hung: no answer within " + std::to_string(limits_.frame.count()) + " ms");
+    });
+}
+
+} // namespace arhost::supervise

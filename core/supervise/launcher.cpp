@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "supervise/launcher.hpp"
+
+#include "ring/wake.hpp"
+
+#include <array>
+#include <climits>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+
+namespace arhost::supervise {
+namespace {
+
+using ring::UniqueFd;
+
+// What the two sides send each other: plain structs, since both are this program.
+struct Request {
+    char program[PATH_MAX]; // with descriptors: control, doorbell, output
+};
+struct Reply {
+    enum Kind : int { spawned, failed, exited } kind;
+    int error; // errno of `failed`
+    Exit exit; // `spawned`: only pid, and its pidfd comes along
+};
+
+// Sends a struct, with descriptors.
+bool send_struct(int socket, const void *data, std::size_t size, std::initializer_list<int> fds) {
+    iovec part{const_cast<void *>(data), size};
+    msghdr header{};
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * 3)] = {};
+    if (fds.size() > 0) {
+        header.msg_control = ancillary;
+        header.msg_controllen = CMSG_SPACE(sizeof(int) * fds.size());
+        cmsghdr *control = CMSG_FIRSTHDR(&header);
+        control->cmsg_level = SOL_SOCKET;
+        control->cmsg_type = SCM_RIGHTS;
+        control->cmsg_len = CMSG_LEN(sizeof(int) * fds.size());
+        std::memcpy(CMSG_DATA(control), fds.begin(), sizeof(int) * fds.size());
+    }
+    ssize_t sent;
+    do
+        sent = ::sendmsg(socket, &header, MSG_NOSIGNAL);
+    while (sent < 0 && errno == EINTR);
+    return sent == static_cast<ssize_t>(size);
+}
+
+// Takes a struct and up to three descriptors; false at the end.
+bool receive_struct(int socket, void *data, std::size_t size, std::array<UniqueFd, 3> &fds) {
+    iovec part{data, size};
+    msghdr header{};
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * 3)] = {};
+    header.msg_control = ancillary;
+    header.msg_controllen = sizeof ancillary;
+    ssize_t received;
+    do
+        received = ::recvmsg(socket, &header, MSG_CMSG_CLOEXEC);
+    while (received < 0 && errno == EINTR);
+    if (received != static_cast<ssize_t>(size))
+        return false;
+    if (const cmsghdr *control = CMSG_FIRSTHDR(&header); control && control->cmsg_type == SCM_RIGHTS) {
+        const std::size_t count = (control->cmsg_len - CMSG_LEN(0)) / sizeof(int);
+        for (std::size_t i = 0; i < count && i < fds.size(); ++i) {
+            int fd = -1;
+            std::memcpy(&fd, CMSG_DATA(control) + i * sizeof(int), sizeof fd);
+            fds[i].reset(fd);
+        }
+    }
+    return true;
+}
+
+// In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
+[[noreturn]] void become(const char *program, const std::array<UniqueFd, 3> &fds, pid_t launcher) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != launcher) // it died before the line above
+        ::_exit(127);
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    // Ctrl-C reaches the whole terminal group; the host alone decides what it means.
+    ::signal(SIGINT, SIG_IGN);
+    ::signal(SIGPIPE, SIG_IGN);
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
+    const int control = ::fcntl(fds[0].get(), F_DUPFD_CLOEXEC, 10);
+    const int doorbell = ::fcntl(fds[1].get(), F_DUPFD_CLOEXEC, 10);
+    ::dup2(fds[2].get(), STDOUT_FILENO);
+    ::dup2(fds[2].get(), STDERR_FILENO);
+    ::dup2(control, 3);
+    ::dup2(doorbell, 4);
+    ::syscall(SYS_close_range, 5u, ~0u, 0u);
+    const int null = ::open("/dev/null", O_RDONLY);
+    ::dup2(null, STDIN_FILENO);
+    ::close(null);
+    ::execl(program, program, static_cast<char *>(nullptr));
+    const char message[] = "arhost-worker can't be executed; is it installed beside arhost?\n";
+    (void)!::write(STDERR_FILENO, message, sizeof message - 1);
+    ::_exit(127);
+}
+
+void spawn_for(int socket, const Request &request, const std::array<UniqueFd, 3> &fds) {
+    const pid_t launcher = ::getpid();
+    const pid_t pid = ::fork();
+    if (pid == 0)
+        become(request.program, fds, launcher);
+    Reply reply{};
+    if (pid < 0) {
+        reply.kind = Reply::failed;
+        reply.error = errno;
+        send_struct(socket, &reply, sizeof reply, {});
+        return;
+    }
+    // No race: the child stays a zombie until this process reaps it.
+    const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+    reply.kind = Reply::spawned;
+    reply.exit.pid = pid;
+    send_struct(socket, &reply, sizeof reply, {pidfd.get()});
+}
+
+void reap(int socket) {
+    for (;;) {
+        Reply reply{};
+        rusage usage{};
+        reply.kind = Reply::exited;
+        reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
+        if (reply.exit.pid <= 0)
+            return;
+        const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+        reply.exit.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+        send_struct(socket, &reply, sizeof reply, {});
+    }
+}
+
+[[noreturn]] void launcher_main(int socket) {
+    ::prctl(PR_SET_NAME, "arhost-launcher");
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ::signal(SIGINT, SIG_IGN);
+    ::signal(SIGTERM, SIG_IGN);
+    sigset_t child;
+    ::sigemptyset(&child);
+    ::sigaddset(&child, SIGCHLD);
+    ::sigprocmask(SIG_BLOCK, &child, nullptr);
+    const UniqueFd signals(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK));
+    for (;;) {
+        pollfd ready[2] = {{socket, POLLIN, 0}, {signals.get(), POLLIN, 0}};
+        if (::poll(ready, 2, -1) < 0)
+            continue;
+        if (ready[1].revents) {
+            signalfd_siginfo info;
+            while (::read(signals.get(), &info, sizeof info) > 0) {
+            }
+            reap(socket);
+        }
+        if (ready[0].revents) {
+            Request request;
+            std::array<UniqueFd, 3> fds;
+            if (!receive_struct(socket, &request, sizeof request, fds))
+                ::_exit(0); // the host is gone; the workers follow
+            spawn_for(socket, request, fds);
+        }
+    }
+}
+
+} // namespace
+
+Launcher::Launcher() {
+    int ends[2];
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
+        ring::throw_errno("socketpair for the launcher");
+    UniqueFd host_end(ends[0]), launcher_end(ends[1]);
+    pid_ = ::fork();
+    if (pid_ < 0)
+        ring::throw_errno("fork of the launcher");
+    if (pid_ == 0) {
+        host_end.reset();
+        launcher_main(launcher_end.get());
+    }
+    socket_ = std::move(host_end);
+}
+
+Launcher::~Launcher() {
+    socket_.reset();
+    ::waitpid(pid_, nullptr, 0);
+}
+
+Spawned Launcher::spawn(const std::filesystem::path &program) {
+    Request request{};
+    if (program.native().size() >= sizeof request.program)
+        throw std::runtime_error("the path of arhost-worker is too long");
+    std::strcpy(request.program, program.c_str());
+
+    Spawned spawned;
+    auto [mine, theirs] = ring::Channel::make_pair();
+    ring::DoorbellPair doorbell = ring::make_doorbell();
+    int pipe_ends[2];
+    if (::pipe2(pipe_ends, O_CLOEXEC) != 0)
+        ring::throw_errno("pipe for a worker's output");
+    spawned.output.reset(pipe_ends[0]);
+    const UniqueFd output_end(pipe_ends[1]);
+    ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
+
+    if (!send_struct(socket_.get(), &request, sizeof request, {theirs.fd(), doorbell.worker.get(), output_end.get()}))
+        throw std::runtime_error("the launcher is gone");
+    for (;;) {
+        Reply reply;
+        std::array<UniqueFd, 3> fds;
+        if (!receive_struct(socket_.get(), &reply, sizeof reply, fds))
+            throw std::runtime_error("the launcher is gone");
+        if (reply.kind == Reply::exited) {
+            exits_.push_back(reply.exit);
+            continue;
+        }
+        if (reply.kind == Reply::failed || !fds[0])
+            throw std::runtime_error(std::string("no process can be started: ") + std::strerror(reply.error));
+        spawned.pid = reply.exit.pid;
+        spawned.pidfd = std::move(fds[0]);
+        spawned.channel = std::move(mine);
+        spawned.doorbell = std::move(doorbell.host);
+        return spawned;
+    }
+}
+
+Exit Launcher::wait_exit(pid_t pid) {
+    for (;;) {
+        for (auto it = exits_.begin(); it != exits_.end(); ++it)
+            if (it->pid == pid) {
+                const Exit found = *it;
+                exits_.erase(it);
+                return found;
+            }
+        Reply reply;
+        std::array<UniqueFd, 3> fds;
+        if (!receive_struct(socket_.get(), &reply, sizeof reply, fds))
+            throw std::runtime_error("the launcher is gone");
+        exits_.push_back(reply.exit);
+    }
+}
+
+} // namespace arhost::supervise

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The launcher: a small single-threaded process, forked from the host before it has any thread, that is
+// the parent of all workers. It starts them on request and reports how they ended. Workers die with it
+// (PR_SET_PDEATHSIG follows the thread that forked), and it ends with the host, so a host that is killed
+// leaves nothing behind.
+#pragma once
+
+#include "ring/channel.hpp"
+#include "ring/unique_fd.hpp"
+
+#include <deque>
+#include <filesystem>
+#include <sys/types.h>
+
+namespace arhost::supervise {
+
+// A process that has just been started.
+struct Spawned {
+    pid_t pid = 0;
+    ring::UniqueFd pidfd;     // readable once it is dead
+    ring::Channel channel;    // its descriptor 3
+    ring::UniqueFd doorbell;  // its descriptor 4
+    ring::UniqueFd output;    // what it writes to stdout and stderr
+};
+
+struct Exit {
+    pid_t pid;
+    int wait_status;    // as of wait(2)
+    double cpu_seconds; // user and system
+};
+
+class Launcher {
+public:
+    // Forks. To be called while the process has one thread.
+    Launcher();
+    ~Launcher();
+    Launcher(const Launcher &) = delete;
+    Launcher &operator=(const Launcher &) = delete;
+
+    // Throws std::runtime_error where no process can be had.
+    Spawned spawn(const std::filesystem::path &program);
+
+    // How a process that is dead already (its pidfd is readable) ended. Waits for the launcher to say so.
+    Exit wait_exit(pid_t pid);
+
+private:
+    ring::UniqueFd socket_;
+    pid_t pid_ = 0;
+    std::deque<Exit> exits_;
+};
+
+} // namespace arhost::supervise

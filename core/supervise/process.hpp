@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One live worker process as the host sees it: its messages, results and death, and the ways to end it.
+#pragma once
+
+#include "ring/channel.hpp"
+#include "ring/memory.hpp"
+#include "ring/protocol.hpp"
+#include "ring/reactor.hpp"
+#include "supervise/launcher.hpp"
+
+#include <arhost/plugin.h>
+
+#include <deque>
+#include <functional>
+#include <string>
+
+namespace arhost::supervise {
+
+using LogFunction = std::function<void(arhost_severity severity, const std::string &component, const std::string &text)>;
+
+// What every component of a host shares.
+struct Context {
+    ring::Reactor &reactor;
+    Launcher &launcher;
+    std::filesystem::path worker_program;
+    LogFunction log;
+};
+
+struct Death {
+    std::string how;      // "killed by signal 11 (Segmentation fault) in per-frame"
+    bool clean = false;   // exit status 0
+    double cpu_seconds = 0;
+    std::string log_tail; // the last lines that it logged or printed
+};
+
+class Process {
+public:
+    // Each is called from the reactor. `died` comes last and once; the Process may be destroyed in it.
+    struct Events {
+        std::function<void(ring::Message &)> message; // but for log messages
+        std::function<void(const ring::Result &)> result;
+        std::function<void(const Death &)> died;
+    };
+
+    // Starts a worker and gives it its pages together with `first`, whose body lacks nothing else.
+    Process(Context &context, std::string name, Events events, const ring::Json &first);
+    ~Process(); // kills it
+    Process(const Process &) = delete;
+    Process &operator=(const Process &) = delete;
+
+    // A message of the start-up, which the worker waits for.
+    void send(const ring::Json &body, std::initializer_list<int> fds = {});
+    // A message to a worker that serves commands; taken in its turn.
+    void send_in_turn(const ring::Json &body, std::initializer_list<int> fds = {});
+    void submit(const ring::Command &command);
+
+    void ask_to_cancel(); // the running call sees host->cancelled
+    // Ends it for a reason that is logged and stands in Death::how: SIGABRT, and SIGKILL soon after.
+    void end(const std::string &reason);
+    void kill_now();
+
+    pid_t pid() const { return spawned_.pid; }
+    double cpu_seconds() const; // so far
+
+private:
+    void on_channel();
+    void on_doorbell();
+    void on_output();
+    void on_death();
+    void take_results();
+    void remember(const std::string &line);
+
+    Context &context_;
+    std::string name_;
+    Events events_;
+    Spawned spawned_;
+    ring::SharedMemory host_memory_, worker_memory_;
+    ring::Mapping host_page_, worker_page_;
+    ring::CommandProducer commands_;
+    ring::ResultConsumer results_;
+    std::string end_reason_, partial_line_;
+    std::deque<std::string> tail_;
+    std::uint64_t rings_ = 0, results_taken_ = 0;
+    ring::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
+};
+
+} // namespace arhost::supervise

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "worker/library.hpp"
+
+#include <dlfcn.h>
+#include <stdexcept>
+#include <string>
+
+namespace arhost::worker {
+namespace {
+
+// The functions that a kind must have, none NULL; a short struct lacks its last ones.
+bool kind_is_complete(arhost_kind kind, const void *functions) {
+    switch (kind) {
+    case ARHOST_KIND_SOURCE: {
+        const auto &f = *static_cast<const arhost_source *>(functions);
+        return f.struct_size >= sizeof f && f.start && f.read && f.stop;
+    }
+    case ARHOST_KIND_TRACKER: {
+        const auto &f = *static_cast<const arhost_tracker *>(functions);
+        return f.struct_size >= sizeof f && f.start && f.track && f.stop;
+    }
+    case ARHOST_KIND_RAYTRACER: {
+        const auto &f = *static_cast<const arhost_raytracer *>(functions);
+        return f.struct_size >= sizeof f && f.start && f.render && f.stop;
+    }
+    case ARHOST_KIND_SINK: {
+        const auto &f = *static_cast<const arhost_sink *>(functions);
+        return f.struct_size >= sizeof f && f.start && f.write && f.stop;
+    }
+    default:
+        return false;
+    }
+}
+
+} // namespace
+
+const arhost_plugin &open_plugin(const std::filesystem::path &file) {
+    const auto refuse = [&](const std::string &why) { throw std::runtime_error(file.string() + ": " + why); };
+    void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (!library)
+        refuse(std::string("can't be loaded: ") + ::dlerror());
+    const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
+    if (!entry)
+        refuse("is no arhost plugin: it exports no symbol 'arhost_entry'");
+    if (entry->struct_size < sizeof(arhost_entry_point) || !entry->negotiate)
+        refuse("its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
+
+    const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
+    arhost_answer answer{sizeof answer, 0xffffffffu, nullptr};
+    const arhost_status status = entry->negotiate(&offer, &answer);
+    const std::string versions = "this arhost speaks ABI version " + std::to_string(ARHOST_ABI_VERSION);
+    if (status != ARHOST_OK)
+        refuse("refused the ABI version; " + versions + ": build the plugin against its headers");
+    if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
+        refuse("chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
+               ": build the plugin against its headers");
+    const arhost_plugin *plugin = answer.plugin;
+    if (!plugin || plugin->struct_size < sizeof(arhost_plugin))
+        refuse("its negotiate gave no (whole) arhost_plugin");
+    if (!plugin->descriptor || plugin->descriptor->struct_size < sizeof(arhost_descriptor) || !plugin->descriptor->id)
+        refuse("has no (whole) descriptor");
+    if (!plugin->create || !plugin->destroy || !plugin->get_extension)
+        refuse("lacks create, destroy or get_extension");
+    if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
+        refuse("its descriptor counts options but lists none");
+    if (!plugin->functions || !kind_is_complete(plugin->descriptor->kind, plugin->functions))
+        refuse("its kind is unknown or lacks a function that the kind must have");
+    return *plugin;
+}
+
+} // namespace arhost::worker

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "worker/loader.hpp"
+
+#include "scene/loader.hpp"
+
+#include <arhost/plugin.h>
+
+#include <cstdlib>
+
+namespace arhost::worker {
+
+int load_scene_for(Link &link, const ring::Message &load) {
+    scene::LoadCallbacks callbacks;
+    callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
+    callbacks.info = [&](const std::string &text) { link.log(ARHOST_INFO, text); };
+    scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);
+    const ring::SharedMemory memory = ring::SharedMemory::create("arhost-scene", builder.byte_size());
+    {
+        const ring::Mapping mapping = memory.map(ring::Access::read_write);
+        std::move(builder).write(mapping.bytes());
+    } // unmapped: the host freezes it, which no writable mapping may outlive
+    link.send({{"type", "loaded"}}, {memory.fd()});
+    return EXIT_SUCCESS;
+}
+
+} // namespace arhost::worker

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-worker: opens one plugin and serves it, or loads one scene. Started by the host's launcher with
+// its control channel as descriptor 3 and its doorbell as descriptor 4; of no use by hand.
+#include "worker/library.hpp"
+#include "worker/link.hpp"
+#include "worker/loader.hpp"
+#include "worker/services.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <fcntl.h>
+#include <sys/prctl.h>
+
+namespace arhost::worker {
+namespace {
+
+using namespace ring;
+
+constexpr int control_fd = 3, doorbell_fd = 4;
+
+// The host's callbacks for a plugin, and the last error that it logged, for `failed`.
+class HostSide {
+public:
+    explicit HostSide(Link &link)
+        : link_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost", ARHOST_VERSION, this, &on_log,
+                             &on_progress, &on_cancelled, &on_extension} {}
+    const arhost_host *get() const { return &host_; }
+    std::string last_error() const {
+        std::lock_guard lock(mutex_);
+        return last_error_;
+    }
+
+private:
+    static HostSide &self(const arhost_host *host) { return *static_cast<HostSide *>(host->context); }
+    static void on_log(const arhost_host *host, arhost_severity severity, const char *text) {
+        const std::string copy = text ? text : "";
+        if (severity == ARHOST_ERROR) {
+            std::lock_guard lock(self(host).mutex_);
+            self(host).last_error_ = copy;
+        }
+        self(host).link_.log(severity, copy);
+    }
+    static void on_progress(const arhost_host *host, double fraction, const char *what) {
+        self(host).link_.progress(fraction, what);
+    }
+    static std::int32_t on_cancelled(const arhost_host *host) { return self(host).link_.cancelled(); }
+    static const void *on_extension(const arhost_host *, const char *) { return nullptr; }
+
+    Link &link_;
+    arhost_host host_;
+    mutable std::mutex mutex_;
+    std::string last_error_;
+};
+
+// One plugin, from `create` to `destroy`.
+class Session {
+public:
+    Session(Link &link, const arhost_plugin &plugin) : link_(link), plugin_(plugin), host_(link) {}
+    ~Session() {
+        if (!instance_)
+            return;
+        Link::InCall call(link_, Call::destroy);
+        plugin_.destroy(instance_);
+    }
+    Session(const Session &) = delete;
+    Session &operator=(const Session &) = delete;
+
+    int run(const Message &create) {
+        if (!make(create))
+            return EXIT_FAILURE;
+        const auto patience = std::chrono::milliseconds(service_->wants_idle() ? 33 : 1000);
+        while (!stopped_) {
+            const auto command = link_.next(patience);
+            if (!command)
+                idle();
+            else if (command->kind == CommandKind::control)
+                take_message();
+            else
+                execute(*command);
+        }
+        return EXIT_SUCCESS;
+    }
+
+private:
+    bool make(const Message &create) {
+        const std::vector<OptionValue> values = options_from_json(create.body.at("options"));
+        std::vector<arhost_option> options;
+        for (const OptionValue &v : values)
+            options.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
+        arhost_status status;
+        {
+            Link::InCall call(link_, Call::create);
+            status = plugin_.create(host_.get(), options.data(), static_cast<std::uint32_t>(options.size()), &instance_);
+        }
+        if (status == ARHOST_OK && !instance_)
+            throw std::runtime_error("the plugin's create succeeded without an instance");
+        Json ready = {{"type", "ready"}};
+        if (status == ARHOST_OK) {
+            service_ = make_service(plugin_, instance_);
+            Link::InCall call(link_, Call::start);
+            status = service_->start(create, ready);
+        }
+        if (status != ARHOST_OK) {
+            const std::string reason = host_.last_error();
+            link_.send({{"type", "failed"},
+                        {"status", status},
+                        {"text", reason.empty() ? "the plugin gave no reason" : reason}});
+            return false;
+        }
+        link_.send(ready);
+        return true;
+    }
+
+    void idle() {
+        Link::InCall call(link_, Call::idle);
+        if (service_->wants_idle() && service_->idle() == ARHOST_END)
+            link_.send({{"type", "end"}});
+    }
+
+    void execute(const Command &command) {
+        Result result{};
+        result.ticket = command.ticket;
+        const auto begin = std::chrono::steady_clock::now();
+        {
+            Link::InCall call(link_, Call::per_frame);
+            result.status = service_->execute(command, memory_, result);
+        }
+        result.busy_ns = (std::chrono::steady_clock::now() - begin).count();
+        link_.answer(result);
+    }
+
+    void take_message() {
+        Message message = link_.receive();
+        const std::string type = message.body.at("type").get<std::string>();
+        if (type == "attach") {
+            const bool output = message.body.at("role") == "output";
+            const auto generation = message.body.at("generation").get<std::uint32_t>();
+            if (message.fds.size() != 1)
+                throw HostGone("no memory came with 'attach'");
+            const SharedMemory memory = SharedMemory::adopt(std::move(message.fds[0]));
+            Memory::Region region{layout_from_json(message.body.at("layout")),
+                                  memory.map(output ? Access::read_write : Access::read_only)};
+            if (region.layout.byte_size() > memory.size())
+                throw HostGone("the slots do not fit into their memory");
+            (output ? memory_.output : memory_.inputs[generation]) = std::move(region);
+            link_.send({{"type", "attached"}, {"role", message.body.at("role")}, {"generation", generation}});
+        } else if (type == "detach") {
+            const auto generation = message.body.at("generation").get<std::uint32_t>();
+            memory_.inputs.erase(generation);
+            link_.send({{"type", "detached"}, {"generation", generation}});
+        } else if (type == "stop") {
+            Link::InCall call(link_, Call::stop);
+            const arhost_status status = service_->stop();
+            link_.send({{"type", "stopped"},
+                        {"status", status},
+                        {"text", status == ARHOST_OK ? std::string() : host_.last_error()}});
+            stopped_ = true;
+        } else {
+            throw HostGone("the host sent a message of unknown type '" + type + "'");
+        }
+    }
+
+    Link &link_;
+    const arhost_plugin &plugin_;
+    HostSide host_;
+    Memory memory_;
+    arhost_instance *instance_ = nullptr;
+    std::unique_ptr<Service> service_;
+    bool stopped_ = false;
+};
+
+int serve(Link &link) {
+    Message open = link.receive();
+    const std::string type = open.body.at("type").get<std::string>();
+    if (type == "load")
+        return load_scene_for(link, open);
+    if (type != "open")
+        throw HostGone("the host's first message is not 'open'");
+    link.map_pages(open);
+    const std::string file = open.body.at("plugin").get<std::string>();
+    const arhost_plugin *plugin = nullptr;
+    {
+        Link::InCall call(link, Call::load);
+        plugin = &open_plugin(file);
+    }
+    ::prctl(PR_SET_NAME, plugin->descriptor->id);
+    link.send({{"type", "hello"}, {"descriptor", to_json(*plugin->descriptor)}});
+    return Session(link, *plugin).run(link.receive());
+}
+
+} // namespace
+} // namespace arhost::worker
+
+int main() {
+    using namespace arhost;
+    if (::fcntl(worker::control_fd, F_GETFD) < 0 || ::fcntl(worker::doorbell_fd, F_GETFD) < 0) {
+        std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
+        return 2;
+    }
+    worker::Link link(ring::Channel(ring::UniqueFd(worker::control_fd)), ring::UniqueFd(worker::doorbell_fd));
+    try {
+        return worker::serve(link);
+    } catch (const worker::HostGone &) {
+        return EXIT_FAILURE; // nobody is left to tell
+    } catch (const std::exception &error) {
+        try {
+            link.send({{"type", "failed"}, {"status", ARHOST_ERROR_CONFIGURATION}, {"text", error.what()}});
+        } catch (const worker::HostGone &) {
+        }
+        return EXIT_FAILURE;
+    }
+}

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "worker/services.hpp"
+
+#include "pixels/grey.hpp"
+
+#include <algorithm>
+
+namespace arhost::worker {
+namespace {
+
+using namespace ring;
+
+std::uint8_t *as_pixels(std::span<std::byte> bytes) { return reinterpret_cast<std::uint8_t *>(bytes.data()); }
+
+void require(bool condition, const char *what) {
+    if (!condition)
+        throw HostGone(what);
+}
+
+class SourceService final : public Service {
+public:
+    SourceService(const arhost_source &source, arhost_instance *instance) : source_(source), instance_(instance) {}
+
+    arhost_status start(const Message &create, Json &ready) override {
+        const Json &json = create.body.at("setup");
+        arhost_source_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.first_sequence = json.at("first_sequence").get<std::uint64_t>();
+        setup.fps = json.at("fps").get<double>();
+        setup.paced = json.at("paced").get<bool>();
+        arhost_intrinsics intrinsics{};
+        if (json.contains("intrinsics")) {
+            intrinsics = intrinsics_from_json(json["intrinsics"]);
+            setup.intrinsics = &intrinsics;
+        }
+        arhost_source_properties properties{};
+        properties.struct_size = sizeof properties;
+        properties.format.struct_size = sizeof properties.format;
+        properties.intrinsics.struct_size = sizeof properties.intrinsics;
+        const arhost_status status = source_.start(instance_, &setup, &properties);
+        if (status != ARHOST_OK)
+            return status;
+        format_ = properties.format;
+        if (!arhost_frame_layout(&format_) || format_.byte_size != properties.format.byte_size)
+            throw std::runtime_error("the source's frame format is not valid, or not laid out by arhost_frame_layout");
+        ready["format"] = to_json(format_);
+        ready["frame_count"] = properties.frame_count;
+        if (properties.has_intrinsics)
+            ready["intrinsics"] = to_json(properties.intrinsics);
+        return status;
+    }
+
+    arhost_status execute(const Command &command, const Memory &memory, Result &result) override {
+        require(command.kind == CommandKind::read, "a source was asked for something else than to read");
+        const std::span<std::byte> slot = memory.output.slot(command.slot);
+        require(slot.size() >= format_.byte_size, "the frame slots are too small");
+        arhost_frame_buffer buffer{};
+        buffer.struct_size = sizeof buffer;
+        buffer.format = &format_;
+        for (std::uint32_t i = 0; i < format_.plane_count; ++i)
+            buffer.plane[i] = as_pixels(slot) + format_.offset[i];
+        buffer.grey = as_pixels(slot) + format_.grey_offset;
+        buffer.sequence = command.sequence;
+        result.frame.struct_size = sizeof result.frame;
+        const arhost_status status = source_.read(instance_, &buffer, &result.frame);
+        // Once for all trackers, and out of the host's process.
+        if (status == ARHOST_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
+            fill_grey(format_, buffer.plane, buffer.grey);
+        return status;
+    }
+
+    arhost_status stop() override { return source_.stop(instance_), ARHOST_OK; }
+
+private:
+    const arhost_source &source_;
+    arhost_instance *instance_;
+    arhost_frame_format format_{};
+};
+
+class TrackerService final : public Service {
+public:
+    TrackerService(const arhost_tracker &tracker, arhost_instance *instance) : tracker_(tracker), instance_(instance) {}
+
+    arhost_status start(const Message &create, Json &) override {
+        const Json &json = create.body.at("setup");
+        format_ = format_from_json(json.at("format"));
+        const arhost_intrinsics intrinsics = intrinsics_from_json(json.at("intrinsics"));
+        std::vector<arhost_marker_config> markers;
+        for (const Json &marker : json.at("markers"))
+            markers.push_back({sizeof(arhost_marker_config), marker.at("id").get<std::int32_t>(),
+                               marker.at("side_mm").get<double>()});
+        arhost_tracker_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.marker_count = static_cast<std::uint32_t>(markers.size());
+        setup.format = &format_;
+        setup.intrinsics = &intrinsics;
+        setup.markers = markers.data();
+        return tracker_.start(instance_, &setup);
+    }
+
+    arhost_status execute(const Command &command, const Memory &memory, Result &) override {
+        require(command.kind == CommandKind::track, "a tracker was asked for something else than to track");
+        const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
+        const std::span<std::byte> output = memory.output.slot(command.slot);
+        require(input.size() >= format_.byte_size && output.size() >= sizeof(arhost_tracker_result),
+                "the tracker's slots are too small");
+        arhost_frame frame{};
+        frame.struct_size = sizeof frame;
+        frame.clock = command.clock;
+        frame.format = &format_;
+        for (std::uint32_t i = 0; i < format_.plane_count; ++i)
+            frame.plane[i] = as_pixels(input) + format_.offset[i];
+        frame.grey = as_pixels(input) + format_.grey_offset;
+        frame.sequence = command.sequence;
+        frame.capture_ns = command.capture_ns;
+        auto &result = *reinterpret_cast<arhost_tracker_result *>(output.data());
+        result = {};
+        result.struct_size = sizeof result;
+        return tracker_.track(instance_, &frame, &result);
+    }
+
+    arhost_status stop() override { return tracker_.stop(instance_), ARHOST_OK; }
+
+private:
+    const arhost_tracker &tracker_;
+    arhost_instance *instance_;
+    arhost_frame_format format_{};
+};
+
+class RaytracerService final : public Service {
+public:
+    RaytracerService(const arhost_raytracer &raytracer, arhost_instance *instance)
+        : raytracer_(raytracer), instance_(instance) {}
+
+    arhost_status start(const Message &create, Json &) override {
+        const Json &json = create.body.at("setup");
+        require(create.fds.size() == 1, "the scene's arena did not come with 'create'");
+        arena_ = SharedMemory::adopt(UniqueFd(::dup(create.fds[0].get()))).map(Access::read_only);
+        require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
+        const arhost_intrinsics intrinsics = intrinsics_from_json(json.at("intrinsics"));
+        arhost_raytracer_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.width = width_ = json.at("width").get<std::uint32_t>();
+        setup.height = height_ = json.at("height").get<std::uint32_t>();
+        setup.scene = &arena_.as<arhost_scene>();
+        setup.intrinsics = &intrinsics;
+        return raytracer_.start(instance_, &setup);
+    }
+
+    arhost_status execute(const Command &command, const Memory &memory, Result &result) override {
+        require(command.kind == CommandKind::render, "a ray tracer was asked for something else than to render");
+        const std::span<std::byte> output = memory.output.slot(command.slot);
+        arhost_image image{};
+        image.struct_size = sizeof image;
+        image.stride = overlay_stride(width_);
+        image.width = width_;
+        image.height = height_;
+        image.rgba = as_pixels(output);
+        require(output.size() >= std::uint64_t(image.stride) * height_, "the image slots are too small");
+        arhost_render_request request{};
+        request.struct_size = sizeof request;
+        request.sequence = command.sequence;
+        request.time_s = command.time_s;
+        request.camera = command.camera;
+        result.render.struct_size = sizeof result.render;
+        return raytracer_.render(instance_, &request, &image, &result.render);
+    }
+
+    arhost_status stop() override { return raytracer_.stop(instance_), ARHOST_OK; }
+
+private:
+    const arhost_raytracer &raytracer_;
+    arhost_instance *instance_;
+    Mapping arena_;
+    std::uint32_t width_ = 0, height_ = 0;
+};
+
+class SinkService final : public Service {
+public:
+    SinkService(const arhost_sink &sink, arhost_instance *instance) : sink_(sink), instance_(instance) {}
+
+    arhost_status start(const Message &create, Json &) override {
+        const Json &json = create.body.at("setup");
+        arhost_sink_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.width = width_ = json.at("width").get<std::uint32_t>();
+        setup.height = height_ = json.at("height").get<std::uint32_t>();
+        setup.fps = json.at("fps").get<double>();
+        setup.first_sequence = json.at("first_sequence").get<std::uint64_t>();
+        return sink_.start(instance_, &setup);
+    }
+
+    arhost_status execute(const Command &command, const Memory &memory, Result &) override {
+        require(command.kind == CommandKind::write, "a sink was asked for something else than to write");
+        const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
+        require(input.size() >= OutputSlot::byte_size(width_, height_), "the output slots are too small");
+        arhost_output output{};
+        output.struct_size = sizeof output;
+        output.stride = OutputSlot::stride(width_);
+        output.width = width_;
+        output.height = height_;
+        output.bgr = as_pixels(input) + OutputSlot::image_offset;
+        output.record = reinterpret_cast<const arhost_record *>(input.data());
+        return sink_.write(instance_, &output);
+    }
+
+    bool wants_idle() const override { return sink_.idle != nullptr; }
+    arhost_status idle() override { return sink_.idle(instance_); }
+    arhost_status stop() override { return sink_.stop(instance_); }
+
+private:
+    const arhost_sink &sink_;
+    arhost_instance *instance_;
+    std::uint32_t width_ = 0, height_ = 0;
+};
+
+} // namespace
+
+std::span<std::byte> Memory::Region::slot(std::uint32_t index) const {
+    require(mapping && index < layout.count, "a command names a slot that is not there");
+    return layout.slot(mapping, index);
+}
+
+const Memory::Region &Memory::input(std::uint32_t generation) const {
+    const auto found = inputs.find(generation);
+    require(found != inputs.end(), "a command names memory that is not attached");
+    return found->second;
+}
+
+std::unique_ptr<Service> make_service(const arhost_plugin &plugin, arhost_instance *instance) {
+    switch (plugin.descriptor->kind) {
+    case ARHOST_KIND_SOURCE:
+        return std::make_unique<SourceService>(*static_cast<const arhost_source *>(plugin.functions), instance);
+    case ARHOST_KIND_TRACKER:
+        return std::make_unique<TrackerService>(*static_cast<const arhost_tracker *>(plugin.functions), instance);
+    case ARHOST_KIND_RAYTRACER:
+        return std::make_unique<RaytracerService>(*static_cast<const arhost_raytracer *>(plugin.functions), instance);
+    default:
+        return std::make_unique<SinkService>(*static_cast<const arhost_sink *>(plugin.functions), instance);
+    }
+}
+
+} // namespace arhost::worker

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ring/reactor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+using namespace arhost::ring;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Pipe {
+    Pipe() {
+        int ends[2];
+        if (::pipe(ends) != 0)
+            throw_errno("pipe");
+        read.reset(ends[0]);
+        write.reset(ends[1]);
+    }
+    void put() const { EXPECT_EQ(::write(write.get(), "x", 1), 1); }
+    UniqueFd read, write;
+};
+
+} // namespace
+
+TEST(Reactor, CallsBackWhileADescriptorIsReadable) {
+    Reactor reactor;
+    const Pipe pipe;
+    int calls = 0;
+    auto watch = reactor.watch(pipe.read.get(), [&] { ++calls; });
+    pipe.put();
+    reactor.run_once();
+    reactor.run_once();
+    EXPECT_EQ(calls, 2);
+}
+
+TEST(Reactor, CallsDeadlinesInTheirOrderAndOnce) {
+    Reactor reactor;
+    std::string order;
+    const auto now = Reactor::Clock::now();
+    auto second = reactor.at(now + 2ms, [&] { order += "2"; });
+    auto first = reactor.at(now + 1ms, [&] { order += "1"; });
+    auto never = reactor.at(now + 1ms, [&] { order += "x"; });
+    never.cancel();
+    while (order.size() < 2)
+        reactor.run_once();
+    EXPECT_EQ(order, "12");
+}
+
+TEST(Reactor, LetsACallbackEndItsOwnWatchAndAnother) {
+    Reactor reactor;
+    const Pipe one, two;
+    int calls = 0;
+    std::optional<Reactor::Registration> first, second;
+    first = reactor.watch(one.read.get(), [&] { ++calls, first.reset(), second.reset(); });
+    second = reactor.watch(two.read.get(), [&] { ++calls, first.reset(), second.reset(); });
+    one.put();
+    two.put();
+    reactor.run_once();
+    EXPECT_EQ(calls, 1) << "the other watch was called after its end";
+}
+
+TEST(Reactor, LetsADeadlineSetAnother) {
+    Reactor reactor;
+    int calls = 0;
+    Reactor::Registration next;
+    auto first = reactor.at(Reactor::Clock::now(), [&] { next = reactor.at(Reactor::Clock::now(), [&] { ++calls; }); });
+    while (calls == 0)
+        reactor.run_once();
+    EXPECT_EQ(calls, 1);
+}
