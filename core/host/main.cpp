@@ -25,7 +25,9 @@ int main(int argc, char **argv) {
     };
     app.add_option("--config", arguments.file, "The configuration to run (docs/config.md)")->type_name("FILE");
     add_configuration_options(app);
-    app.add_option("--frames", arguments.frames, "Stop after so many frames")->type_name("N");
+    app.add_option("--frames", arguments.frames, "Stop after so many frames")
+        ->type_name("N")
+        ->check(CLI::NonNegativeNumber);
     CLI::Option_group &axes = *app.add_option_group(
         "Coordinates", "The dissertation's options (docs/camera.md); they stand above 'coordinates:' in the file");
     axes.add_option("--ar", arguments.ar, "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");

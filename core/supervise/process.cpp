@@ -114,8 +114,11 @@ void Process::on_channel() {
         case ReceiveState::none:
             return;
         case ReceiveState::closed:
-            channel_watch_.cancel(); // its death follows; a worker that only closed its end is useless
-            return end("closed its control channel");
+            channel_watch_.cancel();
+            // Its death follows most times; a worker that only closed its end is useless.
+            kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
+                                                 [this] { end("closed its control channel"); });
+            return;
         case ReceiveState::breach:
             return end("broke the contract: it sent a malformed message");
         case ReceiveState::message:

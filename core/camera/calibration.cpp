@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/calibration.hpp"
+
+#include <arhost/frame.h>
+
+#include <algorithm>
+#include <cctype>
+#include <span>
+#include <sstream>
+
+namespace arhost::camera {
+namespace {
+
+using yaml::Node;
+
+std::string text(const Size &size) {
+    return std::to_string(size.width) + "×" + std::to_string(size.height) + " px";
+}
+
+std::uint32_t side(const Node &node) {
+    return static_cast<std::uint32_t>(node.integer(1, ARHOST_MAX_IMAGE_SIDE));
+}
+
+arhost_intrinsics intrinsics_for(const Size &size) {
+    arhost_intrinsics intrinsics{};
+    intrinsics.struct_size = sizeof intrinsics;
+    intrinsics.width = size.width;
+    intrinsics.height = size.height;
+    intrinsics.distortion = ARHOST_DISTORTION_NONE;
+    return intrinsics;
+}
+
+void set_focal_length(double &to, double value, const Node &node) {
+    if (!(value > 0)) {
+        std::ostringstream message;
+        message << "the focal length must be greater than 0 px, is " << value;
+        node.fail(message.str());
+    }
+    to = value;
+}
+
+// Checks the count for the model and drops what has no effect.
+void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<const double> k, const Node &node) {
+    const auto zero = [](double x) { return x == 0; };
+    const std::string count = std::to_string(k.size());
+    if (model == ARHOST_DISTORTION_FISHEYE) {
+        if (k.size() != 4)
+            node.fail("the fisheye model has 4 coefficients (k1 k2 k3 k4), here are " + count);
+    } else {
+        if (k.size() == 14) {
+            if (!std::all_of(k.begin() + 12, k.end(), zero))
+                node.fail("a tilted sensor (tauX, tauY) is not supported; calibrate without CALIB_TILTED_MODEL");
+            k = k.first(12);
+        }
+        if (k.size() != 0 && k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12)
+            node.fail("the Brown model has 4, 5, 8 or 12 coefficients "
+                      "(k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]), here are " +
+                      count);
+        if (model == ARHOST_DISTORTION_NONE && !std::all_of(k.begin(), k.end(), zero))
+            node.fail("the model is none, but a coefficient is not 0; set the model to brown or fisheye");
+        model = std::all_of(k.begin(), k.end(), zero) ? ARHOST_DISTORTION_NONE : ARHOST_DISTORTION_BROWN;
+        if (model == ARHOST_DISTORTION_NONE)
+            k = {};
+    }
+    to.distortion = model;
+    to.coefficient_count = static_cast<std::uint32_t>(k.size());
+    std::copy(k.begin(), k.end(), to.coefficients);
+}
+
+// A calibration file's keys without case and underscores, since programs and their releases differ in
+// them: camera_matrix, Camera_Matrix, cameraMatrix.
+std::optional<Node> find(const Node &root, std::initializer_list<std::string_view> names) {
+    for (const auto &[key, value] : root.entries()) {
+        std::string plain;
+        for (const char c : key)
+            if (c != '_')
+                plain += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        if (std::find(names.begin(), names.end(), plain) != names.end())
+            return value;
+    }
+    return std::nullopt;
+}
+
+// A list of numbers, or a matrix as OpenCV ({rows, cols, dt, data}) or ROS ({rows, cols, data}) has it.
+std::vector<double> numbers(const Node &node) {
+    if (node.is_sequence())
+        return node.reals();
+    const std::int64_t cells = node.require("rows").integer(0, 1000) * node.require("cols").integer(0, 1000);
+    if (const auto type = node.find("dt"))
+        type->choice({"d", "f"});
+    const Node data = node.require("data");
+    std::vector<double> values = data.reals();
+    if (static_cast<std::int64_t>(values.size()) != cells)
+        data.fail("has " + std::to_string(values.size()) + " numbers, but rows × cols is " + std::to_string(cells));
+    return values;
+}
+
+void read_camera_matrix(arhost_intrinsics &to, const Node &node) {
+    const std::vector<double> k = numbers(node);
+    if (k.size() != 9)
+        node.fail("must be a 3×3 matrix, has " + std::to_string(k.size()) + " numbers");
+    if (k[1] != 0)
+        node.fail("skew (row 1, column 2) is not supported and must be 0");
+    if (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
+        node.fail("must be [fx, 0, cx, 0, fy, cy, 0, 0, 1], row by row");
+    set_focal_length(to.fx, k[0], node);
+    set_focal_length(to.fy, k[4], node);
+    to.cx = k[2];
+    to.cy = k[5];
+}
+
+arhost_distortion model_of(const Node &root) {
+    if (const auto model = find(root, {"distortionmodel"})) {
+        const std::string name =
+            model->choice({"brown", "plumb_bob", "radtan", "rational_polynomial", "fisheye", "equidistant", "none"});
+        if (name == "none")
+            return ARHOST_DISTORTION_NONE;
+        return name == "fisheye" || name == "equidistant" ? ARHOST_DISTORTION_FISHEYE : ARHOST_DISTORTION_BROWN;
+    }
+    const auto fisheye = find(root, {"fisheyemodel"}); // OpenCV's calibration sample
+    return fisheye && fisheye->integer(0, 1) ? ARHOST_DISTORTION_FISHEYE : ARHOST_DISTORTION_BROWN;
+}
+
+Size size_of(const Node &root, std::optional<Size> expected) {
+    const auto width = find(root, {"imagewidth", "width"}), height = find(root, {"imageheight", "height"});
+    if (!width && !height && expected)
+        return *expected;
+    if (!width || !height)
+        root.fail(std::string("the key '") + (width ? "image_height" : "image_width") +
+                  "' is missing; give the size of the calibration's images in px, "
+                  "here or as width and height beside 'file' in the configuration");
+    const Size size{side(*width), side(*height)};
+    if (expected && size != *expected)
+        width->fail("the calibration is for images of " + text(size) + ", but " + text(*expected) +
+                    " are asked for; calibrate at that size");
+    return size;
+}
+
+std::optional<Size> size_beside_file(const Node &node) {
+    const auto width = node.find("width"), height = node.find("height");
+    if (width.has_value() != height.has_value())
+        node.fail("width and height go together; give both or none");
+    if (!width)
+        return std::nullopt;
+    return Size{side(*width), side(*height)};
+}
+
+} // namespace
+
+arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected) {
+    const Node root = Node::load(file);
+    if (!root.is_map())
+        root.fail("is no calibration in YAML; let OpenCV's FileStorage write it to a name that ends in .yaml");
+    arhost_intrinsics intrinsics = intrinsics_for(size_of(root, expected));
+    const auto matrix = find(root, {"cameramatrix", "k"});
+    if (!matrix)
+        root.fail("the key 'camera_matrix' is missing; is this a camera calibration?");
+    read_camera_matrix(intrinsics, *matrix);
+    if (const auto distortion = find(root, {"distortioncoefficients", "distcoeffs", "d"}))
+        set_distortion(intrinsics, model_of(root), numbers(*distortion), *distortion);
+    else
+        root.fail("the key 'distortion_coefficients' is missing; of a lens without distortion it is [0, 0, 0, 0]");
+    return intrinsics;
+}
+
+arhost_intrinsics parse_camera(const Node &node) {
+    if (const auto file = node.find("file")) {
+        node.allow_keys({"file", "width", "height"});
+        const std::filesystem::path path = file->input_path();
+        if (!std::filesystem::exists(path))
+            file->fail("the calibration file " + path.string() + " does not exist");
+        return read_calibration(path, size_beside_file(node));
+    }
+    node.allow_keys({"file", "width", "height", "fx", "fy", "cx", "cy", "distortion"});
+    arhost_intrinsics intrinsics = intrinsics_for({side(node.require("width")), side(node.require("height"))});
+    const Node fx = node.require("fx"), fy = node.find("fy").value_or(fx);
+    set_focal_length(intrinsics.fx, fx.real(), fx);
+    set_focal_length(intrinsics.fy, fy.real(), fy);
+    const auto cx = node.find("cx"), cy = node.find("cy");
+    intrinsics.cx = cx ? cx->real() : (intrinsics.width - 1) / 2.0;
+    intrinsics.cy = cy ? cy->real() : (intrinsics.height - 1) / 2.0;
+    if (const auto distortion = node.find("distortion")) {
+        distortion->allow_keys({"model", "coefficients"});
+        const std::string model = distortion->require("model").choice({"none", "brown", "fisheye"});
+        const auto coefficients = distortion->find("coefficients");
+        if (!coefficients && model != "none")
+            distortion->fail("the key 'coefficients' is missing, the list of the model's numbers");
+        set_distortion(intrinsics,
+                       model == "none"    ? ARHOST_DISTORTION_NONE
+                       : model == "brown" ? ARHOST_DISTORTION_BROWN
+                                          : ARHOST_DISTORTION_FISHEYE,
+                       coefficients ? coefficients->reals() : std::vector<double>(),
+                       coefficients.value_or(*distortion));
+    }
+    return intrinsics;
+}
+
+void check_size(const arhost_intrinsics &intrinsics, std::uint32_t width, std::uint32_t height) {
+    const Size calibrated{intrinsics.width, intrinsics.height}, actual{width, height};
+    if (calibrated != actual)
+        throw yaml::Error("the camera is calibrated for images of " + text(calibrated) + ", but the frames are " +
+                          text(actual) + "; calibrate at the frames' size, or set the source to the calibration's");
+}
+
+} // namespace arhost::camera

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/mapping.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec4.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace arhost::camera {
+
+const char *problem_with(const double (&mt)[16]) {
+    constexpr double tolerance = 1e-6, farthest_mm = 1e9;
+    if (!std::all_of(std::begin(mt), std::end(mt), [](double x) { return std::isfinite(x); }))
+        return "the pose has a number that is not finite";
+    if (mt[3] != 0 || mt[7] != 0 || mt[11] != 0 || mt[15] != 1)
+        return "the pose's last row is not 0 0 0 1";
+    const glm::dmat3 rotation(glm::make_mat4(mt));
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j)
+            if (!(std::abs(glm::dot(rotation[i], rotation[j]) - (i == j)) <= tolerance))
+                return "the pose's rotation is not orthonormal";
+    if (glm::determinant(rotation) < 0)
+        return "the pose mirrors: its rotation is left-handed";
+    if (std::max({std::abs(mt[12]), std::abs(mt[13]), std::abs(mt[14])}) > farthest_mm)
+        return "the pose is more than 1000 km away";
+    return nullptr;
+}
+
+std::optional<arhost_camera> camera_from_marker(const double (&mt)[16], const Coordinates &coordinates,
+                                                const arhost_intrinsics &intrinsics) {
+    if (problem_with(mt))
+        return std::nullopt;
+    const glm::dmat4 cp = glm::inverse(glm::make_mat4(mt) * rotation_of(coordinates)); // equation 3.2
+    const glm::dvec3 eye(cp[3]), look_at = eye - glm::dvec3(cp[2]), up(cp[1]);         // 3.3, 3.4, 3.5
+    arhost_camera camera{};
+    camera.struct_size = sizeof camera;
+    for (int i = 0; i < 3; ++i) {
+        camera.eye[i] = eye[i];
+        camera.look_at[i] = look_at[i];
+        camera.up[i] = up[i];
+    }
+    camera.intrinsics = intrinsics;
+    return camera;
+}
+
+} // namespace arhost::camera

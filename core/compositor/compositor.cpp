@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compositor/compositor.hpp"
+
+#include "pixels/rows.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace arhost {
+namespace {
+
+Region clipped(const Region &region, const ImageView &overlay, const arhost_frame_format &format) {
+    if (!overlay.rgba || region.x >= format.width || region.y >= format.height)
+        return {};
+    return {region.x, region.y, std::min(region.width, format.width - region.x),
+            std::min(region.height, format.height - region.y)};
+}
+
+bool contains(const Region &region, std::size_t x, std::size_t y) {
+    return x >= region.x && x - region.x < region.width && y >= region.y && y - region.y < region.height;
+}
+
+void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, const std::uint8_t *const planes[],
+                 std::size_t y, std::uint8_t *bgr) {
+    const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
+    switch (format.pixel_format) {
+    case ARHOST_GREY8:
+        return rows::bgr_from_grey(row(0, y), bgr, format.width);
+    case ARHOST_RGB8:
+        return rows::bgr_from_rgb(row(0, y), bgr, format.width);
+    case ARHOST_YUYV:
+        return rows::bgr_from_yuyv(row(0, y), matrix, bgr, format.width);
+    case ARHOST_NV12:
+        return rows::bgr_from_nv12(row(0, y), row(1, y / 2), matrix, bgr, format.width);
+    case ARHOST_I420:
+        return rows::bgr_from_i420(row(0, y), row(1, y / 2), row(2, y / 2), matrix, bgr, format.width);
+    }
+}
+
+Bgr pixel(const arhost_frame_format &format, const std::uint8_t *const planes[], std::size_t x, std::size_t y) {
+    const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
+    const std::uint8_t *first = row(0, y);
+    const YuvMatrix matrix = yuv_matrix(format);
+    switch (format.pixel_format) {
+    case ARHOST_GREY8:
+        return {first[x], first[x], first[x]};
+    case ARHOST_RGB8:
+        return {first[3 * x + 2], first[3 * x + 1], first[3 * x]};
+    case ARHOST_YUYV:
+        return bgr_from_yuv(matrix, first[2 * x], first[x / 2 * 4 + 1], first[x / 2 * 4 + 3]);
+    case ARHOST_NV12:
+        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2 * 2], row(1, y / 2)[x / 2 * 2 + 1]);
+    case ARHOST_I420:
+        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2]);
+    default:
+        return {first[3 * x], first[3 * x + 1], first[3 * x + 2]};
+    }
+}
+
+} // namespace
+
+void composite(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
+               const ImageView &overlay, const Region &region, const OutputView &out) {
+    const Region inside = clipped(region, overlay, format);
+    const YuvMatrix matrix = yuv_matrix(format);
+    const std::size_t begin = 3 * std::size_t(inside.x), end = begin + 3 * std::size_t(inside.width);
+    const std::size_t row_bytes = 3 * std::size_t(format.width);
+    for (std::size_t y = 0; y < format.height; ++y) {
+        std::uint8_t *to = out.bgr + y * out.stride;
+        const std::uint8_t *from = to; // once converted, the row is blended where it stands
+        const bool blending = contains(inside, inside.x, y);
+        if (format.pixel_format != ARHOST_BGR8) {
+            convert_row(format, matrix, planes, y, to);
+        } else {
+            from = planes[0] + y * format.stride[0];
+            if (blending) {
+                std::memcpy(to, from, begin);
+                std::memcpy(to + end, from + end, row_bytes - end);
+            } else {
+                std::memcpy(to, from, row_bytes);
+            }
+        }
+        if (blending)
+            rows::blend(from + begin, overlay.rgba + y * overlay.stride + 4 * std::size_t(inside.x), to + begin,
+                        inside.width);
+    }
+}
+
+void composite_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
+                         const ImageView &overlay, const Region &region, const OutputView &out) {
+    const Region inside = clipped(region, overlay, format);
+    for (std::size_t y = 0; y < format.height; ++y)
+        for (std::size_t x = 0; x < format.width; ++x) {
+            Bgr c = pixel(format, planes, x, y);
+            if (contains(inside, x, y)) {
+                const std::uint8_t *rgba = overlay.rgba + y * overlay.stride + 4 * x;
+                c = {blended(c.b, rgba[2], rgba[3]), blended(c.g, rgba[1], rgba[3]), blended(c.r, rgba[0], rgba[3])};
+            }
+            std::memcpy(out.bgr + y * out.stride + 3 * x, &c, 3);
+        }
+}
+
+} // namespace arhost

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What happens to a pixel, in integers. The SIMD kernels of rows.cpp give the same bytes.
+#pragma once
+
+#include <arhost/frame.h>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace arhost {
+
+struct Bgr {
+    std::uint8_t b, g, r;
+};
+
+// B over A (equation 3.6). 255 is odd, so there are no ties to round.
+constexpr std::uint8_t blended(int a, int b, int alpha) {
+    return static_cast<std::uint8_t>((a * (255 - alpha) + b * alpha + 127) / 255);
+}
+
+// From Y'CbCr to R'G'B'. The factors are for (a·b + 2^14) >> 15, the luma's with a = y·2^7 and the
+// chroma's with a = u·2^8 or v·2^8, so that all products are in 1/64 and everything fits 16 bits.
+struct YuvMatrix {
+    std::int16_t y_offset;
+    std::int16_t yy, rv, gu, gv, bu;
+};
+
+// `kr` and `kb`: the weights of red and blue in the luma. ITU-R BT.601-7 §2.5 and BT.709-6 §3 differ in
+// them alone.
+constexpr YuvMatrix yuv_matrix(double kr, double kb, bool limited) {
+    const auto rounded = [](double x) { return static_cast<std::int16_t>(x + 0.5); };
+    const double kg = 1 - kr - kb;
+    const double luma = limited ? 255.0 / 219 : 1, chroma = 2 * (limited ? 255.0 / 224 : 1) * (1 << 13);
+    return {static_cast<std::int16_t>(limited ? 16 : 0),
+            rounded(luma * (1 << 14)),
+            rounded(chroma * (1 - kr)),
+            rounded(chroma * (1 - kb) * kb / kg),
+            rounded(chroma * (1 - kr) * kr / kg),
+            rounded(chroma * (1 - kb))};
+}
+
+constexpr YuvMatrix yuv_matrix(const arhost_frame_format &format) {
+    const bool limited = format.yuv_range != ARHOST_FULL_RANGE;
+    return format.yuv_matrix == ARHOST_BT709 ? yuv_matrix(0.2126, 0.0722, limited)
+                                             : yuv_matrix(0.299, 0.114, limited);
+}
+
+constexpr Bgr bgr_from_yuv(const YuvMatrix &m, int y, int u, int v) {
+    const auto product = [](int a, int b) { return (a * b + (1 << 14)) >> 15; };
+    const auto byte = [](int x) { return static_cast<std::uint8_t>(std::clamp((x + 32) >> 6, 0, 255)); };
+    const int luma = product((y - m.y_offset) * 128, m.yy), cu = (u - 128) * 256, cv = (v - 128) * 256;
+    return {byte(luma + product(cu, m.bu)), byte(luma - product(cu, m.gu) - product(cv, m.gv)),
+            byte(luma + product(cv, m.rv))};
+}
+
+// 0.299, 0.587 and 0.114 (ITU-R BT.601-7 §2.5.1) in 1/65536; their sum is 1.
+constexpr std::uint16_t red_weight = 19595, green_weight = 38470, blue_weight = 7471;
+// Half of the last place, and the mean loss of the three truncations.
+constexpr std::uint16_t grey_rounding = 129;
+
+constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {
+    const auto part = [](unsigned value, unsigned weight) { return (value << 8) * weight >> 16; };
+    return static_cast<std::uint8_t>(
+        (part(r, red_weight) + part(g, green_weight) + part(b, blue_weight) + grey_rounding) >> 8);
+}
+
+// Luma of limited range (16 to 235) to 0 to 255, rounded to nearest.
+constexpr std::uint8_t full_range(int y) {
+    return static_cast<std::uint8_t>(((std::clamp(y, 16, 235) - 16) * 255 + 109) / 219);
+}
+// The same as (t·2^8·gain >> 16 + 64) >> 7 for t = 0 to 219.
+constexpr std::uint16_t full_range_gain = 38155;
+
+} // namespace arhost

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The SIMD kernels: each does `count` pixels of one row on the best instruction set of this machine, with
+// the results of formulas.hpp. No byte outside those pixels is read or written; nothing need be aligned.
+#pragma once
+
+#include "pixels/formulas.hpp"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace arhost::rows {
+
+// out = B over A. `bgr` may be `out`.
+void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count);
+
+// To BGR. The count of YUV pixels is even; chroma is replicated.
+void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count);
+void bgr_from_rgb(const std::uint8_t *rgb, std::uint8_t *bgr, std::size_t count);
+void bgr_from_yuyv(const std::uint8_t *yuyv, const YuvMatrix &matrix, std::uint8_t *bgr, std::size_t count);
+void bgr_from_nv12(const std::uint8_t *y, const std::uint8_t *uv, const YuvMatrix &matrix, std::uint8_t *bgr,
+                   std::size_t count);
+void bgr_from_i420(const std::uint8_t *y, const std::uint8_t *u, const std::uint8_t *v, const YuvMatrix &matrix,
+                   std::uint8_t *bgr, std::size_t count);
+
+// To grey, full range.
+void grey_from_bgr(const std::uint8_t *bgr, std::uint8_t *grey, std::size_t count);
+void grey_from_rgb(const std::uint8_t *rgb, std::uint8_t *grey, std::size_t count);
+void grey_from_yuyv(const std::uint8_t *yuyv, bool limited, std::uint8_t *grey, std::size_t count);
+
+} // namespace arhost::rows

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/loader.hpp"
+
+#include "scene/mesh_text.hpp"
+#include "scene/shapes.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace arhost::scene {
+namespace {
+
+using yaml::Node;
+
+glm::dvec3 vector_of(const Node &node) {
+    const std::vector<double> values = node.reals(3);
+    return {values[0], values[1], values[2]};
+}
+
+// A number for all three, or a list of three.
+glm::dvec3 number_or_vector(const Node &node) {
+    return node.is_sequence() ? vector_of(node) : glm::dvec3(node.real());
+}
+
+glm::dvec3 position_of(const Node &node) {
+    const glm::dvec3 position = vector_of(node);
+    if (glm::any(glm::greaterThan(glm::abs(position), glm::dvec3(coordinate_limit_mm))))
+        node.fail("must lie within 1e9 mm");
+    return position;
+}
+
+double length_of(const Node &node) {
+    const double length = node.real(0, coordinate_limit_mm);
+    if (static_cast<float>(length) <= 0)
+        node.fail("must be more than 0");
+    return length;
+}
+
+// IEC 61966-2-1.
+double linear_from_srgb(double encoded) {
+    return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+// "#rrggbb" in sRGB; a number, or a list of three, in linear light.
+glm::vec3 colour_of(const Node &node, double maximum = 1) {
+    const std::string wrong = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
+                              std::string(maximum == 1 ? "1)" : "1e6)");
+    if (!node.is_scalar() && !node.is_sequence())
+        node.fail(wrong);
+    glm::dvec3 colour;
+    if (node.is_scalar() && node.text().starts_with('#')) {
+        const std::string text = node.text();
+        unsigned value = 0;
+        const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
+        if (text.size() != 7 || error != std::errc() || end != text.data() + 7)
+            node.fail(wrong + ", is '" + text + "'");
+        for (int i = 0; i < 3; ++i)
+            colour[i] = linear_from_srgb((value >> (16 - 8 * i) & 0xff) / 255.0);
+    } else {
+        colour = number_or_vector(node);
+    }
+    for (int i = 0; i < 3; ++i)
+        if (colour[i] < 0 || colour[i] > maximum)
+            node.fail(wrong);
+    return colour;
+}
+
+glm::vec3 colour_or(const Node &parent, std::string_view key, const glm::vec3 &otherwise) {
+    const auto node = parent.find(key);
+    return node ? colour_of(*node) : otherwise;
+}
+
+void set(float (&to)[3], const glm::vec3 &from) {
+    for (int i = 0; i < 3; ++i)
+        to[i] = from[i];
+}
+
+constexpr double light_limit = 1e6;
+
+Settings settings_of(const Node &root) {
+    Settings settings;
+    if (root.require("version").integer() != 1)
+        root.require("version").fail("must be 1");
+    settings.axes = root.require("axes").choice({"z-up", "y-up"}) == "z-up" ? ARHOST_Z_UP : ARHOST_Y_UP;
+    if (const auto node = root.find("max_depth"))
+        settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
+    if (const auto node = root.find("ambient"))
+        settings.ambient = colour_of(*node, light_limit);
+    if (const auto node = root.find("background"))
+        settings.background = colour_of(*node, light_limit);
+    if (const auto node = root.find("shadow_alpha")) {
+        node->allow_keys({"opaque", "translucent"});
+        if (const auto alpha = node->find("opaque"))
+            settings.shadow_alpha_opaque = static_cast<float>(alpha->real(0, 1));
+        if (const auto alpha = node->find("translucent"))
+            settings.shadow_alpha_translucent = static_cast<float>(alpha->real(0, 1));
+    }
+    return settings;
+}
+
+arhost_material material_of(const Node &node) {
+    if (!node.is_map())
+        node.fail("must be a map with the key 'model'");
+    const Node model_node = node.require("model");
+    const std::string model = model_node.choice({"diffuse", "specular", "mirror"});
+    arhost_material material{};
+    material.exponent = 1;
+    if (model == "mirror") {
+        node.allow_keys({"model", "reflectivity"});
+        material.model = ARHOST_MIRROR;
+        set(material.reflectivity, colour_or(node, "reflectivity", glm::vec3(1)));
+        return material;
+    }
+    const glm::vec3 diffuse = colour_of(node.require("diffuse"));
+    set(material.diffuse, diffuse);
+    set(material.ambient, colour_or(node, "ambient", diffuse));
+    if (model == "diffuse") {
+        node.allow_keys({"model", "ambient", "diffuse"});
+        material.model = ARHOST_DIFFUSE;
+        return material;
+    }
+    node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent"});
+    material.model = ARHOST_SPECULAR;
+    set(material.specular, colour_of(node.require("specular")));
+    material.exponent = static_cast<float>(node.require("exponent").real(1, 1e6));
+    return material;
+}
+
+arhost_light light_of(const Node &node) {
+    node.allow_keys({"position", "intensity", "falloff"});
+    arhost_light light{};
+    light.type = ARHOST_POINT_LIGHT;
+    light.falloff = ARHOST_FALLOFF_NONE;
+    if (const auto falloff = node.find("falloff"))
+        light.falloff = falloff->choice({"none", "inverse-square"}) == "none" ? ARHOST_FALLOFF_NONE
+                                                                              : ARHOST_FALLOFF_INVERSE_SQUARE;
+    set(light.position, position_of(node.require("position")));
+    const Node intensity_node = node.require("intensity");
+    const glm::dvec3 intensity = number_or_vector(intensity_node);
+    for (int i = 0; i < 3; ++i)
+        if (intensity[i] < 0 || intensity[i] > 1e12)
+            intensity_node.fail("must be 0 to 1e12");
+    set(light.intensity, intensity);
+    return light;
+}
+
+Transform step_of(const Node &node) {
+    node.allow_keys({"translate", "scale", "rotate"});
+    if (node.entries().size() != 1)
+        node.fail("each step of a transform is one of translate, scale and rotate");
+    if (const auto by = node.find("translate"))
+        return Transform::translation(position_of(*by));
+    if (const auto by = node.find("scale")) {
+        const glm::dvec3 factors = number_or_vector(*by);
+        for (int i = 0; i < 3; ++i)
+            if (!(std::abs(factors[i]) >= 1e-9 && std::abs(factors[i]) <= 1e9))
+                by->fail("each factor must be 1e-9 to 1e9, or that below 0 for a mirrored object");
+        return Transform::scaling(factors);
+    }
+    const Node rotate = node.require("rotate");
+    rotate.allow_keys({"axis", "degrees"});
+    const Node axis_node = rotate.require("axis");
+    const glm::dvec3 axis = vector_of(axis_node);
+    const double length = glm::length(axis);
+    if (!(length > 1e-9 && length < 1e9))
+        axis_node.fail("has no direction");
+    return Transform::rotation(axis / length, rotate.require("degrees").real());
+}
+
+Transform transform_of(const Node &object) {
+    Transform world_from_object;
+    if (const auto steps = object.find("transform"))
+        for (const Node &step : steps->items())
+            world_from_object = step_of(step) * world_from_object;
+    return world_from_object;
+}
+
+glm::dvec3 centre_of(const Node &shape) {
+    const auto centre = shape.find("centre");
+    return centre ? position_of(*centre) : glm::dvec3(0);
+}
+
+TriangleMesh cuboid_of(const Node &shape) {
+    shape.allow_keys({"size", "centre"});
+    const Node size_node = shape.require("size");
+    const glm::dvec3 size = number_or_vector(size_node);
+    for (int i = 0; i < 3; ++i)
+        if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
+            size_node.fail("each side must be 1e-6 to 1e9 mm");
+    return cuboid(centre_of(shape), size);
+}
+
+TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
+    shape.allow_keys({"size", "centre", "normal"});
+    const Node size_node = shape.require("size");
+    const std::vector<double> size = size_node.is_sequence() ? size_node.reals(2) : std::vector(2, size_node.real());
+    for (const double side : size)
+        if (!(side >= 1e-6 && side <= coordinate_limit_mm))
+            size_node.fail("each side must be 1e-6 to 1e9 mm");
+    const glm::dvec3 up = axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+    glm::dvec3 normal = up;
+    if (const auto node = shape.find("normal")) {
+        normal = vector_of(*node);
+        const double length = glm::length(normal);
+        if (!(length > 1e-9 && length < 1e9))
+            node->fail("has no direction");
+        normal /= length;
+    }
+    return rectangle(centre_of(shape), normal, up, {size[0], size[1]});
+}
+
+glm::vec4 sphere_of(const Node &object, const Node &shape, const Transform &world_from_object) {
+    shape.allow_keys({"centre", "radius"});
+    const auto scale = world_from_object.uniform_scale();
+    if (!scale)
+        object.require("transform")
+            .fail("scales a sphere unevenly, which would make it an ellipsoid; scale it by one number");
+    const double radius = length_of(shape.require("radius")) * *scale;
+    return {glm::vec3(world_from_object(centre_of(shape))), static_cast<float>(radius)};
+}
+
+// A sphere so small that its radius vanishes in a float, a mesh that ends beyond the limit.
+template <class Points> void check_extent(const Node &shape, const Points &points) {
+    for (const auto &point : points)
+        for (int i = 0; i < Points::value_type::length(); ++i)
+            if (!(std::abs(point[i]) <= coordinate_limit_mm))
+                shape.fail("reaches further than 1e9 mm after its transform");
+}
+
+std::string extent_of(const TriangleMesh &mesh) {
+    glm::vec3 low = mesh.positions.front(), high = low;
+    for (const glm::vec3 &p : mesh.positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    char text[96];
+    std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", high.x - low.x, high.y - low.y, high.z - low.z);
+    return text;
+}
+
+TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &world_from_object,
+                     const LoadCallbacks &callbacks) {
+    MeshOptions options;
+    if (const auto smooth = object.find("smooth"))
+        options.smooth = smooth->boolean();
+    try {
+        TriangleMesh mesh = load_mesh(path.input_path(), options, callbacks);
+        world_from_object.apply(mesh);
+        check_extent(path, mesh.positions);
+        if (std::ranges::any_of(mesh.texcoords, [](const glm::vec2 &t) {
+                return std::abs(t.x) > coordinate_limit_mm || std::abs(t.y) > coordinate_limit_mm;
+            }))
+            path.fail("has texture coordinates beyond 1e9");
+        if (callbacks.info)
+            callbacks.info(path.input_path().string() + ": " + std::to_string(mesh.triangles.size()) +
+                           " triangles, " + std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
+        return mesh;
+    } catch (const MeshError &error) {
+        path.fail(error.what());
+    }
+}
+
+class SceneLoader {
+public:
+    SceneLoader(const Node &root, const LoadCallbacks &callbacks) : root_(root), callbacks_(callbacks) {}
+
+    ArenaBuilder load() {
+        root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "materials",
+                          "lights", "objects"});
+        builder_.settings = settings_of(root_);
+        const Node materials = root_.require("materials");
+        for (const auto &[name, node] : materials.entries()) {
+            if (!materials_.emplace(name, builder_.add_material(material_of(node))).second)
+                node.fail("the material stands here twice; keep one of them");
+        }
+        if (const auto lights = root_.find("lights"))
+            for (const Node &node : lights->items())
+                builder_.add_light(light_of(node));
+        const std::vector<Node> objects = root_.require("objects").items();
+        for (std::size_t i = 0; i < objects.size(); ++i)
+            add_object(objects[i], i, objects.size());
+        return std::move(builder_);
+    }
+
+private:
+    void add_object(const Node &node, std::size_t index, std::size_t count) {
+        node.allow_keys({"name", "mesh", "smooth", "sphere", "cuboid", "plane", "transform", "material", "role"});
+        const std::string shape_key = shape_key_of(node);
+        const Node shape = node.require(shape_key);
+        if (const auto smooth = node.find("smooth"); smooth && shape_key != "mesh")
+            smooth->fail("belongs to a mesh only");
+        const std::string name = name_of(node, shape_key + " " + std::to_string(index));
+        const std::uint32_t material = material_index(node.require("material"));
+        const arhost_role role = role_of(node);
+        const Transform world_from_object = transform_of(node);
+
+        LoadCallbacks part = callbacks_; // its progress is a part of the whole scene's
+        if (callbacks_.progress)
+            part.progress = [&](double fraction, const std::string &what) {
+                callbacks_.progress(
+                    (static_cast<double>(index) + std::max(fraction, 0.0)) / static_cast<double>(count), what);
+            };
+        builder_.add_object(name, add_geometry(node, shape_key, shape, world_from_object, part), material, role);
+        Watch(part, name).report(1);
+    }
+
+    static std::string shape_key_of(const Node &node) {
+        std::string found;
+        for (const char *key : {"mesh", "sphere", "cuboid", "plane"})
+            if (const auto shape = node.find(key)) {
+                if (!found.empty())
+                    shape->fail("the object has a " + found + " already; make two objects of them");
+                found = key;
+            }
+        if (found.empty())
+            node.fail("needs one of mesh, sphere, cuboid and plane");
+        return found;
+    }
+
+    static std::string name_of(const Node &node, const std::string &otherwise) {
+        const auto name = node.find("name");
+        if (!name)
+            return otherwise;
+        const std::string text = name->text();
+        if (std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+            name->fail("must not hold control characters");
+        return text;
+    }
+
+    std::uint32_t material_index(const Node &node) const {
+        std::vector<std::string_view> names;
+        for (const auto &[name, index] : materials_)
+            names.push_back(name);
+        return materials_.at(node.choice(names));
+    }
+
+    static arhost_role role_of(const Node &node) {
+        const auto role = node.find("role");
+        const std::string text = role ? role->choice({"virtual", "catcher", "occluder"}) : "virtual";
+        return text == "virtual" ? ARHOST_VIRTUAL : text == "catcher" ? ARHOST_CATCHER : ARHOST_OCCLUDER;
+    }
+
+    std::uint32_t add_geometry(const Node &node, const std::string &key, const Node &shape,
+                               const Transform &world_from_object, const LoadCallbacks &callbacks) {
+        if (key == "mesh")
+            return builder_.add_triangles(mesh_of(node, shape, world_from_object, callbacks));
+        if (key == "sphere") {
+            const Spheres spheres = {sphere_of(node, shape, world_from_object)};
+            check_extent(shape, spheres);
+            if (!(spheres[0].w > 0))
+                shape.fail("its radius vanishes after its transform");
+            return builder_.add_spheres(spheres);
+        }
+        TriangleMesh mesh = key == "cuboid" ? cuboid_of(shape) : plane_of(shape, builder_.settings.axes);
+        world_from_object.apply(mesh);
+        check_extent(shape, mesh.positions);
+        return builder_.add_triangles(std::move(mesh));
+    }
+
+    const Node &root_;
+    const LoadCallbacks &callbacks_;
+    ArenaBuilder builder_;
+    std::map<std::string, std::uint32_t> materials_;
+};
+
+} // namespace
+
+ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks) {
+    return SceneLoader(root, callbacks).load();
+}
+
+ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks) {
+    return load_scene(Node::load(file), callbacks);
+}
+
+} // namespace arhost::scene

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Wavefront OBJ: v, vn, vt and f. Colours of vertices, groups, smoothing groups, materials, points, lines
+// and curves are passed over.
+#include "scene/mesh_text.hpp"
+#include "scene/polygon.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace arhost::scene {
+namespace {
+
+class ObjParser {
+public:
+    ObjParser(const MeshText &text, const Watch &watch)
+        : text_(text), watch_(watch), p_(text.begin()), end_(text.end()) {}
+
+    TriangleMesh parse() {
+        if (text_.view().starts_with("\xef\xbb\xbf")) // UTF-8's byte order mark
+            p_ += 3;
+        const char *next_report = p_;
+        while (p_ < end_) {
+            statement();
+            skip_line(p_, end_);
+            if (p_ >= next_report) {
+                watch_.report(static_cast<double>(p_ - text_.begin()) / static_cast<double>(text_.view().size()));
+                next_report = p_ + (1 << 20);
+            }
+        }
+        if (corners_[0].empty())
+            text_.fail("there are no triangles in it" +
+                       std::string(other_shapes_ ? ", only points, lines or curves" : "") +
+                       (positions_.empty() ? ", nor vertices" : ""));
+        if (names_materials_)
+            watch_.info(text_.name() + ": its MTL materials are passed over; the scene file gives materials");
+        return mesh();
+    }
+
+private:
+    enum { Position, Texcoord, Normal };
+
+    void statement() {
+        skip_blanks(p_, end_);
+        const char *line = p_;
+        if (word("f"))
+            face(line);
+        else if (word("v"))
+            positions_.push_back(numbers<glm::vec3>(line, 3, "a vertex"));
+        else if (word("vn"))
+            normals_.push_back(numbers<glm::vec3>(line, 3, "a normal"));
+        else if (word("vt"))
+            texcoords_.push_back(numbers<glm::vec2>(line, 1, "a texcoord"));
+        else if (word("usemtl") || word("mtllib"))
+            names_materials_ = true;
+        else if (word("l") || word("p") || word("curv") || word("surf"))
+            other_shapes_ = true;
+    }
+
+    bool word(std::string_view expected) {
+        const std::string_view left(p_, static_cast<std::size_t>(end_ - p_));
+        if (!left.starts_with(expected) || left.size() == expected.size() || !is_blank(left[expected.size()]))
+            return false;
+        p_ += expected.size();
+        return true;
+    }
+
+    // Over blanks, and over line ends that a backslash hides.
+    void skip_gap() {
+        while (true) {
+            skip_blanks(p_, end_);
+            if (p_ == end_ || *p_ != '\\')
+                return;
+            const char *after = p_ + 1;
+            skip_blanks(after, end_);
+            if (after < end_ && *after != '\n')
+                return;
+            p_ = std::min(after + 1, end_);
+        }
+    }
+    bool at_line_end() {
+        skip_gap();
+        return p_ == end_ || *p_ == '\n' || *p_ == '#';
+    }
+    bool at_token_end() const { return p_ == end_ || is_blank(*p_) || *p_ == '\n' || *p_ == '\\' || *p_ == '#'; }
+
+    template <class Vector> Vector numbers(const char *line, int needed, const char *what) {
+        Vector values(0);
+        for (int i = 0; i < Vector::length(); ++i) {
+            if (at_line_end()) {
+                if (i >= needed)
+                    break;
+                text_.fail_line(line, std::string(what) + " needs " + std::to_string(needed) + " numbers, has " +
+                                          std::to_string(i));
+            }
+            const char *token = p_;
+            if (!read_number(p_, end_, values[i]) || !at_token_end())
+                text_.fail_line(token, "'" + token_at(token, end_) + "' is not a number");
+            if (!std::isfinite(values[i]))
+                text_.fail_line(token, std::string(what) + " has the number '" + token_at(token, end_) + "'");
+        }
+        return values;
+    }
+
+    // One of v, v/vt, v//vn and v/vt/vn, counted from 1, or from the last one with -1.
+    void face(const char *line) {
+        for (auto &corners : polygon_)
+            corners.clear();
+        while (!at_line_end()) {
+            const char *token = p_;
+            polygon_[Position].push_back(index(token, positions_.size(), "vertex"));
+            std::uint32_t texcoord = ARHOST_NONE, normal = ARHOST_NONE;
+            if (p_ < end_ && *p_ == '/') {
+                ++p_;
+                if (p_ < end_ && *p_ != '/' && !at_token_end())
+                    texcoord = index(token, texcoords_.size(), "texcoord");
+                if (p_ < end_ && *p_ == '/') {
+                    ++p_;
+                    if (!at_token_end())
+                        normal = index(token, normals_.size(), "normal");
+                }
+            }
+            if (!at_token_end())
+                text_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
+            polygon_[Texcoord].push_back(texcoord);
+            polygon_[Normal].push_back(normal);
+        }
+        const auto &polygon = polygon_[Position];
+        if (polygon.size() < 3)
+            text_.fail_line(line, "a face needs three corners, has " + std::to_string(polygon.size()));
+        const auto triangles = triangulate(polygon, positions_, triangles_);
+        if (triangles.empty())
+            text_.fail_line(line, "a concave face has " + std::to_string(polygon.size()) + " corners, more than " +
+                                      std::to_string(concave_corner_limit) + "; cut it into triangles");
+        if (corners_[Position].size() + triangles.size() >= ARHOST_NONE / 3)
+            text_.fail_line(line, "there are too many triangles");
+        for (const glm::uvec3 &t : triangles) {
+            for (const int kind : {Position, Texcoord, Normal}) {
+                const auto &from = polygon_[kind];
+                if (kind != Position && !used_[kind]) {
+                    if (from[t.x] == ARHOST_NONE && from[t.y] == ARHOST_NONE && from[t.z] == ARHOST_NONE)
+                        continue;
+                    used_[kind] = true; // the first: those before have none
+                    corners_[kind].resize(corners_[Position].size() - 1, glm::uvec3(ARHOST_NONE));
+                }
+                corners_[kind].emplace_back(from[t.x], from[t.y], from[t.z]);
+            }
+        }
+    }
+
+    std::uint32_t index(const char *token, std::size_t count, const char *what) {
+        std::int64_t value = 0;
+        if (!read_integer(p_, end_, value))
+            text_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
+        const std::int64_t from_zero = value < 0 ? static_cast<std::int64_t>(count) + value : value - 1;
+        if (value == 0 || from_zero < 0 || from_zero >= static_cast<std::int64_t>(count))
+            text_.fail_line(token, "a face names " + std::string(what) + " " + std::to_string(value) + ", but " +
+                                       std::to_string(count) + " stand above it");
+        return static_cast<std::uint32_t>(from_zero);
+    }
+
+    TriangleMesh mesh() {
+        if (used_[Normal] && has_gap(corners_[Normal])) {
+            watch_.info(text_.name() + ": some faces have normals and some have none; all are passed over");
+            used_[Normal] = false;
+        }
+        if (!used_[Normal] && !used_[Texcoord])
+            return {std::move(positions_), {}, {}, std::move(corners_[Position])};
+        return joined();
+    }
+
+    static bool has_gap(const std::vector<glm::uvec3> &corners) {
+        for (const glm::uvec3 &c : corners)
+            if (c.x == ARHOST_NONE || c.y == ARHOST_NONE || c.z == ARHOST_NONE)
+                return true;
+        return false;
+    }
+
+    // A vertex for each triple of position, texcoord and normal that occurs. A hash table with open
+    // addressing finds the triples again.
+    TriangleMesh joined() {
+        TriangleMesh mesh;
+        const std::size_t corner_count = corners_[Position].size() * 3;
+        std::vector<std::uint32_t> table(std::bit_ceil(corner_count * 2), ARHOST_NONE);
+        std::vector<glm::uvec3> triples;
+        const auto vertex = [&](const glm::uvec3 &triple) {
+            std::uint64_t hash =
+                triple.x * 0x9e3779b97f4a7c15u ^ triple.y * 0xc2b2ae3d27d4eb4fu ^ triple.z * 0x165667b19e3779f9u;
+            hash ^= hash >> 29;
+            for (std::size_t slot = hash & (table.size() - 1);; slot = (slot + 1) & (table.size() - 1)) {
+                if (table[slot] == ARHOST_NONE) {
+                    table[slot] = static_cast<std::uint32_t>(triples.size());
+                    triples.push_back(triple);
+                    return table[slot];
+                }
+                if (triples[table[slot]] == triple)
+                    return table[slot];
+            }
+        };
+        mesh.triangles = std::move(corners_[Position]);
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+            for (int corner = 0; corner < 3; ++corner)
+                mesh.triangles[i][corner] =
+                    vertex({mesh.triangles[i][corner], used_[Texcoord] ? corners_[Texcoord][i][corner] : ARHOST_NONE,
+                            used_[Normal] ? corners_[Normal][i][corner] : ARHOST_NONE});
+        for (const glm::uvec3 &triple : triples) {
+            mesh.positions.push_back(positions_[triple.x]);
+            if (used_[Texcoord])
+                mesh.texcoords.push_back(triple.y == ARHOST_NONE ? glm::vec2(0) : texcoords_[triple.y]);
+            if (used_[Normal])
+                mesh.normals.push_back(normals_[triple.z]);
+        }
+        return mesh;
+    }
+
+    const MeshText &text_;
+    const Watch &watch_;
+    const char *p_, *end_;
+    std::vector<glm::vec3> positions_, normals_;
+    std::vector<glm::vec2> texcoords_;
+    std::vector<glm::uvec3> corners_[3]; // of the triangles, by kind
+    bool used_[3] = {true, false, false};
+    std::vector<std::uint32_t> polygon_[3];
+    std::vector<glm::uvec3> triangles_;
+    bool names_materials_ = false, other_shapes_ = false;
+};
+
+} // namespace
+
+TriangleMesh parse_obj(MeshText &text, const Watch &watch) {
+    text.lone_carriage_returns_to_newlines();
+    return ObjParser(text, watch).parse();
+}
+
+} // namespace arhost::scene

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Transforms that are put into the vertices, and the shapes that scene files know by name. Private to
+// core/scene.
+#pragma once
+
+#include "scene/arena.hpp"
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include <optional>
+
+namespace arhost::scene {
+
+// p → linear · p + offset. A product is applied from right to left.
+class Transform {
+public:
+    Transform() = default;
+    static Transform translation(const glm::dvec3 &by) { return {glm::dmat3(1), by}; }
+    static Transform scaling(const glm::dvec3 &factors);
+    static Transform rotation(const glm::dvec3 &unit_axis, double degrees); // right-handed
+
+    friend Transform operator*(const Transform &b, const Transform &a) {
+        return {b.linear_ * a.linear_, b.linear_ * a.offset_ + b.offset_};
+    }
+    glm::dvec3 operator()(const glm::dvec3 &point) const { return linear_ * point + offset_; }
+
+    // The factor of all lengths, or nothing where it differs by direction.
+    std::optional<double> uniform_scale() const;
+
+    // Normals by the inverse transpose; a mirroring one turns the triangles round, so that their outsides
+    // stay outside.
+    void apply(TriangleMesh &mesh) const;
+
+private:
+    Transform(const glm::dmat3 &linear, const glm::dvec3 &offset) : linear_(linear), offset_(offset) {}
+    glm::dmat3 linear_{1};
+    glm::dvec3 offset_{0};
+};
+
+// 12 triangles, counter-clockwise seen from outside.
+TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &size);
+
+// 2 triangles, counter-clockwise seen from where `normal` points to. The first side is level, the second
+// goes as far `up` as the rectangle allows. Where it lies flat, they go along x and along y (z-up) or −z
+// (y-up).
+TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &unit_normal, const glm::dvec3 &up,
+                       const glm::dvec2 &size);
+
+} // namespace arhost::scene

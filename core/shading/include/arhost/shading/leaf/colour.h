@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Colour. A leaf file: see ../scalar.hpp.
+
+// Linear light to sRGB and back, both 0 to 1 (IEC 61966-2-1:1999, its transfer function).
+ARHOST_LEAF Float srgb_encode(Float linear) {
+    Float x = min(max(linear, Float(0.0)), Float(1.0));
+    Float curve = Float(1.055) * pow(max(x, Float(0.0031308)), Float(1.0 / 2.4)) - Float(0.055);
+    return select(x > Float(0.0031308), curve, Float(12.92) * x);
+}
+
+ARHOST_LEAF Float srgb_decode(Float encoded) {
+    Float x = min(max(encoded, Float(0.0)), Float(1.0));
+    Float curve = pow((max(x, Float(0.04045)) + Float(0.055)) / Float(1.055), Float(2.4));
+    return select(x > Float(0.04045), curve, x / Float(12.92));
+}

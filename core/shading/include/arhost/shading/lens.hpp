@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost/shading/lens.hpp: the lens of arhost/camera.h, from rays to pixels and back. Double precision:
+// made once into a table of rays, not evaluated per frame.
+//
+// Axes: x right, y down, z forward (OpenCV). "Image plane": the plane z = 1.
+#pragma once
+
+#include <arhost/camera.h>
+
+#include "vec3.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace arhost::shading {
+
+struct Point2 {
+    double x, y;
+};
+
+class Lens {
+public:
+    explicit Lens(const arhost_intrinsics &intrinsics) : intrinsics_(intrinsics) {
+        std::copy_n(intrinsics.coefficients, std::min<std::uint32_t>(intrinsics.coefficient_count, 12), k_);
+        limit_ = fold();
+    }
+
+    // (x'', y'') of a direction. None behind the camera, or beyond the fold of the polynomial, where
+    // directions come back inwards.
+    std::optional<Point2> distort(Vec3T<double> d) const {
+        if (intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE) {
+            const double r = std::hypot(d.x, d.y), theta = std::atan2(r, d.z);
+            if (theta > limit_)
+                return {};
+            const double scale = r > 0 ? fisheye(theta) / r : 0;
+            return Point2{d.x * scale, d.y * scale};
+        }
+        if (d.z <= 0)
+            return {};
+        const Point2 p{d.x / d.z, d.y / d.z};
+        if (std::hypot(p.x, p.y) > limit_)
+            return {};
+        return brown(p);
+    }
+
+    std::optional<Point2> project(Vec3T<double> direction) const {
+        const auto p = distort(direction);
+        if (!p)
+            return {};
+        return Point2{intrinsics_.fx * p->x + intrinsics_.cx, intrinsics_.fy * p->y + intrinsics_.cy};
+    }
+
+    // The direction seen at a pixel, to 1e-9: on the plane z = 1, or of length 1 for a fisheye lens.
+    // None where no direction arrives.
+    std::optional<Vec3T<double>> ray(Point2 pixel) const {
+        const Point2 p{(pixel.x - intrinsics_.cx) / intrinsics_.fx, (pixel.y - intrinsics_.cy) / intrinsics_.fy};
+        switch (intrinsics_.distortion) {
+        case ARHOST_DISTORTION_NONE:
+            return Vec3T<double>{p.x, p.y, 1};
+        case ARHOST_DISTORTION_BROWN:
+            return undistort_brown(p);
+        default:
+            return undistort_fisheye(p);
+        }
+    }
+
+private:
+    static constexpr double tolerance = 1e-11; // of x'', y''
+    static constexpr int max_steps = 100;
+
+    // Brown–Conrady as in OpenCV's calib3d ("Detailed Description" of camera calibration); s3, s4 of the
+    // thin prism included.
+    double radial(double r2) const {
+        return (1 + r2 * (k_[0] + r2 * (k_[1] + r2 * k_[4]))) / (1 + r2 * (k_[5] + r2 * (k_[6] + r2 * k_[7])));
+    }
+    Point2 brown(Point2 p) const {
+        const double r2 = p.x * p.x + p.y * p.y, scale = radial(r2);
+        return {p.x * scale + 2 * k_[2] * p.x * p.y + k_[3] * (r2 + 2 * p.x * p.x) + r2 * (k_[8] + r2 * k_[9]),
+                p.y * scale + k_[2] * (r2 + 2 * p.y * p.y) + 2 * k_[3] * p.x * p.y + r2 * (k_[10] + r2 * k_[11])};
+    }
+
+    // Kannala–Brandt as in OpenCV's fisheye: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸).
+    double fisheye(double theta) const {
+        const double t2 = theta * theta;
+        return theta * (1 + t2 * (k_[0] + t2 * (k_[1] + t2 * (k_[2] + t2 * k_[3]))));
+    }
+
+    // The radius on the image plane (Brown) or the angle (fisheye) up to which the radial curve rises:
+    // beyond it, two directions would share a pixel. 0.001 is far finer than any lens' curve bends.
+    double fold() const {
+        if (intrinsics_.distortion == ARHOST_DISTORTION_NONE)
+            return 1e30;
+        const bool is_fisheye = intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE;
+        const double end = is_fisheye ? std::numbers::pi : 20, step = 0.001;
+        double before = 0;
+        for (double r = step; r < end; r += step) {
+            const double after = is_fisheye ? fisheye(r) : r * radial(r * r);
+            if (!(after > before))
+                return r - step;
+            before = after;
+        }
+        return end;
+    }
+
+    // Newton's method with the 2×2 Jacobian by central differences, halving steps that do not help.
+    std::optional<Vec3T<double>> undistort_brown(Point2 wanted) const {
+        const auto error_at = [&](Point2 p) {
+            const Point2 q = brown(p);
+            return Point2{q.x - wanted.x, q.y - wanted.y};
+        };
+        const auto size = [](Point2 p) { return std::hypot(p.x, p.y); };
+        // Start inside the fold, in the wanted direction.
+        const double start = std::min(1.0, 0.9 * limit_ / std::max(size(wanted), 1e-30));
+        Point2 p{wanted.x * start, wanted.y * start};
+        Point2 error = error_at(p);
+        for (int step = 0; step < max_steps && !(size(error) < tolerance); ++step) {
+            constexpr double h = 1e-6;
+            const Point2 right = brown({p.x + h, p.y}), left = brown({p.x - h, p.y});
+            const Point2 below = brown({p.x, p.y + h}), above = brown({p.x, p.y - h});
+            const double a = (right.x - left.x) / (2 * h), b = (below.x - above.x) / (2 * h);
+            const double c = (right.y - left.y) / (2 * h), d = (below.y - above.y) / (2 * h);
+            const double determinant = a * d - b * c;
+            if (!(std::abs(determinant) > 1e-12))
+                return {};
+            const Point2 move{(d * error.x - b * error.y) / determinant, (a * error.y - c * error.x) / determinant};
+            bool better = false;
+            for (double share = 1; share > 1e-4 && !better; share /= 2) {
+                const Point2 next{p.x - share * move.x, p.y - share * move.y};
+                const Point2 next_error = error_at(next);
+                // Beyond the fold lies another solution, which no light takes.
+                if (size(next) <= limit_ && size(next_error) < size(error)) {
+                    p = next;
+                    error = next_error;
+                    better = true;
+                }
+            }
+            if (!better)
+                break;
+        }
+        if (!(size(error) < 1e-10))
+            return {};
+        return Vec3T<double>{p.x, p.y, 1};
+    }
+
+    // Newton's method in a bracket: the curve rises up to the fold, so it can't miss.
+    std::optional<Vec3T<double>> undistort_fisheye(Point2 wanted) const {
+        const double r = std::hypot(wanted.x, wanted.y);
+        double low = 0, high = limit_;
+        if (!(r <= fisheye(high)))
+            return {};
+        double theta = std::min(r, high);
+        for (int step = 0; step < max_steps; ++step) {
+            const double error = fisheye(theta) - r, t2 = theta * theta;
+            if (std::abs(error) < tolerance)
+                break;
+            (error < 0 ? low : high) = theta;
+            theta -= error / (1 + t2 * (3 * k_[0] + t2 * (5 * k_[1] + t2 * (7 * k_[2] + t2 * 9 * k_[3]))));
+            if (!(theta > low && theta < high))
+                theta = (low + high) / 2;
+        }
+        const double scale = r > 0 ? std::sin(theta) / r : 0;
+        return Vec3T<double>{wanted.x * scale, wanted.y * scale, std::cos(theta)};
+    }
+
+    arhost_intrinsics intrinsics_;
+    double k_[ARHOST_MAX_DISTORTION] = {};
+    double limit_;
+};
+
+} // namespace arhost::shading

@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/calibration.hpp"
+
+#include "camera/coordinates.hpp"
+#include "errors.hpp"
+#include "plugin_under_test.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include <fstream>
+#include <vector>
+
+namespace arhost::camera {
+namespace {
+
+using test::error_of;
+
+class Calibration : public testing::Test {
+protected:
+    std::filesystem::path write(const std::string &text) const {
+        std::ofstream(folder_.path() / "camera.yaml") << text;
+        return folder_.path() / "camera.yaml";
+    }
+    // The error of reading `text`, without the folder's name.
+    std::string error_in(const std::string &text, std::optional<Size> expected = {}) const {
+        const auto file = write(text);
+        const std::string message = error_of([&] { read_calibration(file, expected); });
+        const std::string folder = folder_.path().string() + "/";
+        return message.starts_with(folder) ? message.substr(folder.size()) : message;
+    }
+    test::ScratchFolder folder_;
+};
+
+std::vector<double> coefficients(const arhost_intrinsics &intrinsics) {
+    return {intrinsics.coefficients, intrinsics.coefficients + intrinsics.coefficient_count};
+}
+
+arhost_intrinsics parsed(const std::string &text) {
+    return parse_camera(yaml::Node::parse(text, "lab.yaml"));
+}
+
+// A calibration with other lines for the distortion.
+std::string with_distortion(const std::string &lines) {
+    return "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+           "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+           "   data: [ 600., 0., 320., 0., 601., 240., 0., 0., 1. ]\n" +
+           lines;
+}
+
+const std::string no_distortion = "distortion_coefficients: [0, 0, 0, 0]\n";
+
+} // namespace
+
+TEST_F(Calibration, IsReadAsOpenCvsFileStorageWritesIt) {
+    const std::vector<double> k = {0.0995485, -0.206384, 0.00754589, 0.00336531, 1e-17};
+    const auto file = folder_.path() / "camera.yaml";
+    {
+        cv::FileStorage storage(file.string(), cv::FileStorage::WRITE);
+        storage << "image_width" << 1280 << "image_height" << 960;
+        storage << "camera_matrix"
+                << cv::Mat(cv::Matx33d(1006.126285753055, 0, 655.86392441504, 0, 1004.0154330, 490.61, 0, 0, 1));
+        storage << "distortion_coefficients" << cv::Mat(k, true);
+    }
+    const arhost_intrinsics intrinsics = read_calibration(file);
+    EXPECT_EQ(intrinsics.struct_size, sizeof intrinsics);
+    EXPECT_EQ(intrinsics.width, 1280u);
+    EXPECT_EQ(intrinsics.height, 960u);
+    EXPECT_EQ(intrinsics.fx, 1006.126285753055);
+    EXPECT_EQ(intrinsics.fy, 1004.0154330);
+    EXPECT_EQ(intrinsics.cx, 655.86392441504);
+    EXPECT_EQ(intrinsics.cy, 490.61);
+    EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_BROWN);
+    EXPECT_EQ(coefficients(intrinsics), k);
+}
+
+TEST_F(Calibration, OfOpenCvsTutorialsIsRead) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/opencv_doc/tutorial_camera_charuco.yml");
+    const arhost_intrinsics charuco =
+        read_calibration(test::shared_data("markers/opencv_doc/tutorial_camera_charuco.yml"));
+    EXPECT_EQ(charuco.width, 640u);
+    EXPECT_EQ(charuco.height, 480u);
+    EXPECT_EQ(charuco.fx, 452.51072219637672);
+    EXPECT_EQ(charuco.cy, 277.75155919135995);
+    EXPECT_EQ(coefficients(charuco),
+              (std::vector<double>{1.2136925618707872e-01, -1.0854664722560681e+00, 1.1786843796668460e-04,
+                                   -4.6240686046485508e-04, 2.9542589406810080e+00}));
+
+    const auto without_size = test::shared_data("markers/opencv_doc/tutorial_camera_params.yml");
+    EXPECT_EQ(read_calibration(without_size, Size{640, 480}).fx, 628.158);
+    EXPECT_EQ(read_calibration(without_size, Size{640, 480}).width, 640u);
+    EXPECT_EQ(error_of([&] { read_calibration(without_size); }),
+              without_size.string() + ":2:1: the key 'image_width' is missing; give the size of the calibration's "
+                                      "images in px, here or as width and height beside 'file' in the configuration");
+}
+
+TEST_F(Calibration, IsReadUnderTheKeysOfOlderOpenCvs) {
+    const auto intrinsics = read_calibration(
+        write("%YAML:1.0\nimage_Width: 640\nimage_Height: 480\nCamera_Matrix: [600, 0, 320, 0, 601, 240, 0, 0, 1]\n"
+              "Distortion_Coefficients: [0.1, 0, 0, 0, 0]\n"));
+    EXPECT_EQ(intrinsics.fy, 601);
+    EXPECT_EQ(intrinsics.coefficients[0], 0.1);
+}
+
+TEST_F(Calibration, IsReadFromRosCameraInfo) {
+    const auto plumb_bob = read_calibration(
+        write("image_width: 640\nimage_height: 480\ncamera_name: usb\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+              "  data: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n"
+              "  rows: 1\n  cols: 5\n  data: [0.1, -0.2, 0.001, 0.002, 0]\n"));
+    EXPECT_EQ(plumb_bob.distortion, ARHOST_DISTORTION_BROWN);
+    EXPECT_EQ(plumb_bob.coefficient_count, 5u);
+    const auto equidistant = read_calibration(
+        write("width: 640\nheight: 480\nK: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: equidistant\n"
+              "D: [0.1, -0.2, 0.001, 0.002]\n"));
+    EXPECT_EQ(equidistant.distortion, ARHOST_DISTORTION_FISHEYE);
+    EXPECT_EQ(equidistant.coefficient_count, 4u);
+}
+
+TEST_F(Calibration, OfAFisheyeLensIsToldByItsModel) {
+    const std::string four = "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n";
+    EXPECT_EQ(read_calibration(write(with_distortion(four))).distortion, ARHOST_DISTORTION_BROWN);
+    EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + four))).distortion,
+              ARHOST_DISTORTION_FISHEYE);
+    EXPECT_EQ(read_calibration(write(with_distortion("fisheye_model: 1\n" + four))).distortion,
+              ARHOST_DISTORTION_FISHEYE);
+    // Of a fisheye, coefficients of 0 do not mean a lens without distortion.
+    EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + no_distortion))).distortion,
+              ARHOST_DISTORTION_FISHEYE);
+}
+
+TEST_F(Calibration, TakesEachCountOfBrownsCoefficients) {
+    for (const std::size_t count : {4, 5, 8, 12}) {
+        std::string list = "0.5";
+        for (std::size_t i = 1; i < count; ++i)
+            list += ", 0.25";
+        const auto intrinsics = read_calibration(write(with_distortion("distortion_coefficients: [" + list + "]\n")));
+        EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_BROWN);
+        EXPECT_EQ(intrinsics.coefficient_count, count);
+        EXPECT_EQ(intrinsics.coefficients[count - 1], 0.25);
+    }
+    EXPECT_EQ(read_calibration(write(with_distortion("distortion_coefficients: []\n"))).distortion,
+              ARHOST_DISTORTION_NONE);
+}
+
+TEST_F(Calibration, WithCoefficientsOfZeroHasNoDistortion) {
+    const auto intrinsics = read_calibration(write(with_distortion(no_distortion)));
+    EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_NONE);
+    EXPECT_EQ(intrinsics.coefficient_count, 0u);
+}
+
+TEST_F(Calibration, TakesFourteenCoefficientsOnlyWithoutTilt) {
+    const std::string twelve = "distortion_coefficients: [0.1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.2, ";
+    EXPECT_EQ(read_calibration(write(with_distortion(twelve + "0, 0]\n"))).coefficient_count, 12u);
+    EXPECT_EQ(error_in(with_distortion(twelve + "0, 0.01]\n")),
+              "camera.yaml:10:26: distortion_coefficients: a tilted sensor (tauX, tauY) is not supported; calibrate "
+              "without CALIB_TILTED_MODEL");
+}
+
+TEST_F(Calibration, ThatIsWrongNamesLineKeyAndTheMend) {
+    EXPECT_EQ(
+        error_in(with_distortion("distortion_coefficients: [1, 2, 3]\n")),
+        "camera.yaml:10:26: distortion_coefficients: the Brown model has 4, 5, 8 or 12 coefficients (k1 k2 p1 p2 "
+        "[k3 [k4 k5 k6 [s1 s2 s3 s4]]]), here are 3");
+    EXPECT_EQ(error_in(with_distortion("distortion_model: fisheye\ndistortion_coefficients: [1, 2, 3, 4, 5]\n")),
+              "camera.yaml:11:26: distortion_coefficients: the fisheye model has 4 coefficients (k1 k2 k3 k4), here "
+              "are 5");
+    EXPECT_EQ(error_in(with_distortion("distortion_model: radtn\n" + no_distortion)),
+              "camera.yaml:10:19: distortion_model: 'radtn' is not one of brown, plumb_bob, radtan, "
+              "rational_polynomial, fisheye, equidistant, none; did you mean 'radtan'?");
+    EXPECT_EQ(error_in(with_distortion("distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4]\n")),
+              "camera.yaml:11:26: distortion_coefficients: the model is none, but a coefficient is not 0; set the "
+              "model to brown or fisheye");
+    EXPECT_EQ(error_in(with_distortion("")), "camera.yaml:3:1: the key 'distortion_coefficients' is missing; of a "
+                                             "lens without distortion it is [0, 0, 0, 0]");
+    EXPECT_EQ(error_in("image_width: 640\nimage_height: 480\n" + no_distortion),
+              "camera.yaml:1:1: the key 'camera_matrix' is missing; is this a camera calibration?");
+    EXPECT_EQ(error_in("image_width: 640\n"), "camera.yaml:1:1: the key 'image_height' is missing; give the size of "
+                                              "the calibration's images in px, here or as width and height beside "
+                                              "'file' in the configuration");
+    EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"),
+              "camera.yaml:1:1: is no calibration in YAML; let OpenCV's FileStorage write it to a name that ends in "
+              ".yaml");
+}
+
+TEST_F(Calibration, WithAWrongCameraMatrixNamesIt) {
+    const auto with_matrix = [](const std::string &value) {
+        return "image_width: 640\nimage_height: 480\ncamera_matrix: " + value + "\n" + no_distortion;
+    };
+    EXPECT_EQ(error_in(with_matrix("[600, 0, 320, 0, 601, 240]")),
+              "camera.yaml:3:16: camera_matrix: must be a 3×3 matrix, has 6 numbers");
+    EXPECT_EQ(error_in(with_matrix("[600, 0.5, 320, 0, 601, 240, 0, 0, 1]")),
+              "camera.yaml:3:16: camera_matrix: skew (row 1, column 2) is not supported and must be 0");
+    EXPECT_EQ(error_in(with_matrix("[600, 0, 0, 0, 601, 0, 320, 240, 1]")),
+              "camera.yaml:3:16: camera_matrix: must be [fx, 0, cx, 0, fy, cy, 0, 0, 1], row by row");
+    EXPECT_EQ(error_in(with_matrix("[600, 0, 320, 0, -601, 240, 0, 0, 1]")),
+              "camera.yaml:3:16: camera_matrix: the focal length must be greater than 0 px, is -601");
+    EXPECT_EQ(error_in(with_matrix("[.Nan, 0, 320, 0, 601, 240, 0, 0, 1]")),
+              "camera.yaml:3:17: camera_matrix[0]: must be a number, is '.Nan'");
+    EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: d, data: [1, 2]}")),
+              "camera.yaml:3:48: camera_matrix.data: has 2 numbers, but rows × cols is 9");
+    EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: u, data: [1, 2]}")),
+              "camera.yaml:3:39: camera_matrix.dt: 'u' is not one of d, f; did you mean 'd'?");
+}
+
+TEST_F(Calibration, ForAnotherImageSizeNamesBoth) {
+    EXPECT_EQ(error_in(with_distortion(no_distortion), Size{1280, 720}),
+              "camera.yaml:3:14: image_width: the calibration is for images of 640×480 px, but 1280×720 px are asked "
+              "for; calibrate at that size");
+    const auto intrinsics = read_calibration(write(with_distortion(no_distortion)), Size{640, 480});
+    EXPECT_EQ(error_of([&] { check_size(intrinsics, 640, 480); }), "no error");
+    EXPECT_EQ(error_of([&] { check_size(intrinsics, 1280, 720); }),
+              "the camera is calibrated for images of 640×480 px, but the frames are 1280×720 px; calibrate at the "
+              "frames' size, or set the source to the calibration's");
+}
+
+TEST_F(Calibration, ThatIsMissingIsReported) {
+    EXPECT_EQ(error_of([] { read_calibration("/no/camera.yaml"); }),
+              "/no/camera.yaml: can't be read: No such file or directory");
+}
+
+TEST(CameraBlock, PutsThePrincipalPointAtTheImagesCentreByDefault) {
+    const arhost_intrinsics intrinsics = parsed("{width: 640, height: 480, fx: 600}");
+    EXPECT_EQ(intrinsics.struct_size, sizeof intrinsics);
+    EXPECT_EQ(intrinsics.fx, 600);
+    EXPECT_EQ(intrinsics.fy, 600);
+    EXPECT_EQ(intrinsics.cx, 319.5);
+    EXPECT_EQ(intrinsics.cy, 239.5);
+    EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_NONE);
+    EXPECT_EQ(intrinsics.coefficient_count, 0u);
+}
+
+TEST(CameraBlock, TakesEveryNumberGiven) {
+    const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, fx: 700, fy: 701, cx: 400, cy: 300,\n"
+                                                " distortion: {model: fisheye, coefficients: [0.1, 0.2, 0.3, 0.4]}}");
+    EXPECT_EQ(intrinsics.width, 800u);
+    EXPECT_EQ(intrinsics.height, 600u);
+    EXPECT_EQ(intrinsics.fy, 701);
+    EXPECT_EQ(intrinsics.cx, 400);
+    EXPECT_EQ(intrinsics.cy, 300);
+    EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_FISHEYE);
+    EXPECT_EQ(coefficients(intrinsics), (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
+    EXPECT_EQ(parsed("{width: 8, height: 6, fx: 7, distortion: {model: none}}").distortion, ARHOST_DISTORTION_NONE);
+    EXPECT_EQ(
+        parsed("{width: 8, height: 6, fx: 7, distortion: {model: brown, coefficients: [1, 0, 0, 0]}}").distortion,
+        ARHOST_DISTORTION_BROWN);
+}
+
+TEST(CameraBlock, ReadsAFileBesideTheConfiguration) {
+    const test::ScratchFolder folder;
+    std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";
+    std::ofstream(folder.path() / "lab.yaml") << "{file: camera.yaml, width: 640, height: 480}\n";
+    const arhost_intrinsics intrinsics = parse_camera(yaml::Node::load(folder.path() / "lab.yaml"));
+    EXPECT_EQ(intrinsics.fy, 601);
+    EXPECT_EQ(intrinsics.height, 480u);
+}
+
+TEST(CameraBlock, ThatIsWrongNamesLineKeyAndTheMend) {
+    EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\n"); }), "lab.yaml:1:1: the key 'fx' is missing");
+    EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 0\n"); }),
+              "lab.yaml:3:5: fx: the focal length must be greater than 0 px, is 0");
+    EXPECT_EQ(error_of([] { parsed("width: 0\nheight: 480\nfx: 600\n"); }),
+              "lab.yaml:1:8: width: must be 1 to 16384, is 0");
+    EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 600\nf: 1\n"); }),
+              "lab.yaml:4:4: f: unknown key; did you mean 'fx'?");
+    EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: brown}}"); }),
+              "lab.yaml:1:48: distortion: the key 'coefficients' is missing, the list of the model's numbers");
+    EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: lens}}"); }),
+              "lab.yaml:1:56: distortion.model: 'lens' is not one of none, brown, fisheye");
+    EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, width: 640}"); }),
+              "lab.yaml:1:8: file: the calibration file " +
+                  (std::filesystem::current_path() / "camera.yaml").string() + " does not exist");
+    EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, fx: 640}"); }),
+              "lab.yaml:1:25: fx: unknown key; known here: file, width, height");
+}
+
+TEST(CameraBlock, NeedsWidthAndHeightTogetherBesideAFile) {
+    const test::ScratchFolder folder;
+    const std::string file = (folder.path() / "camera.yaml").string();
+    std::ofstream(file) << "{}\n";
+    EXPECT_EQ(error_of([&] { parsed("{file: " + file + ", width: 640}"); }),
+              "lab.yaml:1:1: width and height go together; give both or none");
+}
+
+// The examples of docs/camera.md.
+TEST(CameraDocumentation, HasExamplesThatCanBeRead) {
+    const test::ScratchFolder folder;
+    std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";
+    std::ifstream page(std::string(ARHOST_SOURCE_DIRECTORY) + "/docs/camera.md");
+    std::size_t cameras = 0, coordinates = 0;
+    for (std::string line, example; std::getline(page, line);) {
+        if (line != "```yaml")
+            continue;
+        for (example.clear(); std::getline(page, line) && line != "```";)
+            example += line + "\n";
+        const yaml::Node root = yaml::Node::parse(example, (folder.path() / "lab.yaml").string());
+        if (const auto camera = root.find("camera")) {
+            EXPECT_GT(parse_camera(*camera).fx, 0);
+            ++cameras;
+        }
+        if (const auto block = root.find("coordinates")) {
+            EXPECT_EQ(parse_coordinates(*block).rotations.size(), 1u);
+            ++coordinates;
+        }
+    }
+    EXPECT_EQ(cameras, 2u);
+    EXPECT_EQ(coordinates, 1u);
+}
+
+} // namespace arhost::camera

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/calibration.hpp"
+#include "camera/lens.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
+
+#include <random>
+#include <vector>
+
+namespace arhost::camera {
+namespace {
+
+arhost_intrinsics lens(arhost_distortion model, const std::vector<double> &coefficients) {
+    arhost_intrinsics intrinsics{};
+    intrinsics.struct_size = sizeof intrinsics;
+    intrinsics.width = 640;
+    intrinsics.height = 480;
+    intrinsics.distortion = model;
+    intrinsics.fx = 628.158;
+    intrinsics.fy = 627.25;
+    intrinsics.cx = 324.099;
+    intrinsics.cy = 250.908;
+    intrinsics.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
+    std::copy(coefficients.begin(), coefficients.end(), intrinsics.coefficients);
+    return intrinsics;
+}
+
+std::vector<cv::Point3d> points_in_view() {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> slope(-0.6, 0.6), depth_mm(100, 3000);
+    std::vector<cv::Point3d> points{{0, 0, 1000}, {1e-7, 0, 1000}};
+    for (int i = 0; i < 500; ++i) {
+        const double z = depth_mm(random);
+        points.emplace_back(slope(random) * z, slope(random) * z, z);
+    }
+    return points;
+}
+
+void expect_as(const std::vector<cv::Point2d> &expected, const arhost_intrinsics &intrinsics) {
+    const std::vector<cv::Point3d> points = points_in_view();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const auto pixel = project(intrinsics, {points[i].x, points[i].y, points[i].z});
+        ASSERT_TRUE(pixel);
+        ASSERT_NEAR(pixel->x, expected[i].x, 1e-9);
+        ASSERT_NEAR(pixel->y, expected[i].y, 1e-9);
+    }
+}
+
+cv::Matx33d matrix(const arhost_intrinsics &i) {
+    return {i.fx, 0, i.cx, 0, i.fy, i.cy, 0, 0, 1};
+}
+
+class BrownLens : public testing::TestWithParam<std::vector<double>> {};
+
+} // namespace
+
+TEST_P(BrownLens, ProjectsAsOpenCvDoes) {
+    const auto intrinsics = lens(GetParam().empty() ? ARHOST_DISTORTION_NONE : ARHOST_DISTORTION_BROWN, GetParam());
+    std::vector<cv::Point2d> expected;
+    cv::projectPoints(points_in_view(), cv::Vec3d(), cv::Vec3d(), matrix(intrinsics), GetParam(), expected);
+    expect_as(expected, intrinsics);
+}
+INSTANTIATE_TEST_SUITE_P(Coefficients, BrownLens,
+                         testing::Values(std::vector<double>{}, std::vector<double>{0.12, -0.31, 0.002, -0.003},
+                                         std::vector<double>{0.0995485, -0.206384, 0.00754589, 0.00336531, 0.05},
+                                         std::vector<double>{0.1, -0.2, 0.001, 0.002, 0.05, 0.2, -0.1, 0.03},
+                                         std::vector<double>{0.1, -0.2, 0.001, 0.002, 0.05, 0.2, -0.1, 0.03, 0.004,
+                                                             -0.005, 0.006, -0.007}));
+
+TEST(FisheyeLens, ProjectsAsOpenCvDoes) {
+    const std::vector<double> k{0.07, -0.02, 0.013, -0.004};
+    const auto intrinsics = lens(ARHOST_DISTORTION_FISHEYE, k);
+    std::vector<cv::Point2d> expected;
+    cv::fisheye::projectPoints(points_in_view(), expected, cv::Vec3d(), cv::Vec3d(), matrix(intrinsics), k);
+    expect_as(expected, intrinsics);
+}
+
+// Pixel centres are at integers, so the middle of 640 pixels lies between 319 and 320.
+TEST(Lens, SeesTheOpticalAxisAtTheImagesCentre) {
+    const auto camera = parse_camera(yaml::Node::parse("{width: 640, height: 480, fx: 600}", "lab.yaml"));
+    const auto pixel = project(camera, {0, 0, 1000});
+    ASSERT_TRUE(pixel);
+    EXPECT_EQ(*pixel, glm::dvec2(319.5, 239.5));
+    EXPECT_EQ(*project(camera, {10, 20, 1000}), glm::dvec2(325.5, 251.5)); // right and down
+}
+
+TEST(Lens, SeesNothingBehindTheCamera) {
+    const auto intrinsics = lens(ARHOST_DISTORTION_NONE, {});
+    EXPECT_FALSE(project(intrinsics, {0, 0, 0}));
+    EXPECT_FALSE(project(intrinsics, {10, 10, -500}));
+}
+
+} // namespace arhost::camera

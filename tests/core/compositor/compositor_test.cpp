@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compositor/compositor.hpp"
+
+#include "../pixels/instruction_sets.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+#include <vector>
+
+namespace arhost {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr arhost_pixel_format all_formats[] = {ARHOST_GREY8, ARHOST_RGB8, ARHOST_BGR8,
+                                               ARHOST_YUYV,  ARHOST_NV12, ARHOST_I420};
+
+arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width, std::uint32_t height,
+                           arhost_yuv_matrix matrix = ARHOST_BT601, arhost_yuv_range range = ARHOST_LIMITED_RANGE) {
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = pixel_format;
+    format.width = width;
+    format.height = height;
+    format.yuv_matrix = matrix;
+    format.yuv_range = range;
+    EXPECT_TRUE(arhost_frame_layout(&format));
+    return format;
+}
+
+bool has_chroma_pairs(arhost_pixel_format format) {
+    return format == ARHOST_YUYV || format == ARHOST_NV12 || format == ARHOST_I420;
+}
+
+// A random frame and overlay. `shift` moves every pointer off its alignment and makes the strides odd.
+struct Scene {
+    Scene(arhost_frame_format laid_out, std::size_t shift, std::mt19937 &random) : format(laid_out) {
+        for (std::uint32_t p = 0; p < format.plane_count; ++p)
+            format.stride[p] += static_cast<std::uint32_t>(shift);
+        for (std::uint32_t p = 0; p < format.plane_count; ++p) {
+            plane_bytes[p].resize(std::size_t(format.stride[p]) * format.height + shift);
+            std::generate(plane_bytes[p].begin(), plane_bytes[p].end(), std::ref(random));
+            planes[p] = plane_bytes[p].data() + shift;
+        }
+        overlay_stride = 4 * std::size_t(format.width) + 5 * shift;
+        overlay_bytes.resize(overlay_stride * format.height + shift);
+        // Runs of empty, opaque and other alphas.
+        for (std::size_t i = 0, alpha = 0, run = 0; i < overlay_bytes.size(); ++i) {
+            if (run-- == 0) {
+                alpha = random() % 3;
+                run = random() % 400;
+            }
+            const auto any = static_cast<std::uint8_t>(random());
+            overlay_bytes[i] = alpha == 0 && i >= shift && (i - shift) % overlay_stride % 4 == 3   ? 0
+                               : alpha == 1 && i >= shift && (i - shift) % overlay_stride % 4 == 3 ? 255
+                                                                                                   : any;
+        }
+        out_stride = 3 * std::size_t(format.width) + 7 * shift;
+        out_shift = shift;
+    }
+    ImageView overlay() const { return {overlay_bytes.data() + out_shift, overlay_stride}; }
+
+    // What `function` makes of it, with the bytes between and around the rows.
+    template <class Function>
+    Bytes output(const Function &function, const ImageView &image, const Region &region) const {
+        Bytes bytes(out_stride * format.height + out_shift + 100, 0xa5);
+        function(format, planes, image, region, OutputView{bytes.data() + out_shift, out_stride});
+        return bytes;
+    }
+
+    arhost_frame_format format;
+    Bytes plane_bytes[ARHOST_MAX_PLANES], overlay_bytes;
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
+    std::size_t overlay_stride = 0, out_stride = 0, out_shift = 0;
+};
+
+} // namespace
+
+TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
+    test::on_each_instruction_set([] {
+        std::mt19937 random(4);
+        for (const arhost_pixel_format pixel_format : all_formats)
+            for (const arhost_yuv_matrix matrix : {ARHOST_BT601, ARHOST_BT709})
+                for (const arhost_yuv_range range : {ARHOST_LIMITED_RANGE, ARHOST_FULL_RANGE}) {
+                    const std::uint32_t step = has_chroma_pairs(pixel_format) ? 2 : 1;
+                    for (std::uint32_t width = step; width <= 130; width += step) {
+                        const Scene scene(layout(pixel_format, width, 4, matrix, range), random() % 4, random);
+                        const std::uint32_t x = random() % width, y = random() % 4, w = 1 + random() % width;
+                        for (const Region &region : {Region{0, 0, width, 4}, Region{x, y, w, 2}})
+                            ASSERT_EQ(scene.output(composite, scene.overlay(), region),
+                                      scene.output(composite_reference, scene.overlay(), region))
+                                << "format " << pixel_format << ", width " << width << ", region from " << region.x;
+                    }
+                }
+    });
+}
+
+TEST(Composite, IsEquation36) {
+    const arhost_frame_format format = layout(ARHOST_BGR8, 4, 1);
+    Bytes frame(format.byte_size);
+    const std::uint8_t bgr[] = {10, 20, 30, 10, 20, 30, 10, 20, 30, 200, 100, 50};
+    std::copy(std::begin(bgr), std::end(bgr), frame.begin());
+    const std::uint8_t rgba[] = {1, 2, 3, 0, 1, 2, 3, 255, 0, 0, 0, 153, 60, 90, 120, 128};
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {frame.data()};
+    Bytes out(12);
+    composite(format, planes, {rgba, 16}, {0, 0, 4, 1}, {out.data(), 12});
+    EXPECT_EQ(out, (Bytes{10, 20, 30, // alpha 0: the video
+                          3, 2, 1,    // alpha 255: the overlay, R and B in their places
+                          4, 8, 12,   // a shadow of 0.6 leaves 0.4
+                          160, 95, 55}));
+}
+
+TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
+    std::mt19937 random(5);
+    const Scene scene(layout(ARHOST_BGR8, 67, 5), 1, random);
+    const Bytes none = scene.output(composite, ImageView{}, Region{0, 0, 67, 5});
+    for (std::size_t y = 0; y < 5; ++y)
+        EXPECT_EQ(std::memcmp(none.data() + scene.out_shift + y * scene.out_stride,
+                              scene.planes[0] + y * scene.format.stride[0], 3 * 67),
+                  0);
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{}), none);
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{5, 2, 0, 3}), none);
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{67, 0, 1, 1}), none);
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{0, 5, 1, 1}), none);
+}
+
+TEST(Composite, ClipsARegionThatReachesOutOfTheImage) {
+    std::mt19937 random(6);
+    const Scene scene(layout(ARHOST_NV12, 66, 6), 3, random);
+    const std::uint32_t most = 0xffffffffu;
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{7, 1, most, most}),
+              scene.output(composite, scene.overlay(), Region{7, 1, 59, 5}));
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{most, most, most, most}),
+              scene.output(composite, ImageView{}, Region{}));
+}
+
+// A row of the overlay is a page; the pages outside the region can't be read.
+TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
+    const std::uint32_t page = static_cast<std::uint32_t>(getpagesize()), width = page / 4, height = 8;
+    const Region region{0, 3, width, 2};
+    auto *rgba =
+        static_cast<std::uint8_t *>(mmap(nullptr, page * height, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+    ASSERT_NE(rgba, MAP_FAILED);
+    ASSERT_EQ(mprotect(rgba + page * region.y, page * region.height, PROT_READ | PROT_WRITE), 0);
+    std::memset(rgba + page * region.y, 255, page * region.height);
+    for (const arhost_pixel_format pixel_format : all_formats) {
+        const arhost_frame_format format = layout(pixel_format, width, height);
+        const Bytes frame(format.byte_size, 40);
+        const std::uint8_t *planes[ARHOST_MAX_PLANES] = {
+            frame.data() + format.offset[0], frame.data() + format.offset[1], frame.data() + format.offset[2]};
+        Bytes out(3 * std::size_t(width) * height);
+        composite(format, planes, {rgba, page}, region, {out.data(), 3 * std::size_t(width)});
+        EXPECT_EQ(out[3 * std::size_t(width) * 3], 255);
+        EXPECT_NE(out[3 * std::size_t(width) * 5], 255);
+    }
+    munmap(rgba, page * height);
+}
+
+TEST(Composite, ConvertsBt601AsOpenCvDoes) {
+    std::mt19937 random(7);
+    const int codes[] = {cv::COLOR_YUV2BGR_YUY2, cv::COLOR_YUV2BGR_NV12, cv::COLOR_YUV2BGR_I420};
+    const arhost_pixel_format formats[] = {ARHOST_YUYV, ARHOST_NV12, ARHOST_I420};
+    for (int i = 0; i < 3; ++i) {
+        constexpr int width = 128, height = 64; // strides without padding, as OpenCV's planar images
+        const arhost_frame_format format = layout(formats[i], width, height);
+        Bytes frame(format.byte_size);
+        // OpenCV does not take values below 16 for what they are.
+        std::generate(frame.begin(), frame.end(), [&] { return static_cast<std::uint8_t>(16 + random() % 224); });
+        const std::uint8_t *planes[ARHOST_MAX_PLANES] = {
+            frame.data() + format.offset[0], frame.data() + format.offset[1], frame.data() + format.offset[2]};
+        cv::Mat ours(height, width, CV_8UC3), opencv, difference;
+        composite(format, planes, {}, {}, {ours.data, ours.step});
+        if (formats[i] == ARHOST_I420) { // its chroma rows are padded to 64 bytes already: width/2 is 64
+            ASSERT_EQ(format.stride[1], width / 2);
+        }
+        const cv::Mat yuv = formats[i] == ARHOST_YUYV ? cv::Mat(height, width, CV_8UC2, frame.data())
+                                                      : cv::Mat(height * 3 / 2, width, CV_8UC1, frame.data());
+        cv::cvtColor(yuv, opencv, codes[i]);
+        cv::absdiff(ours, opencv, difference);
+        double greatest = 0;
+        cv::minMaxLoc(difference.reshape(1), nullptr, &greatest);
+        EXPECT_LE(greatest, 1) << "format " << formats[i];
+    }
+}
+
+TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerTellsOne) {
+    arhost_render_info info{};
+    info.struct_size = sizeof info;
+    const Region whole = region_of(info, 640, 480);
+    EXPECT_EQ(whole.width, 640u);
+    EXPECT_EQ(whole.height, 480u);
+    info = {sizeof info, 1, 5, 6, 7, 8};
+    const Region told = region_of(info, 640, 480);
+    EXPECT_EQ(told.x, 5u);
+    EXPECT_EQ(told.y, 6u);
+    EXPECT_EQ(told.width, 7u);
+    EXPECT_EQ(told.height, 8u);
+}
+
+} // namespace arhost

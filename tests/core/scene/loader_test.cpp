@@ -1,0 +1,424 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugin_under_test.hpp"
+#include "scene/loader.hpp"
+#include "scene_samples.hpp"
+
+#include <glm/geometric.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+using namespace arhost::scene;
+using namespace arhost::scene::test;
+using arhost::test::ScratchFolder;
+using arhost::yaml::Error;
+using arhost::yaml::Node;
+using testing::ElementsAre;
+using testing::FloatNear;
+using testing::HasSubstr;
+
+namespace {
+
+const std::string start = "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n"; // 4 lines
+
+Arena load(const std::string &text) {
+    Arena arena = load_scene(Node::parse(text, "s.yaml")).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    return arena;
+}
+
+std::string error_of(const std::string &text) {
+    try {
+        load_scene(Node::parse(text, "s.yaml"));
+    } catch (const Error &error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
+    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
+}
+const arhost_material &material(const Arena &a, std::size_t i = 0) {
+    return at<arhost_material>(a, a.scene().materials)[i];
+}
+const arhost_light &light(const Arena &a, std::size_t i = 0) {
+    return at<arhost_light>(a, a.scene().lights)[i];
+}
+const arhost_object &object(const Arena &a, std::size_t i = 0) {
+    return at<arhost_object>(a, a.scene().objects)[i];
+}
+const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
+    return at<arhost_geometry>(a, a.scene().geometries)[i];
+}
+glm::vec3 position(const Arena &a, std::size_t i) {
+    return at<glm::vec3>(a, geometry(a).positions)[i];
+}
+glm::vec4 sphere(const Arena &a) {
+    return *at<glm::vec4>(a, geometry(a).positions);
+}
+const char *name(const Arena &a, std::size_t i = 0) {
+    return at<char>(a, a.scene().names) + object(a, i).name;
+}
+
+// The normal that a triangle's winding gives.
+glm::vec3 facing(const Arena &a, std::size_t triangle) {
+    const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
+    return glm::normalize(glm::cross(position(a, t.y) - position(a, t.x), position(a, t.z) - position(a, t.x)));
+}
+glm::vec3 middle(const Arena &a, std::size_t triangle) {
+    const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
+    return (position(a, t.x) + position(a, t.y) + position(a, t.z)) / 3.f;
+}
+
+Arena load_object(const std::string &shape, const std::string &more = "") {
+    return load(start + "objects:\n  - {" + shape + ", material: grey" + more + "}\n");
+}
+
+void expect_near(const glm::vec3 &found, const glm::vec3 &expected) {
+    EXPECT_LT(glm::distance(found, expected), 1e-4f) << found.x << ' ' << found.y << ' ' << found.z << " in place of "
+                                                     << expected.x << ' ' << expected.y << ' ' << expected.z;
+}
+
+// Loads "scene.yaml" in a folder with "mesh.obj".
+Arena load_with_mesh(const std::string &obj, const std::string &more, const LoadCallbacks &callbacks = {}) {
+    const ScratchFolder folder;
+    write_file(folder.path() / "mesh.obj", obj);
+    write_file(folder.path() / "scene.yaml", start + "objects:\n  - {mesh: mesh.obj, material: grey" + more + "}\n");
+    Arena arena = load_scene(folder.path() / "scene.yaml", callbacks).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    return arena;
+}
+
+const std::string triangle_with_normals = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
+
+} // namespace
+
+TEST(SceneFile, HasDefaults) {
+    const Arena arena = load(start + "objects: []\n");
+    EXPECT_EQ(arena.scene().axes, ARHOST_Z_UP);
+    EXPECT_EQ(arena.scene().max_depth, 5u);
+    EXPECT_THAT(arena.scene().ambient, testing::Each(0.2f));
+    EXPECT_THAT(arena.scene().background, testing::Each(1.0f));
+    EXPECT_EQ(arena.scene().shadow_alpha_opaque, 0.6f);
+    EXPECT_EQ(arena.scene().shadow_alpha_translucent, 0.3f);
+}
+
+TEST(SceneFile, SetsTheScene) {
+    const Arena arena = load("version: 1\naxes: y-up\nmax_depth: 9\nambient: [0.1, 0.2, 0.3]\nbackground: '#ff0000'\n"
+                             "shadow_alpha: {opaque: 0.5, translucent: 0}\nmaterials: {}\nobjects: []\n");
+    EXPECT_EQ(arena.scene().axes, ARHOST_Y_UP);
+    EXPECT_EQ(arena.scene().max_depth, 9u);
+    EXPECT_THAT(arena.scene().ambient, ElementsAre(0.1f, 0.2f, 0.3f));
+    EXPECT_THAT(arena.scene().background, ElementsAre(1, 0, 0));
+    EXPECT_EQ(arena.scene().shadow_alpha_opaque, 0.5f);
+    EXPECT_EQ(arena.scene().shadow_alpha_translucent, 0.0f);
+}
+
+TEST(SceneFile, TakesColoursAsLinearNumbersOrAsSrgb) {
+    const Arena arena = load("version: 1\naxes: z-up\nmaterials:\n"
+                             "  a: {model: diffuse, diffuse: 0.25, ambient: [1, 0, 0.5]}\n"
+                             "  b: {model: diffuse, diffuse: '#ff8000'}\n"
+                             "  c: {model: diffuse, diffuse: '#010A0b'}\n"
+                             "objects: []\n");
+    EXPECT_THAT(material(arena, 0).diffuse, testing::Each(0.25f));
+    EXPECT_THAT(material(arena, 0).ambient, ElementsAre(1, 0, 0.5f));
+    // IEC 61966-2-1: 128/255 → 0.2158605, 1/255 → 0.0003035, 10/255 → 0.0030353, 11/255 → 0.0033465
+    EXPECT_THAT(material(arena, 1).diffuse, ElementsAre(1, FloatNear(0.2158605f, 1e-7f), 0));
+    EXPECT_THAT(material(arena, 2).diffuse, ElementsAre(FloatNear(0.0003035f, 1e-7f), FloatNear(0.0030353f, 1e-7f),
+                                                        FloatNear(0.0033465f, 1e-7f)));
+    EXPECT_THAT(material(arena, 1).ambient, ElementsAre(1, FloatNear(0.2158605f, 1e-7f), 0)); // as diffuse
+}
+
+TEST(SceneFile, DescribesMaterials) {
+    const Arena arena = load("version: 1\naxes: z-up\nmaterials:\n"
+                             "  a: {model: specular, diffuse: 0.5, specular: 0.3, exponent: 64, ambient: 0.1}\n"
+                             "  b: {model: mirror, reflectivity: [0.9, 0.8, 0.7]}\n"
+                             "  c: {model: mirror}\n"
+                             "objects: []\n");
+    EXPECT_EQ(material(arena, 0).model, ARHOST_SPECULAR);
+    EXPECT_THAT(material(arena, 0).specular, testing::Each(0.3f));
+    EXPECT_EQ(material(arena, 0).exponent, 64);
+    EXPECT_THAT(material(arena, 0).ambient, testing::Each(0.1f));
+    EXPECT_EQ(material(arena, 1).model, ARHOST_MIRROR);
+    EXPECT_THAT(material(arena, 1).reflectivity, ElementsAre(0.9f, 0.8f, 0.7f));
+    EXPECT_THAT(material(arena, 2).reflectivity, testing::Each(1.0f));
+}
+
+TEST(SceneFile, DescribesLights) {
+    const Arena arena = load(start + "lights:\n  - {position: [1, 2, 3], intensity: 0.8}\n"
+                                     "  - {position: [0, 0, 9], intensity: [1e4, 2e4, 0], falloff: inverse-square}\n"
+                                     "objects: []\n");
+    EXPECT_EQ(light(arena, 0).type, ARHOST_POINT_LIGHT);
+    EXPECT_EQ(light(arena, 0).falloff, ARHOST_FALLOFF_NONE);
+    EXPECT_THAT(light(arena, 0).position, ElementsAre(1, 2, 3));
+    EXPECT_THAT(light(arena, 0).intensity, testing::Each(0.8f));
+    EXPECT_EQ(light(arena, 1).falloff, ARHOST_FALLOFF_INVERSE_SQUARE);
+    EXPECT_THAT(light(arena, 1).intensity, ElementsAre(1e4f, 2e4f, 0));
+}
+
+TEST(SceneFile, GivesObjectsTheirNameRoleAndMaterial) {
+    const Arena arena = load("version: 1\naxes: z-up\nmaterials: {b: {model: mirror}, a: {model: mirror}}\nobjects:\n"
+                             "  - {sphere: {radius: 1}, material: a, role: catcher}\n"
+                             "  - {sphere: {radius: 1}, material: b, role: occluder, name: the “ball”}\n"
+                             "  - {cuboid: {size: 1}, material: b}\n");
+    EXPECT_STREQ(name(arena, 0), "sphere 0");
+    EXPECT_STREQ(name(arena, 1), "the “ball”");
+    EXPECT_EQ(object(arena, 0).role, ARHOST_CATCHER);
+    EXPECT_EQ(object(arena, 1).role, ARHOST_OCCLUDER);
+    EXPECT_EQ(object(arena, 2).role, ARHOST_VIRTUAL);
+    EXPECT_EQ(object(arena, 0).material, 1u);
+    EXPECT_EQ(object(arena, 1).material, 0u);
+}
+
+TEST(Shapes, CuboidsFaceOutwards) {
+    for (const std::string transform : {"", ", transform: [{scale: [-1, 1, 2]}]"}) {
+        const Arena arena = load_object("cuboid: {size: [2, 4, 6], centre: [1, 1, 1]}", transform);
+        EXPECT_EQ(geometry(arena).type, ARHOST_TRIANGLES);
+        ASSERT_EQ(geometry(arena).indices.count, 12u);
+        EXPECT_EQ(geometry(arena).normals.count, 0u);
+        const glm::vec3 centre = transform.empty() ? glm::vec3(1, 1, 1) : glm::vec3(-1, 1, 2);
+        for (std::size_t i = 0; i < 12; ++i)
+            EXPECT_GT(glm::dot(facing(arena, i), middle(arena, i) - centre), 0.9f);
+    }
+    const Arena arena = load_object("cuboid: {size: [2, 4, 6], centre: [1, 1, 1]}");
+    EXPECT_THAT(arena.scene().bounds_min, ElementsAre(0, -1, -2));
+    EXPECT_THAT(arena.scene().bounds_max, ElementsAre(2, 3, 4));
+}
+
+TEST(Shapes, PlanesFaceAlongTheirNormal) {
+    const Arena floor = load_object("plane: {size: [4, 2], centre: [0, 0, 5]}");
+    ASSERT_EQ(geometry(floor).indices.count, 2u);
+    expect_near(facing(floor, 0), {0, 0, 1});
+    expect_near(facing(floor, 1), {0, 0, 1});
+    EXPECT_THAT(floor.scene().bounds_min, ElementsAre(-2, -1, 5));
+    EXPECT_THAT(floor.scene().bounds_max, ElementsAre(2, 1, 5));
+
+    const Arena wall = load_object("plane: {size: [4, 2], normal: [0, -3, 0]}"); // 4 wide, 2 high
+    expect_near(facing(wall, 0), {0, -1, 0});
+    EXPECT_THAT(wall.scene().bounds_min, ElementsAre(-2, 0, -1));
+    const Arena side = load_object("plane: {size: [4, 2], normal: [1, 0, 0]}");
+    expect_near(facing(side, 1), {1, 0, 0});
+    EXPECT_THAT(side.scene().bounds_min, ElementsAre(0, -2, -1));
+    const Arena ceiling = load_object("plane: {size: 3, normal: [0, 0, -1]}");
+    expect_near(facing(ceiling, 0), {0, 0, -1});
+}
+
+TEST(Shapes, PlanesLieFlatWhereverUpIs) {
+    const Arena arena = load("version: 1\naxes: y-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
+                             "  - {plane: {size: [4, 2]}, material: a}\n");
+    expect_near(facing(arena, 0), {0, 1, 0});
+    EXPECT_THAT(arena.scene().bounds_min, ElementsAre(-2, 0, -1));
+}
+
+TEST(Transforms, AreAppliedOneAfterTheOther) {
+    // The seed's T·S·R: (1, 0, 0) → rotated (0, 1, 0) → scaled (0, 3, 0) → moved (10, 3, 0)
+    const Arena arena = load_with_mesh(triangle_with_normals,
+                                       ", transform: [{rotate: {axis: [0, 0, 2], degrees: 90}}, {scale: [2, 3, 4]}, "
+                                       "{translate: [10, 0, 0]}]");
+    expect_near(position(arena, 0), {10, 0, 0});
+    expect_near(position(arena, 1), {10, 3, 0});
+    expect_near(position(arena, 2), {8, 0, 0});
+    EXPECT_THAT(object(arena).world_from_object, ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0));
+}
+
+TEST(Transforms, TurnRightHanded) {
+    const auto turned = [](const std::string &axis) {
+        return load_object("sphere: {centre: [1, 2, 3], radius: 1}",
+                           ", transform: [{rotate: {axis: " + axis + ", degrees: 90}}]");
+    };
+    expect_near(glm::vec3(sphere(turned("[1, 0, 0]"))), {1, -3, 2});
+    expect_near(glm::vec3(sphere(turned("[0, 1, 0]"))), {3, 2, -1});
+    expect_near(glm::vec3(sphere(turned("[0, 0, 1]"))), {-2, 1, 3});
+    expect_near(glm::vec3(sphere(turned("[1, 1, 1]"))), {2.5773503f, 0.8452995f, 2.5773503f});
+}
+
+TEST(Transforms, TurnNormalsByTheInverseTranspose) {
+    // A slope of 45°, made twice as steep: the normal (0, 1, 1) gets (0, 1/1, 1/2).
+    const Arena arena = load_with_mesh("v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n",
+                                       ", transform: [{scale: [1, 1, 2]}]");
+    const glm::vec3 normal = *at<glm::vec3>(arena, geometry(arena).normals);
+    expect_near(normal, glm::normalize(glm::vec3(0, 2, 1)));
+    expect_near(facing(arena, 0), normal);
+}
+
+TEST(Transforms, ThatMirrorKeepTheOutsideOutside) {
+    const std::string slope = "v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n";
+    for (const std::string scale : {"[-1, 1, 1]", "[1, -1, 1]", "[1, 1, -1]", "-2", "[-1, -1, 1]"}) {
+        const Arena arena = load_with_mesh(slope, ", transform: [{scale: " + scale + "}]");
+        expect_near(facing(arena, 0), *at<glm::vec3>(arena, geometry(arena).normals));
+    }
+}
+
+TEST(Transforms, ScaleASpheresRadius) {
+    const Arena arena = load_object("sphere: {centre: [1, 0, 0], radius: 2}",
+                                    ", transform: [{rotate: {axis: [1, 2, 3], degrees: 33}}, {scale: -3}, "
+                                    "{rotate: {axis: [1, 2, 3], degrees: -33}}, {translate: [0, 0, 7]}]");
+    expect_near(glm::vec3(sphere(arena)), {-3, 0, 7});
+    EXPECT_FLOAT_EQ(sphere(arena).w, 6);
+    EXPECT_EQ(geometry(arena).type, ARHOST_SPHERES);
+}
+
+TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
+    const std::string ball = start + "objects:\n  - {sphere: {radius: 1}, material: grey";
+    EXPECT_EQ(error_of("axes: z-up\n"), "s.yaml:1:1: the key 'version' is missing");
+    EXPECT_EQ(error_of("version: 2\naxes: z-up\n"), "s.yaml:1:10: version: must be 1");
+    EXPECT_EQ(error_of("version: 1\naxes: zup\n"),
+              "s.yaml:2:7: axes: 'zup' is not one of z-up, y-up; did you mean 'z-up'?");
+    EXPECT_EQ(error_of("version: 1\naxes: z-up\nmaterial: {}\n"),
+              "s.yaml:3:11: material: unknown key; did you mean 'materials'?");
+    EXPECT_EQ(error_of(start + "max_depth: 101\n"), "s.yaml:5:12: max_depth: must be 0 to 100, is 101");
+    EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
+              "s.yaml:6:10: objects: the key stands here twice; keep one of them");
+    EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
+              "s.yaml:5:9: materials.grey: the material stands here twice; keep one of them");
+    EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
+              "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror; did you mean "
+              "'diffuse'?");
+    EXPECT_EQ(error_of(start + "  red: {model: mirror, diffuse: 1}\n"),
+              "s.yaml:5:33: materials.red.diffuse: unknown key; known here: model, reflectivity");
+    EXPECT_EQ(
+        error_of(start + "  red: {model: diffuse, diffuse: '#ff00'}\n"),
+        "s.yaml:5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, "
+        "0 to 1), is '#ff00'");
+    EXPECT_THAT(error_of(start + "  red: {model: diffuse, diffuse: '#gg0000'}\n"), HasSubstr("is '#gg0000'"));
+    EXPECT_THAT(error_of(start + "  red: {model: diffuse, diffuse: '#-10000'}\n"), HasSubstr("is '#-10000'"));
+    EXPECT_EQ(
+        error_of(start + "  red: {model: diffuse, diffuse: [0, 1.5, 0]}\n"),
+        "s.yaml:5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, "
+        "0 to 1)");
+    EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0], intensity: 1}\n"),
+              "s.yaml:6:16: lights[0].position: must be a list of 3 numbers, has 2");
+    EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2e9], intensity: 1}\n"),
+              "s.yaml:6:16: lights[0].position: must lie within 1e9 mm");
+    EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2], intensity: -1}\n"),
+              "s.yaml:6:38: lights[0].intensity: must be 0 to 1e12");
+    EXPECT_EQ(error_of(start + "objects:\n  - {material: grey}\n"),
+              "s.yaml:6:5: objects[0]: needs one of mesh, sphere, cuboid and plane");
+    EXPECT_EQ(error_of(ball + ", cuboid: {size: 1}}\n"),
+              "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; make two objects of them");
+    EXPECT_EQ(error_of(ball + "y}\n"),
+              "s.yaml:6:37: objects[0].material: 'greyy' is not one of grey; did you mean 'grey'?");
+    EXPECT_EQ(error_of(ball + ", smooth: true}\n"), "s.yaml:6:51: objects[0].smooth: belongs to a mesh only");
+    EXPECT_EQ(error_of(ball + ", role: ghost}\n"),
+              "s.yaml:6:49: objects[0].role: 'ghost' is not one of virtual, catcher, occluder");
+    EXPECT_EQ(error_of(ball + ", name: \"a\\tb\"}\n"),
+              "s.yaml:6:49: objects[0].name: must not hold control characters");
+    EXPECT_EQ(error_of(start + "objects:\n  - {sphere: {radius: 0}, material: grey}\n"),
+              "s.yaml:6:23: objects[0].sphere.radius: must be more than 0");
+    EXPECT_EQ(error_of(start + "objects:\n  - {cuboid: {size: [1, 0, 1]}, material: grey}\n"),
+              "s.yaml:6:21: objects[0].cuboid.size: each side must be 1e-6 to 1e9 mm");
+    EXPECT_EQ(error_of(start + "objects:\n  - {plane: {size: 1, normal: [0, 0, 0]}, material: grey}\n"),
+              "s.yaml:6:31: objects[0].plane.normal: has no direction");
+}
+
+TEST(SceneErrors, NameTheStepOfATransform) {
+    const auto with = [](const std::string &steps) {
+        return error_of(start + "objects:\n  - sphere: {radius: 1}\n    material: grey\n    transform:\n" + steps);
+    };
+    EXPECT_EQ(with("      - scale: 0\n"),
+              "s.yaml:9:16: objects[0].transform[0].scale: each factor must be 1e-9 to 1e9, or that below 0 for a "
+              "mirrored object");
+    EXPECT_EQ(with("      - rotate: {axis: [0, 0, 0], degrees: 1}\n"),
+              "s.yaml:9:24: objects[0].transform[0].rotate.axis: has no direction");
+    EXPECT_EQ(with("      - {scale: 1, translate: [0, 0, 0]}\n"),
+              "s.yaml:9:9: objects[0].transform[0]: each step of a transform is one of translate, scale and rotate");
+    EXPECT_EQ(with("      - scale: 1\n      - skale: 1\n"),
+              "s.yaml:10:16: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
+    EXPECT_EQ(
+        with("      - scale: [1, 1, 2]\n"),
+        "s.yaml:9:7: objects[0].transform: scales a sphere unevenly, which would make it an ellipsoid; scale it by "
+        "one number");
+    EXPECT_EQ(with("      - translate: [1e9, 0, 0]\n      - translate: [1e9, 0, 0]\n"),
+              "s.yaml:6:13: objects[0].sphere: reaches further than 1e9 mm after its transform");
+}
+
+TEST(SceneErrors, NameTheMeshAndTheLineThatNamesIt) {
+    const ScratchFolder folder;
+    const auto error_with = [&](const std::string &obj) -> std::string {
+        write_file(folder.path() / "mesh.obj", obj);
+        write_file(folder.path() / "scene.yaml", start + "objects:\n  - mesh: mesh.obj\n    material: grey\n");
+        try {
+            load_scene(folder.path() / "scene.yaml");
+        } catch (const Error &error) {
+            return error.what();
+        }
+        return "no error";
+    };
+    const std::string where = (folder.path() / "scene.yaml").string() + ":6:11: objects[0].mesh: ";
+    const std::string mesh = (folder.path() / "mesh.obj").string();
+    EXPECT_EQ(error_with("v 0 0\n"), where + mesh + ":1: a vertex needs 3 numbers, has 2");
+    EXPECT_EQ(error_with("v 1e10 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 3\n"),
+              where + "reaches further than 1e9 mm after its transform");
+    EXPECT_EQ(error_with("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1e10\nf 1/1 2/1 3/1\n"),
+              where + "has texture coordinates beyond 1e9");
+    std::filesystem::remove(mesh);
+    write_file(folder.path() / "scene.yaml", start + "objects:\n  - mesh: gone.obj\n    material: grey\n");
+    try {
+        load_scene(folder.path() / "scene.yaml");
+        FAIL();
+    } catch (const Error &error) {
+        EXPECT_EQ(error.what(),
+                  where + (folder.path() / "gone.obj").string() + ": can't be read: No such file or directory");
+    }
+}
+
+TEST(SceneLoading, TellsTheSizeOfMeshesAndItsProgress) {
+    LoadCallbacks callbacks;
+    std::vector<std::string> info;
+    std::vector<double> fractions;
+    callbacks.info = [&](const std::string &text) { info.push_back(text); };
+    callbacks.progress = [&](double fraction, const std::string &) { fractions.push_back(fraction); };
+    load_with_mesh(triangle_with_normals, ", transform: [{scale: 30}]", callbacks);
+    ASSERT_EQ(info.size(), 1u);
+    EXPECT_THAT(info[0], testing::EndsWith("mesh.obj: 1 triangles, 3 vertices, 30 x 30 x 0 mm"));
+    ASSERT_FALSE(fractions.empty());
+    EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+    EXPECT_EQ(fractions.back(), 1);
+}
+
+TEST(SceneLoading, StopsWhenItIsCancelled) {
+    LoadCallbacks callbacks;
+    callbacks.cancelled = [] { return true; };
+    EXPECT_THROW(load_with_mesh(triangle_with_normals, "", callbacks), Cancelled);
+}
+
+TEST(SceneLoading, SmoothComputesNormals) {
+    const std::string flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    EXPECT_EQ(geometry(load_with_mesh(flat, "")).normals.count, 0u);
+    EXPECT_EQ(geometry(load_with_mesh(flat, ", smooth: true")).normals.count, 3u);
+    EXPECT_EQ(geometry(load_with_mesh(triangle_with_normals, ", smooth: false")).normals.count, 0u);
+}
+
+class ShippedScenes : public testing::TestWithParam<const char *> {};
+
+TEST_P(ShippedScenes, LoadAndStandOnTheMarker) {
+    const Arena arena =
+        load_scene(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes" / GetParam()).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    EXPECT_EQ(arena.scene().axes, ARHOST_Z_UP);
+    EXPECT_EQ(arena.scene().bounds_min[2], 0);
+    EXPECT_GE(arena.scene().lights.count, 1u);
+    EXPECT_GE(arena.scene().objects.count, 5u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Config, ShippedScenes, testing::Values("optix-cs.yaml", "demo.yaml"));
+
+TEST(SceneDocumentation, ItsExampleLoads) {
+    std::ifstream stream(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "docs/scenes.md");
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    const std::size_t begin = text.find("```yaml\n");
+    ASSERT_NE(begin, std::string::npos);
+    const std::string example = text.substr(begin + 8, text.find("```\n", begin + 8) - begin - 8);
+    const ScratchFolder folder;
+    write_file(folder.path() / "vase.ply",
+               "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+               "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    write_file(folder.path() / "scene.yaml", example);
+    const Arena arena = load_scene(folder.path() / "scene.yaml").build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    EXPECT_GT(arena.scene().objects.count, 3u);
+}

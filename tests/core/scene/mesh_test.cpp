@@ -1,0 +1,609 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugin_under_test.hpp"
+#include "scene/mesh.hpp"
+#include "scene_samples.hpp"
+
+#include <glm/geometric.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <random>
+
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+using namespace arhost::scene;
+using namespace arhost::scene::test;
+using arhost::test::ScratchFolder;
+using arhost::test::shared_data;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+namespace {
+
+std::string gzipped(const std::string &content) {
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+    std::string packed(deflateBound(&stream, content.size()), '\0');
+    stream.next_in = reinterpret_cast<Bytef *>(const_cast<char *>(content.data()));
+    stream.avail_in = static_cast<uInt>(content.size());
+    stream.next_out = reinterpret_cast<Bytef *>(packed.data());
+    stream.avail_out = static_cast<uInt>(packed.size());
+    deflate(&stream, Z_FINISH);
+    packed.resize(stream.total_out);
+    deflateEnd(&stream);
+    return packed;
+}
+
+// Its loader's messages, each after a "; ".
+struct Loaded {
+    TriangleMesh mesh;
+    std::string info;
+};
+
+Loaded load_text(const std::string &name, const std::string &content, const MeshOptions &options = {}) {
+    const ScratchFolder folder;
+    write_file(folder.path() / name, content);
+    Loaded loaded;
+    LoadCallbacks callbacks;
+    callbacks.info = [&](const std::string &text) {
+        loaded.info += text.substr(std::min(text.size(), folder.path().string().size() + 1)) + "; ";
+    };
+    loaded.mesh = load_mesh(folder.path() / name, options, callbacks);
+    return loaded;
+}
+
+// The message, without the folder.
+std::string error_of(const std::string &name, const std::string &content, const MeshOptions &options = {}) {
+    const ScratchFolder folder;
+    write_file(folder.path() / name, content);
+    try {
+        load_mesh(folder.path() / name, options);
+    } catch (const MeshError &error) {
+        return std::string(error.what()).substr(folder.path().string().size() + 1);
+    }
+    return "no error";
+}
+
+// What the validator says to the mesh as a scene.
+std::string validated(TriangleMesh mesh) {
+    ArenaBuilder builder;
+    builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey()));
+    return validate(std::move(builder).build().bytes());
+}
+
+float area_of(const TriangleMesh &mesh) {
+    float area = 0;
+    for (const glm::uvec3 &t : mesh.triangles) {
+        const glm::vec3 &a = mesh.positions[t.x];
+        area += glm::length(glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a)) / 2;
+    }
+    return area;
+}
+
+const std::string three_vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+const std::string ply_start = "ply\nformat ascii 1.0\n";
+const std::string ply_triangle_header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                        "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+template <class T> void append(std::string &bytes, T value, bool big_endian) {
+    char raw[sizeof(T)];
+    std::memcpy(raw, &value, sizeof(T));
+    if (big_endian == (std::endian::native == std::endian::little))
+        std::reverse(raw, raw + sizeof(T));
+    bytes.append(raw, sizeof(T));
+}
+
+std::string binary_triangle(bool big_endian) {
+    std::string bytes = std::string("ply\nformat binary_") + (big_endian ? "big" : "little") + "_endian 1.0\n" +
+                        "element vertex 3\nproperty double x\nproperty float y\nproperty short z\n"
+                        "property uchar red\nelement face 1\nproperty list uchar ushort vertex_index\n"
+                        "property list uint char rubbish\nend_header\n";
+    for (int i = 0; i < 3; ++i) {
+        append<double>(bytes, 10.5 + i, big_endian);
+        append<float>(bytes, i == 2 ? 300.25f : 0, big_endian);
+        append<std::int16_t>(bytes, static_cast<std::int16_t>(-300 * i), big_endian);
+        append<std::uint8_t>(bytes, 255, big_endian);
+    }
+    append<std::uint8_t>(bytes, 3, big_endian);
+    for (const std::uint16_t index : {2, 0, 1})
+        append(bytes, index, big_endian);
+    append<std::uint32_t>(bytes, 2, big_endian);
+    return bytes + "xy";
+}
+
+} // namespace
+
+TEST(Obj, ReadsTriangles) {
+    const TriangleMesh mesh = load_text("a.obj", three_vertices + "f 1 2 3\n").mesh;
+    EXPECT_THAT(mesh.positions, ElementsAre(glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)));
+    EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2)));
+    EXPECT_TRUE(mesh.normals.empty());
+    EXPECT_TRUE(mesh.texcoords.empty());
+}
+
+TEST(Obj, CountsNegativeIndicesFromTheLastVertex) {
+    const TriangleMesh mesh = load_text("a.obj", three_vertices + "f -3 -2 -1\nv 5 5 5\nf -1 -4 -3\n").mesh;
+    EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(3, 0, 1)));
+}
+
+TEST(Obj, MakesAVertexForEachPairOfPositionAndNormal) {
+    const TriangleMesh mesh =
+        load_text("a.obj", three_vertices + "v 1 1 0\nvn 0 0 2\nvn 0 0 -1\n"
+                                            "f 1//1 2//1 3//1\nf 2//1 4//2 3//1\nf 4//2 2//1 3//2\n")
+            .mesh;
+    EXPECT_EQ(mesh.positions.size(), 5u);
+    EXPECT_THAT(mesh.normals, ElementsAre(glm::vec3(0, 0, 1), glm::vec3(0, 0, 1), glm::vec3(0, 0, 1),
+                                          glm::vec3(0, 0, -1), glm::vec3(0, 0, -1)));
+    EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(1, 3, 2), glm::uvec3(3, 1, 4)));
+    EXPECT_EQ(mesh.positions[4], glm::vec3(0, 1, 0));
+}
+
+TEST(Obj, KeepsTexcoordsAndGivesZeroToCornersWithout) {
+    const TriangleMesh mesh =
+        load_text("a.obj", three_vertices + "vt 0.25 0.5\nvt 1\nf 1 2 3\nf 1/1 2/2 3/-1\n").mesh;
+    ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
+    EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0));
+    EXPECT_EQ(mesh.texcoords[mesh.triangles[1].x], glm::vec2(0.25f, 0.5f));
+    EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 0));
+}
+
+TEST(Obj, PassesOverNormalsThatOnlySomeFacesHave) {
+    const Loaded loaded = load_text("a.obj", three_vertices + "vn 0 0 1\nf 1 2 3\nf 1//1 2//1 3//1\n");
+    EXPECT_TRUE(loaded.mesh.normals.empty());
+    EXPECT_EQ(loaded.info, "a.obj: some faces have normals and some have none; all are passed over; ");
+}
+
+TEST(Obj, SaysThatMaterialsArePassedOver) {
+    EXPECT_EQ(load_text("a.obj", "mtllib a.mtl\n" + three_vertices + "f 1 2 3").info,
+              "a.obj: its MTL materials are passed over; the scene file gives materials; ");
+}
+
+TEST(Obj, ReadsTheWritingsOfOtherPrograms) {
+    for (const std::string &text :
+         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows, no line end
+          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // old Macs
+          std::string("v 0 \\\n0 0\nv 1 0 0 # last\nv 0 1 0 1.0\nf 1 \\\n 2 3 # f 9 9 9\n"),
+          std::string("\t v\t+0 0. .0 0.5 0.5 0.5\nvp 1\nv 1e0 0E5 -0\nv 1e-60 +1.0e+0 0\ng a\ns off\nf 1 2 3\\")}) {
+        const TriangleMesh mesh = load_text("a.obj", text).mesh;
+        EXPECT_THAT(mesh.positions, ElementsAre(glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)));
+        EXPECT_EQ(mesh.triangles.size(), 1u);
+    }
+}
+
+TEST(Obj, NamesFileLineAndFault) {
+    EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, has 2");
+    EXPECT_EQ(error_of("a.obj", "\n\nv 0 x 0\n"), "a.obj:3: 'x' is not a number");
+    EXPECT_EQ(error_of("a.obj", "v 0 1,5 0\n"), "a.obj:1: '1,5' is not a number");
+    EXPECT_EQ(error_of("a.obj", "v 0 nan 0\n"), "a.obj:1: a vertex has the number 'nan'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 1e99\n"), "a.obj:1: a vertex has the number '1e99'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the number '-inf'");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"), "a.obj:4: a face needs three corners, has 2");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 4\n"),
+              "a.obj:4: a face names vertex 4, but 3 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 -4\n"),
+              "a.obj:4: a face names vertex -4, but 3 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 0 1 2\n"),
+              "a.obj:4: a face names vertex 0, but 3 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1/1 2/1 3/1\n"),
+              "a.obj:4: a face names texcoord 1, but 0 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "vn 0 0 1\nf 1//1 2//2 3//1\n"),
+              "a.obj:5: a face names normal 2, but 1 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 x\n"), "a.obj:4: 'x' is not a corner of a face");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 3/1/1/1\n"),
+              "a.obj:4: a face names texcoord 1, but 0 stand above it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 99999999999999999999\n"),
+              "a.obj:4: '99999999999999999999' is not a corner of a face");
+    EXPECT_EQ(error_of("a.obj", three_vertices), "a.obj: there are no triangles in it");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "l 1 2\n"),
+              "a.obj: there are no triangles in it, only points, lines or curves");
+    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: there are no triangles in it, nor vertices");
+}
+
+TEST(Polygons, AreCutIntoTrianglesThatCoverThem) {
+    // A square; an arrow's head, concave; a U, whose fan would cover the gap; and the U the other way round.
+    EXPECT_FLOAT_EQ(area_of(load_text("a.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n").mesh), 4);
+    const TriangleMesh arrow = load_text("a.obj", "v 0 0 0\nv 4 0 2\nv 0 0 4\nv 1 0 2\nf 1 2 3 4\n").mesh;
+    EXPECT_FLOAT_EQ(area_of(arrow), 6);
+    const std::string u = "v 0 0 7\nv 3 0 7\nv 3 3 7\nv 2 3 7\nv 2 1 7\nv 1 1 7\nv 1 3 7\nv 0 3 7\n";
+    for (const std::string face : {"f 1 2 3 4 5 6 7 8\n", "f 8 7 6 5 4 3 2 1\n"}) {
+        const TriangleMesh mesh = load_text("a.obj", u + face).mesh;
+        EXPECT_EQ(mesh.triangles.size(), 6u);
+        EXPECT_FLOAT_EQ(area_of(mesh), 7);
+        for (const glm::uvec3 &t : mesh.triangles) { // all wound as the polygon is
+            const glm::vec3 &a = mesh.positions[t.x];
+            const float z = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a).z;
+            EXPECT_GE(face[2] == '1' ? z : -z, 0);
+        }
+    }
+}
+
+TEST(Polygons, ThatCrossThemselvesGiveTrianglesAllTheSame) {
+    EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 2 0\nf 1 2 3 4\n").mesh.triangles.size(), 2u);
+    EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 1 1 1\nf 1 2 1 2 1 2\n").mesh.triangles.size(), 4u);
+}
+
+TEST(Polygons, MayNotBeConcaveWithThousandsOfCorners) {
+    std::string text, face = "f";
+    for (int i = 0; i < 1002; ++i) {
+        text += "v " + std::to_string(i) + " " + std::to_string(i % 2 ? 0 : 5000 - i) + " 0\n";
+        face += " " + std::to_string(i + 1);
+    }
+    EXPECT_EQ(error_of("a.obj", text + face + "\n"),
+              "a.obj:1003: a concave face has 1002 corners, more than 1000; cut it into triangles");
+}
+
+TEST(Ply, ReadsAscii) {
+    const TriangleMesh mesh =
+        load_text("a.ply",
+                  "ply\r\nformat ascii 1.0\r\ncomment x\r\nobj_info y\r\nelement vertex 4\r\nproperty float x\r\n"
+                  "property double y\r\nproperty int z\r\nproperty list uchar float weights\r\n"
+                  "property float nx\r\nproperty float ny\r\nproperty float nz\r\nproperty float u\r\n"
+                  "property float v\r\nelement edge 1\r\nproperty int a\r\nelement face 2\r\n"
+                  "property uchar red\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
+                  "0 0 0 0 0 0 2 0 0\r\n1 0 0 2 0.5 0.5 0 0 1 1 0\r\n1 1 0 0 0 0 1 1 1\r\n\r\n0 1e0 0 0 0 0 1 0 1\r\n"
+                  "7\r\n255 4 0 1 2 3\r\n0 2 0 1")
+            .mesh;
+    EXPECT_THAT(mesh.positions,
+                ElementsAre(glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(1, 1, 0), glm::vec3(0, 1, 0)));
+    EXPECT_THAT(mesh.normals, testing::Each(glm::vec3(0, 0, 1)));
+    EXPECT_THAT(mesh.texcoords, ElementsAre(glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1), glm::vec2(0, 1)));
+    EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(0, 2, 3)));
+}
+
+TEST(Ply, ReadsBinaryOfBothByteOrders) {
+    for (const bool big_endian : {false, true}) {
+        const TriangleMesh mesh = load_text("a.ply", binary_triangle(big_endian)).mesh;
+        EXPECT_THAT(mesh.positions,
+                    ElementsAre(glm::vec3(10.5, 0, 0), glm::vec3(11.5, 0, -300), glm::vec3(12.5, 300.25, -600)));
+        EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(2, 0, 1)));
+    }
+}
+
+TEST(Ply, ReadsFilesOfOldMacs) {
+    std::string text = ply_start + ply_triangle_header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    std::replace(text.begin(), text.end(), '\n', '\r');
+    EXPECT_EQ(load_text("a.ply", text).mesh.triangles.size(), 1u);
+}
+
+TEST(Ply, NamesFileLineAndFaultInTheHeader) {
+    EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: a PLY file begins with a line 'ply', this one does not");
+    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header has no end_header");
+    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header has no format");
+    EXPECT_EQ(error_of("a.ply", "ply\nformat utf8 1.0\nend_header\n"),
+              "a.ply:2: the format 'utf8' is not ascii, binary_little_endian or binary_big_endian");
+    EXPECT_EQ(error_of("a.ply", "ply\nformat ascii 2.0\n"), "a.ply:2: the format's version is '2.0', not 1.0");
+    EXPECT_EQ(error_of("a.ply", ply_start + "element vertex -1\n"),
+              "a.ply:3: the element 'vertex' has the count '-1'");
+    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"),
+              "a.ply:3: a property stands before the first element");
+    EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty half x\n"),
+              "a.ply:4: the property type 'half' is unknown");
+    EXPECT_EQ(error_of("a.ply", ply_start + "element face 1\nproperty list float int vertex_indices\n"),
+              "a.ply:4: a list's count must be of an integer type");
+    EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 0\nend_header\n"),
+              "a.ply: there are no triangles in it: the header has no element 'face' with a list 'vertex_indices'");
+    EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty float x\nelement face 1\n"
+                                            "property list uchar int vertex_index\nend_header\n1\n3 0 0 0\n"),
+              "a.ply: its vertices lack x, y or z");
+}
+
+TEST(Ply, NamesFileLineAndFaultInTheData) {
+    const std::string header = ply_start + ply_triangle_header; // lines 1 to 9
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is cut short");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n"),
+              "a.ply:11: vertex 1 has more numbers than properties");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: 'zero' is not a number");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"),
+              "a.ply:11: vertex 1 has a number 'y' that is not finite");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+              "a.ply:13: face 0 names vertex 3, but there are 3 above it");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"),
+              "a.ply:13: face 0 names vertex -1, but there are 3 above it");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"),
+              "a.ply:13: '1.5' is not a whole number");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:13: face 0 is cut short");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n\n\n"),
+              "a.ply:15: the file is cut short: it ends before face 0 of 1");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n4000000 0 1 2\n"),
+              "a.ply:13: face 0: its list 'vertex_indices' has the length 4000000");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
+              "a.ply: there are no triangles in it: its faces have fewer than three corners");
+}
+
+TEST(Ply, NamesTheByteInBinaryData) {
+    const std::string whole = binary_triangle(false);
+    const std::size_t header = whole.find("end_header\n") + 11;
+    EXPECT_EQ(error_of("a.ply", whole.substr(0, whole.size() - 1)),
+              "a.ply: byte " + std::to_string(whole.size() - 2) + ": face 0: its list 'rubbish' has the length 2");
+    EXPECT_EQ(error_of("a.ply", whole.substr(0, header + 10)),
+              "a.ply: its header tells of 3 elements 'vertex', but only 10 bytes are left for them");
+    std::string wrong = whole;
+    wrong[header + 3 * 15 + 1] = 77;
+    EXPECT_EQ(error_of("a.ply", wrong), "a.ply: byte " + std::to_string(header + 3 * 15 + 3) +
+                                            ": face 0 names vertex 77, but there are 3 above it");
+}
+
+TEST(Ply, RefusesCountsThatTheFileIsTooShortForBeforeItReservesMemory) {
+    for (const std::string count : {"4000000000", "4611686018427387904", "9223372036854775807"})
+        for (const std::string format : {"ascii", "binary_little_endian"}) {
+            const std::string text = "ply\nformat " + format + " 1.0\nelement vertex " + count +
+                                     "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                                     "property list uchar int vertex_indices\nend_header\n0 0 0\n";
+            EXPECT_THAT(error_of("a.ply", text),
+                        HasSubstr("a.ply: its header tells of " + count + " elements 'vertex', but only"));
+        }
+}
+
+TEST(MeshFile, IsUnpackedFromGzip) {
+    const std::string text = three_vertices + "f 1 2 3\n";
+    EXPECT_EQ(load_text("a.obj.gz", gzipped(text)).mesh.triangles.size(), 1u);
+    EXPECT_EQ(load_text("A.OBJ.GZ", gzipped(text)).mesh.triangles.size(), 1u);
+    EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(), 1u); // by its content
+    EXPECT_EQ(load_text("a.ply.gz", gzipped(binary_triangle(true))).mesh.triangles.size(), 1u);
+    // Two members one after the other, and zeros behind, as tapes leave them (RFC 1952, 2.2).
+    const std::string parts = gzipped(text.substr(0, 9)) + gzipped(text.substr(9)) + std::string(5, '\0');
+    EXPECT_EQ(load_text("a.obj.gz", parts).mesh.triangles.size(), 1u);
+}
+
+TEST(MeshFile, NamesTheByteWhereGzipIsDamaged) {
+    std::string text = three_vertices;
+    for (int i = 0; i < 5000; ++i)
+        text += "v " + std::to_string(i * 7919 % 1013) + " 0 1\n";
+    const std::string packed = gzipped(text + "f 1 2 3\n");
+    ASSERT_GT(packed.size(), 1000u);
+    EXPECT_THAT(error_of("a.obj.gz", packed.substr(0, packed.size() - 3)),
+                HasSubstr("a.obj.gz: the gzip data is cut short after byte"));
+    EXPECT_THAT(error_of("a.obj.gz", packed.substr(0, 12)), HasSubstr("the gzip data is cut short after byte"));
+    std::string damaged = packed;
+    damaged[packed.size() / 2] ^= 0x55;
+    EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("the gzip data is damaged at byte"));
+    damaged = packed;
+    damaged[packed.size() - 6] ^= 1; // the checksum
+    EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("incorrect data check"));
+    EXPECT_THAT(error_of("a.obj.gz", packed + "rubbish"), HasSubstr("not a gzip member"));
+    EXPECT_EQ(error_of("a.obj.gz", gzipped("")), "a.obj.gz: is empty");
+}
+
+TEST(MeshFile, MayNotUnpackToMoreThanItsLimit) {
+    const std::string bomb = gzipped(std::string(20 << 20, '#'));
+    MeshOptions options;
+    options.byte_limit = 4 << 20;
+    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: unpacks to more than 4 MiB, the most that is loaded");
+    EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options),
+              "a.obj: has 5 MiB; 4 MiB is the most that is loaded");
+}
+
+TEST(MeshFile, OfAnotherKindIsRefusedByName) {
+    EXPECT_EQ(error_of("a.stl", "solid x\n"),
+              "a.stl: mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)");
+    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension can't be loaded"));
+    EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is text in UTF-16; save it as UTF-8 or ASCII");
+    EXPECT_EQ(error_of("a.obj", ply_start), "a.obj: is a PLY file by its content; name it .ply");
+    EXPECT_EQ(error_of("a.obj", ""), "a.obj: is empty");
+}
+
+TEST(MeshFile, ThatCantBeReadSaysWhy) {
+    const ScratchFolder folder;
+    const auto error_at = [](const std::filesystem::path &path) -> std::string {
+        try {
+            load_mesh(path);
+        } catch (const MeshError &error) {
+            return error.what();
+        }
+        return "no error";
+    };
+    EXPECT_EQ(error_at("/no/such.ply"), "/no/such.ply: can't be read: No such file or directory");
+    std::filesystem::create_directory(folder.path() / "folder.obj");
+    EXPECT_THAT(error_at(folder.path() / "folder.obj"), HasSubstr("is a folder, not a mesh file"));
+    ASSERT_EQ(mkfifo((folder.path() / "fifo.obj").c_str(), 0600), 0);
+    EXPECT_THAT(error_at(folder.path() / "fifo.obj"), HasSubstr("is not a regular file"));
+}
+
+TEST(MeshFile, LoadingStopsWhenItIsCancelled) {
+    const ScratchFolder folder;
+    write_file(folder.path() / "a.obj", three_vertices + "f 1 2 3\n");
+    LoadCallbacks callbacks;
+    callbacks.cancelled = [] { return true; };
+    EXPECT_THROW(load_mesh(folder.path() / "a.obj", {}, callbacks), Cancelled);
+}
+
+TEST(Normals, AreComputedWhereSmoothAsksForThem) {
+    // Two triangles of a ridge; the edge's normals lie between theirs, by area: 1 to 3.
+    const std::string ridge = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -3\nf 1 3 2\nf 1 2 4\n";
+    EXPECT_TRUE(load_text("a.obj", ridge).mesh.normals.empty());
+    const TriangleMesh mesh = load_text("a.obj", ridge, {true}).mesh;
+    const glm::vec3 edge = glm::normalize(glm::vec3(-3, 0, 1));
+    ASSERT_EQ(mesh.normals.size(), 4u);
+    EXPECT_LT(glm::distance(mesh.normals[0], edge), 1e-6f);
+    EXPECT_LT(glm::distance(mesh.normals[1], edge), 1e-6f);
+    EXPECT_EQ(mesh.normals[2], glm::vec3(0, 0, 1));
+    EXPECT_EQ(mesh.normals[3], glm::vec3(-1, 0, 0));
+}
+
+TEST(Normals, AreSharedAcrossSeamsOfTheTexture) {
+    const std::string seam = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -1\nvt 0 0\nvt 1 1\nf 1/1 3/1 2/1\nf 1/2 2/2 4/2\n";
+    const TriangleMesh mesh = load_text("a.obj", seam, {true}).mesh;
+    ASSERT_EQ(mesh.positions.size(), 6u);
+    EXPECT_EQ(mesh.normals[mesh.triangles[0].x], mesh.normals[mesh.triangles[1].x]);
+}
+
+TEST(Normals, OfTheFileAreDroppedWhereSmoothIsFalse) {
+    const std::string text = three_vertices + "vn 0 0 1\nf 1//1 2//1 3//1\n";
+    EXPECT_EQ(load_text("a.obj", text).mesh.normals.size(), 3u);
+    EXPECT_EQ(load_text("a.obj", text, {true}).mesh.normals.size(), 3u);
+    EXPECT_TRUE(load_text("a.obj", text, {false}).mesh.normals.empty());
+}
+
+TEST(Normals, OfLengthZeroAreComputed) {
+    const TriangleMesh mesh =
+        load_text("a.obj",
+                  three_vertices + "v 9 9 9\nv 9 9 9\nvn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//1\nf 4//1 5//1 4//1\n")
+            .mesh;
+    EXPECT_EQ(mesh.normals[0], glm::vec3(0, 0, 1));
+    EXPECT_EQ(mesh.normals[1], glm::vec3(1, 0, 0));
+    EXPECT_EQ(validated(mesh), ""); // those of the triangle without area, too
+}
+
+TEST(Normals, OfATinySphereAreRight) { // the squares of its lengths are too small for floats
+    TriangleMesh mesh = square();
+    for (glm::vec3 &p : mesh.positions)
+        p *= 1e-24f;
+    EXPECT_THAT(smooth_normals(mesh), testing::Each(glm::vec3(0, 0, 1)));
+}
+
+struct SharedMesh {
+    const char *file;
+    std::size_t triangles;
+};
+
+class SharedMeshes : public testing::TestWithParam<SharedMesh> {};
+
+TEST_P(SharedMeshes, HaveTheirTriangles) {
+    ARHOST_REQUIRE_SHARED_DATA("meshes");
+    const TriangleMesh mesh = load_mesh(shared_data(std::string("meshes/") + GetParam().file));
+    EXPECT_EQ(mesh.triangles.size(), GetParam().triangles);
+    EXPECT_EQ(validated(mesh), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Real, SharedMeshes,
+                         testing::Values(SharedMesh{"bunny_4968.obj", 4968}, SharedMesh{"bunny_4968.ply", 4968},
+                                         SharedMesh{"bunny_69451.ply.gz", 69451}, SharedMesh{"teapot_6320.obj", 6320},
+                                         SharedMesh{"lucy_99970.obj.gz", 99970}, SharedMesh{"lucy_15000.ply", 15000},
+                                         SharedMesh{"buddha_100000.obj.gz", 100000},
+                                         SharedMesh{"buddha_20000.obj", 20000}, SharedMesh{"dragon_20000.obj", 20000},
+                                         SharedMesh{"dragon_vrip.ply.gz", 871414},
+                                         SharedMesh{"dragon_vrip_res2.ply.gz", 202520},
+                                         SharedMesh{"dragon_vrip_res3.ply.gz", 47794},
+                                         SharedMesh{"dragon_vrip_res4.ply.gz", 11102},
+                                         SharedMesh{"spot_5856.obj", 5856}, SharedMesh{"suzanne_968.obj", 968}));
+
+struct LoaderCase {
+    const char *file;
+    std::size_t triangles, vertices;
+    const char *message = nullptr; // in place of a mesh
+};
+
+class LoaderCases : public testing::TestWithParam<LoaderCase> {};
+
+TEST_P(LoaderCases, GiveTheirMeshOrAClearMessage) {
+    ARHOST_REQUIRE_SHARED_DATA("meshes/loader_cases");
+    const std::filesystem::path file = shared_data(std::string("meshes/loader_cases/") + GetParam().file);
+    try {
+        const TriangleMesh mesh = load_mesh(file);
+        EXPECT_EQ(GetParam().message, nullptr);
+        EXPECT_EQ(mesh.triangles.size(), GetParam().triangles);
+        EXPECT_EQ(mesh.positions.size(), GetParam().vertices);
+        EXPECT_EQ(validated(mesh), "");
+    } catch (const MeshError &error) {
+        ASSERT_NE(GetParam().message, nullptr) << error.what();
+        EXPECT_EQ(error.what(), file.string() + GetParam().message);
+    }
+}
+
+namespace {
+constexpr char no_stl[] =
+    ": mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+constexpr char no_mtl[] =
+    ": mesh files '*.mtl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+constexpr char no_faces[] =
+    ": there are no triangles in it: the header has no element 'face' with a list 'vertex_indices'";
+constexpr char only_lines[] = ": there are no triangles in it, only points, lines or curves";
+} // namespace
+
+INSTANTIATE_TEST_SUITE_P(
+    Real, LoaderCases,
+    testing::Values(
+        LoaderCase{"Spider_ascii.stl", 0, 0, no_stl}, LoaderCase{"Spider_binary.stl", 0, 0, no_stl},
+        LoaderCase{"Wuson.ply", 3732, 11184}, LoaderCase{"WusonOBJ.obj", 3732, 2117}, LoaderCase{"box.obj", 12, 8},
+        LoaderCase{"box_UTF16BE.obj", 0, 0, ": is text in UTF-16; save it as UTF-8 or ASCII"},
+        LoaderCase{"box_longline.obj", 944, 8}, LoaderCase{"box_mat_with_spaces.obj", 12, 8},
+        LoaderCase{"box_spaces.mtl", 0, 0, no_mtl}, LoaderCase{"box_without_lineending.obj", 12, 8},
+        LoaderCase{"concave_polygon.mtl", 0, 0, no_mtl}, LoaderCase{"concave_polygon.obj", 64, 64},
+        LoaderCase{"cube.ply", 12, 8}, LoaderCase{"cube_binary.ply", 12, 8},
+        LoaderCase{"cube_mtllib_after_g.mtl", 0, 0, no_mtl}, LoaderCase{"cube_mtllib_after_g.obj", 12, 24},
+        LoaderCase{"cube_usemtl.mtl", 0, 0, no_mtl}, LoaderCase{"cube_usemtl.obj", 12, 24},
+        LoaderCase{"cube_uv.ply", 12, 24}, LoaderCase{"cube_with_vertexcolors.obj", 12, 24},
+        LoaderCase{"cube_with_vertexcolors_uni.obj", 12, 24}, LoaderCase{"empty_mat.mtl", 0, 0, no_mtl},
+        LoaderCase{"empty_mat.obj", 256, 450}, LoaderCase{"float-color.ply", 1, 3},
+        LoaderCase{"issue623.ply", 0, 0, no_faces}, LoaderCase{"multiple_spaces.obj", 1, 4},
+        LoaderCase{"number_formats.obj", 0, 0, ":11: '3.1+e2' is not a number"},
+        LoaderCase{"point_cloud.obj", 0, 0, ": there are no triangles in it"},
+        LoaderCase{"points.ply", 0, 0, no_faces}, LoaderCase{"regr01.mtl", 0, 0, no_mtl},
+        LoaderCase{"regr_3429812.mtl", 0, 0, no_mtl}, LoaderCase{"regr_3429812.obj", 4, 4},
+        LoaderCase{"space_in_material_name.mtl", 0, 0, no_mtl}, LoaderCase{"space_in_material_name.obj", 64, 64},
+        LoaderCase{"sphereWithHole.stl", 0, 0, no_stl}, LoaderCase{"spider.mtl", 0, 0, no_mtl},
+        LoaderCase{"spider.obj", 1368, 974}, LoaderCase{"testline.obj", 0, 0, only_lines},
+        LoaderCase{"testmixed.obj", 12, 8}, LoaderCase{"testpoints.obj", 0, 0, only_lines},
+        LoaderCase{"triangle.stl", 0, 0, no_stl}, LoaderCase{"triangle_with_empty_solid.stl", 0, 0, no_stl},
+        LoaderCase{"triangle_with_two_solids.stl", 0, 0, no_stl}));
+
+TEST(LoaderCaseTable, HoldsEveryFileOfTheFolder) {
+    ARHOST_REQUIRE_SHARED_DATA("meshes/loader_cases");
+    const auto files = std::filesystem::directory_iterator(shared_data("meshes/loader_cases"));
+    EXPECT_EQ(std::distance(begin(files), end(files)), 43);
+}
+
+// Damaged files give a mesh that the validator accepts, or a MeshError: nothing else is thrown, and the
+// sanitizers' builds find nothing.
+TEST(MeshMutations, GiveAMeshOrAnError) {
+    std::vector<std::pair<std::string, std::string>> seeds = {
+        {"a.obj",
+         three_vertices + "vt 0 1\nvn 0 0 1\nv 1 1 0 \\\n 1\nf 1/1/1 2/1/1 4/1/1 3/1/1\nf -1//1 -2//1 -3//1\n"},
+        {"a.ply", ply_start + ply_triangle_header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+        {"b.ply", binary_triangle(false)},
+        {"c.ply", binary_triangle(true)},
+        {"a.obj.gz", gzipped(three_vertices + "f 1 2 3\n")}};
+    std::mt19937 random(7);
+    // The files lie in memory, where writing thousands of them takes no time.
+    const int memory = memfd_create("mesh", 0);
+    ASSERT_GE(memory, 0);
+    const ScratchFolder folder;
+    for (const auto &[name, content] : seeds)
+        std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(memory), folder.path() / name);
+    int loaded = 0, refused = 0;
+    for (int round = 0; round < 4000; ++round) {
+        auto [name, content] = seeds[static_cast<std::size_t>(round) % seeds.size()];
+        for (unsigned edits = 1 + random() % 2; edits > 0 && !content.empty(); --edits) {
+            const std::size_t at = random() % content.size();
+            switch (random() % 4) {
+            case 0:
+                content[at] = static_cast<char>(random());
+                break;
+            case 1:
+                content.erase(at, random() % 8 == 0 ? std::string::npos : 1 + random() % 8);
+                break;
+            case 2:
+                content.insert(at, content.substr(random() % content.size(), random() % 16));
+                break;
+            case 3:
+                content[at] = "0123456789-+.e/ \n\\#"[random() % 19];
+                break;
+            }
+        }
+        ASSERT_EQ(ftruncate(memory, 0), 0);
+        ASSERT_EQ(pwrite(memory, content.data(), content.size(), 0), static_cast<ssize_t>(content.size()));
+        try {
+            TriangleMesh mesh = load_mesh(folder.path() / name, {random() % 2 == 0});
+            const bool in_limits = // which the scene's loader sees to
+                std::ranges::all_of(mesh.positions, [](const glm::vec3 &p) { return glm::length(p) < 1e9f; }) &&
+                std::ranges::all_of(mesh.texcoords, [](const glm::vec2 &p) { return glm::length(p) < 1e9f; });
+            if (in_limits) {
+                EXPECT_EQ(validated(std::move(mesh)), "");
+            }
+            ++loaded;
+        } catch (const MeshError &) {
+            ++refused;
+        }
+    }
+    close(memory);
+    EXPECT_GT(loaded, 200);
+    EXPECT_GT(refused, 200);
+}

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Starts the arhost of this build in a scratch folder, and looks at what it does.
+#pragma once
+
+#include "plugin_under_test.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace arhost::test {
+
+inline std::string read_file(const std::filesystem::path &file) {
+    std::ifstream stream(file, std::ios::binary);
+    std::ostringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+class ArhostRun {
+public:
+    // The configuration is written to run.yaml in the scratch folder, where arhost also runs.
+    explicit ArhostRun(const std::string &yaml = "") {
+        if (!yaml.empty())
+            write("run.yaml", yaml);
+    }
+    ~ArhostRun() {
+        if (pid_ > 0) {
+            ::kill(pid_, SIGKILL);
+            ::waitpid(pid_, nullptr, 0);
+        }
+    }
+
+    std::filesystem::path path(const std::string &name) const { return folder_.path() / name; }
+    void write(const std::string &name, const std::string &text) const {
+        std::filesystem::create_directories(path(name).parent_path());
+        std::ofstream(path(name), std::ios::binary) << text;
+    }
+    std::string read(const std::string &name) const { return read_file(path(name)); }
+    bool exists(const std::string &name) const { return std::filesystem::exists(path(name)); }
+    nlohmann::json stats() const { return nlohmann::json::parse(read("stats.json")); }
+
+    // Starts `arhost ARGUMENTS`; output() and wait() follow.
+    void start(std::vector<std::string> arguments = {"--config", "run.yaml"}) {
+        pid_ = ::fork();
+        if (pid_ == 0) {
+            if (::chdir(folder_.path().c_str()) != 0)
+                ::_exit(126);
+            const int out = ::open("output.txt", O_CREAT | O_WRONLY | O_TRUNC | O_APPEND, 0644);
+            ::dup2(out, STDOUT_FILENO);
+            ::dup2(out, STDERR_FILENO);
+            ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
+            arguments.insert(arguments.begin(), ARHOST_BINARY_DIRECTORY "/bin/arhost");
+            std::vector<char *> argv;
+            for (std::string &argument : arguments)
+                argv.push_back(argument.data());
+            argv.push_back(nullptr);
+            ::execv(argv[0], argv.data());
+            ::_exit(127);
+        }
+    }
+    // The exit status, 128 + the signal that killed it, or -1 after `limit`.
+    int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
+        const auto end = std::chrono::steady_clock::now() + limit;
+        while (std::chrono::steady_clock::now() < end) {
+            int status = 0;
+            if (::waitpid(pid_, &status, WNOHANG) == pid_) {
+                pid_ = 0;
+                return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+            }
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        return -1;
+    }
+    int run(std::vector<std::string> arguments = {"--config", "run.yaml"}) {
+        start(std::move(arguments));
+        return wait();
+    }
+    bool running() const {
+        siginfo_t info{};
+        return pid_ > 0 && ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+               info.si_pid == 0;
+    }
+    std::string output() const { return read("output.txt"); }
+    pid_t pid() const { return pid_; }
+
+    // The worker that serves this plugin now (its process bears the plugin's id); 0 where there is none.
+    pid_t worker(const std::string &plugin) const {
+        for (const pid_t launcher : children(pid_))
+            for (const pid_t candidate : children(launcher))
+                if (name_of(candidate) == plugin.substr(0, 15))
+                    return candidate;
+        return 0;
+    }
+    std::vector<pid_t> workers() const {
+        std::vector<pid_t> all;
+        for (const pid_t launcher : children(pid_))
+            for (const pid_t worker : children(launcher))
+                all.push_back(worker);
+        return all;
+    }
+
+private:
+    static std::vector<pid_t> children(pid_t pid) {
+        std::ifstream list("/proc/" + std::to_string(pid) + "/task/" + std::to_string(pid) + "/children");
+        std::vector<pid_t> found;
+        for (pid_t child; list >> child;)
+            found.push_back(child);
+        return found;
+    }
+    static std::string name_of(pid_t pid) {
+        std::string name = read_file("/proc/" + std::to_string(pid) + "/comm");
+        if (!name.empty())
+            name.pop_back();
+        return name;
+    }
+
+    ScratchFolder folder_;
+    pid_t pid_ = 0;
+};
+
+// A configuration of the counting plugins; every frame's journey can be read off counted.txt.
+inline std::string counting(const std::string &mode, const std::string &source, const std::string &tracker,
+                            const std::string &raytracer, const std::string &more = "") {
+    return "version: 1\nmode: " + mode + "\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
+           "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}], options: {" + tracker + "}, deadline_ms: 700}\n" +
+           "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + raytracer + "}, deadline_ms: 700}\n" +
+           "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" + more;
+}
+inline const char *const small_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 0.5}}\n"
+                                       "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n";
+
+struct CountedLine {
+    std::uint64_t sequence, video;
+    std::string overlay;
+    int kind;
+};
+inline std::vector<CountedLine> counted(const ArhostRun &run) {
+    std::istringstream text(run.read("counted.txt"));
+    std::vector<CountedLine> lines;
+    for (CountedLine line; text >> line.sequence >> line.video >> line.overlay >> line.kind;)
+        lines.push_back(line);
+    return lines;
+}
+
+} // namespace arhost::test

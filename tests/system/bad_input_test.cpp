@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Bad input gets one clear message that names the place and the mend, status 2, and no output file.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace {
+
+const std::string good = counting("lockstep", "frames: 5", "", "");
+
+std::string replaced(std::string text, const std::string &from, const std::string &to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+}
+
+struct Case {
+    const char *name;
+    std::string yaml, scene;
+    std::vector<std::string> expected; // parts of the message
+};
+
+const std::vector<Case> cases = {
+    {"Syntax", "version: 1\nsource: [plugin\n", small_scene, {"run.yaml:", "YAML syntax"}},
+    {"UnknownKey", replaced(good, "deadline_ms", "deadlinems"), small_scene, {"run.yaml:4:", "tracker.deadlinems", "did you mean 'deadline_ms'"}},
+    {"DuplicateKey", good + "mode: live\n", small_scene, {"run.yaml:8:", "mode", "twice"}},
+    {"WrongType", replaced(good, "side_mm: 80", "side_mm: wide"), small_scene, {"run.yaml:4:", "tracker.markers[0].side_mm", "must be a number, is 'wide'"}},
+    {"MarkerTwice", replaced(good, "[{id: 3, side_mm: 80}]", "[{id: 3, side_mm: 80}, {id: 3, side_mm: 60}]"), small_scene, {"run.yaml:4:", "listed twice"}},
+    {"NoVersion", replaced(good, "version: 1\n", ""), small_scene, {"run.yaml:1:", "'version' is missing"}},
+    {"WrongVersion", replaced(good, "version: 1\n", "version: 2\n"), small_scene, {"run.yaml:1:10", "must be 1"}},
+    {"WrongMode", replaced(good, "lockstep", "lockstp"), small_scene, {"run.yaml:2:7", "did you mean 'lockstep'"}},
+    {"UnknownPlugin", replaced(good, "tracker_counter", "tracker_conter"), small_scene, {"run.yaml:4:", "there is no plugin 'tracker_conter'", "did you mean 'tracker_counter'"}},
+    {"PluginOfAnotherKind", replaced(good, "tracker_counter", "rt_counter"), small_scene, {"run.yaml:4:", "'rt_counter' is a raytracer, not a tracker"}},
+    {"UnknownOption", replaced(good, "frames: 5", "frame: 5"), small_scene, {"run.yaml:3:", "source.options.frame", "did you mean 'frames'"}},
+    {"OptionOfWrongType", replaced(good, "frames: 5", "frames: many"), small_scene, {"run.yaml:3:", "source.options.frames", "whole number"}},
+    {"OptionOutOfRange", replaced(good, "frames: 5", "width: 0"), small_scene, {"run.yaml:3:", "source.options.width", "must be 1 to 4096, is 0"}},
+    {"OptionMissing", replaced(good, ", path: counted.txt", ""), small_scene, {"run.yaml:6:", "sink_counter needs 'path'"}},
+    {"PathForAPluginWithoutOne", replaced(good, "source_counter,", "source_counter, path: x,"), small_scene, {"run.yaml:3:", "source_counter takes no path"}},
+    {"PluginRefuses", replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"), small_scene, {"run.yaml:5:", "raytracer", "refused, as the option 'refuse' asks"}},
+    {"NoPlugin", replaced(good, "rt_counter", "no_plugin"), small_scene, {"no_plugin.so", "exports no symbol 'arhost_entry'"}},
+    {"AbiVersion", replaced(good, "rt_counter", "broken_version"), small_scene, {"broken_version.so", "chose ABI version 77"}},
+    {"AbiAnswer", replaced(good, "rt_counter", "broken_answer"), small_scene, {"broken_answer.so", "no (whole) arhost_plugin"}},
+    {"AbiShort", replaced(good, "rt_counter", "broken_short"), small_scene, {"broken_short.so", "too short"}},
+    {"CrashOnLoad", replaced(good, "rt_counter", "broken_constructor"), small_scene, {"broken_constructor.so", "signal 11", "while its library was loaded"}},
+    {"PluginThatIsNoLibrary", replaced(good, "rt_counter", "./run.yaml.so"), small_scene, {"run.yaml:5:", "there is no plugin"}},
+    {"NoSceneFile", replaced(good, "scene.yaml", "none.yaml"), small_scene, {"run.yaml:5:", "there is no scene file"}},
+    {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
+    {"SceneWithMissingMesh", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: none.obj"), {"scene.yaml:4:", "none.obj"}},
+    {"SceneWithNanVertex", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: nan.obj"), {"scene.yaml:4:", "nan.obj", ":2"}},
+    {"SceneWithIndexOutOfRange", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: index.obj"), {"scene.yaml:4:", "index.obj", ":4"}},
+    {"SceneWithoutTriangles", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: empty.obj"), {"scene.yaml:4:", "empty.obj", "no triangles"}},
+    {"CalibrationForAnotherSize", good + "camera: {width: 640, height: 480, fx: 600}\n", small_scene, {"run.yaml:8:", "640", "480", "64", "48"}},
+    {"CalibrationMissing", good + "camera: {file: none.yaml}\n", small_scene, {"run.yaml:8:", "camera.file", "none.yaml does not exist"}},
+    {"ZeroAxis", good + "coordinates: {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [0, 0, 0]}]}\n", small_scene, {"run.yaml:8:", "coordinates.rotations[0].axis"}},
+};
+
+void PrintTo(const Case &c, std::ostream *stream) { *stream << c.name; }
+
+class BadInput : public testing::TestWithParam<Case> {};
+
+} // namespace
+
+TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
+    ArhostRun run(GetParam().yaml);
+    run.write("scene.yaml", GetParam().scene);
+    run.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+    run.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    run.write("empty.obj", "v 0 0 0\n");
+    EXPECT_EQ(run.run(), 2) << run.output();
+    const std::string output = run.output();
+    for (const std::string &part : GetParam().expected)
+        EXPECT_THAT(output, HasSubstr(part));
+    EXPECT_THAT(output, Not(HasSubstr("terminate called")));
+    EXPECT_THAT(output, Not(HasSubstr("what():")));
+    EXPECT_FALSE(run.exists("counted.txt")) << "half-written output";
+    EXPECT_FALSE(run.exists("stats.json"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, BadInput, testing::ValuesIn(cases), [](const auto &info) { return info.param.name; });
+
+TEST(BadCommandLine, IsRefused) {
+    ArhostRun run(good);
+    run.write("scene.yaml", small_scene);
+    struct {
+        std::vector<std::string> arguments;
+        const char *expected;
+    } const lines[] = {
+        {{"--config", "none.yaml"}, "none.yaml: can't be read: No such file or directory"},
+        {{"--config", "."}, "is a folder"},
+        {{"--config", "run.yaml", "--set", "mode"}, "key.path=value"},
+        {{"--config", "run.yaml", "--set", "mode=fast"}, "--set: mode: 'fast' is not one of lockstep, live"},
+        {{"--config", "run.yaml", "--set", "nonsense=1"}, "nonsense: unknown key"},
+        {{"--config", "run.yaml", "--ar", "1", "--rt", "2", "--g1", "90"}, "axis"},
+        {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 needs --g1"},
+        {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
+    };
+    for (const auto &line : lines) {
+        EXPECT_EQ(run.run(line.arguments), 2);
+        EXPECT_THAT(run.output(), HasSubstr(line.expected));
+    }
+}

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Mode live: the newest frame wins, and the video never waits for a backend.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+// Ascending, each overlay from its own frame's pose.
+void expect_own_overlays_in_order(const std::vector<CountedLine> &lines) {
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        ASSERT_EQ(lines[i].video, lines[i].sequence);
+        if (i > 0) {
+            ASSERT_GT(lines[i].sequence, lines[i - 1].sequence);
+        }
+        if (lines[i].overlay != "none") {
+            ASSERT_EQ(lines[i].overlay, std::to_string(lines[i].sequence)) << "the overlay is another frame's";
+        }
+    }
+}
+
+} // namespace
+
+TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
+    ArhostRun run(counting("live", "frames: 60", "", "delay_ms: 100"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto lines = counted(run);
+    expect_own_overlays_in_order(lines);
+    const auto stats = run.stats();
+    EXPECT_EQ(stats["frames"]["in"], 60);
+    // 100 ms a frame at 30 fps: two of three frames are dropped, however fast the machine is.
+    EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
+    std::uint64_t dropped = 0;
+    for (const auto &[stage, count] : stats["frames"]["dropped"].items())
+        dropped += count.get<std::uint64_t>();
+    EXPECT_EQ(dropped + lines.size(), 60u) << "each frame is shown or counted where it was dropped\n" << stats.dump(1);
+    for (const auto &line : lines)
+        EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
+}
+
+TEST(Live, TheVideoGoesOnWhileABackendHangs) {
+    ArhostRun run(counting("live", "frames: 90", "", "hang_at: 20", "live: {max_latency_ms: 150}\n"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto lines = counted(run);
+    expect_own_overlays_in_order(lines);
+    const auto plain = std::count_if(lines.begin(), lines.end(), [](const auto &line) { return line.overlay == "none"; });
+    EXPECT_GE(plain, 5) << "the plain video was to go on until the deadline";
+    EXPECT_NE(lines.back().overlay, "none") << "the overlay was to come back";
+    EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
+}
+
+TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
+    ArhostRun run(counting("live", "frames: 90", "", "", "restart: {proven_after_frames: 100000, first_delay_ms: 600}\n"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    while (run.running() && counted(run).size() < 15)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(run.worker("tracker_counter"), SIGKILL);
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    const auto lines = counted(run);
+    expect_own_overlays_in_order(lines);
+    EXPECT_GE(std::count_if(lines.begin(), lines.end(), [](const auto &line) { return line.overlay == "none"; }), 8);
+    EXPECT_NE(lines.back().overlay, "none");
+}
+
+TEST(Live, ASlowOutputDropsItsOwnFramesOnly) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_counter, options: {frames: 60}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: slow.txt, options: {delay_ms: 120}}\n"
+                  "stats: stats.json\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto stats = run.stats();
+    EXPECT_GE(stats["frames"]["dropped"]["sink_counter#1"], 20);
+    EXPECT_GE(counted(run).size(), 40u);
+}

@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Speaks a version that nobody offers. */
+#include <arhost/arhost.h>
+
+static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    (void)offer;
+    answer->abi_version = 77;
+    return ARHOST_OK;
+}
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A ray tracer in plain C, against the C headers alone: a square of 16 px in the top left corner whose
+ * colour is the number of the frame, taken from the camera's distance: R and G the low and high byte.
+ */
+#include <arhost/arhost.h>
+
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+struct arhost_instance {
+    const arhost_host *host;
+    int64_t crash_at, hang_at, error_at;
+    double delay_ms;
+};
+
+static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
+                            arhost_instance **instance) {
+    arhost_instance *self = calloc(1, sizeof *self);
+    uint32_t i;
+    if (!self)
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    self->host = host;
+    for (i = 0; i < option_count; ++i) {
+        if (!strcmp(options[i].key, "crash_at"))
+            self->crash_at = options[i].integer;
+        else if (!strcmp(options[i].key, "hang_at"))
+            self->hang_at = options[i].integer;
+        else if (!strcmp(options[i].key, "error_at"))
+            self->error_at = options[i].integer;
+        else if (!strcmp(options[i].key, "delay_ms"))
+            self->delay_ms = options[i].real;
+        else if (!strcmp(options[i].key, "refuse") && options[i].integer) {
+            host->log(host, ARHOST_ERROR, "refused, as the option 'refuse' asks");
+            free(self);
+            return ARHOST_ERROR_CONFIGURATION;
+        } else if (!strcmp(options[i].key, "crash_in_create") && options[i].integer) {
+            signal(SIGSEGV, SIG_DFL);
+            raise(SIGSEGV);
+        }
+    }
+    *instance = self;
+    return ARHOST_OK;
+}
+
+static void destroy(arhost_instance *self) { free(self); }
+static const void *get_extension(const char *id) { return (void)id, (const void *)0; }
+
+static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
+    (void)self;
+    return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_OK : ARHOST_ERROR_INVALID_ARGUMENT;
+}
+
+static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
+                            arhost_render_info *info) {
+    const int64_t number = (int64_t)(request->camera.eye[2] - 500.0 + 0.5);
+    uint32_t x, y;
+    if (number == self->crash_at) {
+        signal(SIGSEGV, SIG_DFL);
+        raise(SIGSEGV);
+    }
+    while (number == self->hang_at)
+        pause();
+    if (number == self->error_at)
+        return ARHOST_ERROR_INTERNAL;
+    if (self->delay_ms > 0) {
+        struct timespec time = {0, 0};
+        time.tv_sec = (time_t)(self->delay_ms / 1000.0);
+        time.tv_nsec = (long)((self->delay_ms - 1000.0 * (double)time.tv_sec) * 1e6);
+        nanosleep(&time, NULL);
+    }
+    for (y = 0; y < image->height; ++y)
+        for (x = 0; x < image->width; ++x) {
+            uint8_t *pixel = image->rgba + (size_t)y * image->stride + 4 * (size_t)x;
+            pixel[0] = (uint8_t)number;
+            pixel[1] = (uint8_t)(number >> 8);
+            pixel[2] = 170;
+            pixel[3] = x < 16 && y < 16 ? 255 : 0;
+        }
+    info->has_region = 1;
+    info->region_width = info->region_height = 16;
+    return ARHOST_OK;
+}
+
+static void stop(arhost_instance *self) { (void)self; }
+
+static const arhost_option_descriptor options[] = {
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Dies at this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL, "Never returns from this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL, "Returns an error for this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL, "Sleeps so long in each frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL, "Dies in create"},
+};
+static const arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_RAYTRACER, "rt_counter", "Counter", "0.1.0",
+                                             "arhost", "Apache-2.0", "Draws a frame's number, for tests.",
+                                             ARHOST_TRACES_LENS, sizeof options / sizeof *options, options, NULL};
+static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+
+static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    const uint32_t spoken = ARHOST_ABI_VERSION;
+    if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
+        return ARHOST_ERROR_UNSUPPORTED;
+    answer->abi_version = spoken;
+    answer->plugin = &plugin;
+    return ARHOST_OK;
+}
+
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

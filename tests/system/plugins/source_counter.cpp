@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Frames whose every pixel is its own number: B and G the low and high byte, R 85.
+#include "faults.hpp"
+
+namespace {
+
+using namespace arhost;
+
+class Counter {
+public:
+    Counter(const Host &host, const Options &options)
+        : host_(host), faults_(options), frames_(static_cast<std::uint64_t>(options.integer("frames"))),
+          width_(static_cast<std::uint32_t>(options.integer("width"))),
+          height_(static_cast<std::uint32_t>(options.integer("height"))) {}
+
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        fps_ = setup.fps > 0 ? setup.fps : 30;
+        paced_ = setup.paced;
+        first_ = setup.first_sequence;
+        begin_ = std::chrono::steady_clock::now();
+        arhost_frame_format &format = properties.format;
+        format.pixel_format = ARHOST_BGR8;
+        format.width = width_;
+        format.height = height_;
+        format.fps = fps_;
+        arhost_frame_layout(&format);
+        properties.frame_count = frames_;
+        if (setup.intrinsics)
+            return;
+        properties.has_intrinsics = 1;
+        properties.intrinsics.width = width_;
+        properties.intrinsics.height = height_;
+        properties.intrinsics.fx = properties.intrinsics.fy = width_;
+        properties.intrinsics.cx = 0.5 * (width_ - 1);
+        properties.intrinsics.cy = 0.5 * (height_ - 1);
+        properties.intrinsics.distortion = ARHOST_DISTORTION_NONE;
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        if (buffer.sequence >= frames_)
+            return ARHOST_END;
+        faults_.at(buffer.sequence);
+        if (paced_)
+            std::this_thread::sleep_until(begin_ + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                                       std::chrono::duration<double>(static_cast<double>(buffer.sequence - first_) / fps_)));
+        for (std::uint32_t y = 0; y < height_; ++y)
+            for (std::uint32_t x = 0; x < width_; ++x) {
+                std::uint8_t *pixel = buffer.plane[0] + y * buffer.format->stride[0] + 3 * x;
+                pixel[0] = static_cast<std::uint8_t>(buffer.sequence);
+                pixel[1] = static_cast<std::uint8_t>(buffer.sequence >> 8);
+                pixel[2] = 85;
+            }
+        info.clock = ARHOST_CLOCK_MEDIA;
+        info.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(buffer.sequence) / fps_);
+        return ARHOST_OK;
+    }
+
+private:
+    Host host_;
+    test::Faults faults_;
+    std::uint64_t frames_, first_ = 0;
+    std::uint32_t width_, height_;
+    double fps_ = 30;
+    bool paced_ = false;
+    std::chrono::steady_clock::time_point begin_;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INTEGER, "frames", "100", "How many frames"),
+    option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096), option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
+    ARHOST_FAULT_OPTIONS};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_SOURCE, "source_counter", "Counter", "0.1.0",
+                                          "arhost", "Apache-2.0", "Numbered frames, for tests.", ARHOST_CAN_SEEK,
+                                          std::size(options), options, nullptr};
+
+} // namespace
+
+ARHOST_SOURCE(Counter, descriptor)

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Reads the number out of the frame, refuses one that is not its own, and reports one marker that lies
+// so many mm away.
+#include "faults.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace {
+
+using namespace arhost;
+
+class Counter {
+public:
+    Counter(const Host &, const Options &options)
+        : faults_(options), lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
+          nan_at_(options.integer("nan_at")) {}
+
+    void start(const arhost_tracker_setup &setup) { id_ = setup.markers[0].id; }
+
+    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+        const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
+        if (number != frame.sequence)
+            throw Failure(ARHOST_ERROR_INTERNAL, "the frame is not its own");
+        faults_.at(number);
+        const auto signed_number = static_cast<std::int64_t>(number);
+        if (signed_number >= lost_from_ && signed_number < lost_to_)
+            return;
+        result.marker_count = 1;
+        arhost_marker &marker = result.markers[0];
+        marker.struct_size = sizeof marker;
+        marker.id = id_;
+        std::strcpy(marker.family, "counter");
+        marker.state = ARHOST_MARKER_DETECTED;
+        for (int i : {0, 5, 10, 15})
+            marker.mt[i] = 1;
+        marker.mt[14] = -500.0 - static_cast<double>(number);
+        if (signed_number == nan_at_)
+            marker.mt[12] = std::numeric_limits<double>::quiet_NaN();
+    }
+
+private:
+    test::Faults faults_;
+    std::int64_t lost_from_, lost_to_, nan_at_;
+    std::int32_t id_ = 0;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
+    option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
+    option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"), ARHOST_FAULT_OPTIONS};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_TRACKER, "tracker_counter", "Counter", "0.1.0",
+                                          "arhost", "Apache-2.0", "Tracks numbered frames, for tests.", 0,
+                                          std::size(options), options, nullptr};
+
+} // namespace
+
+ARHOST_TRACKER(Counter, descriptor)

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The real plugins on a real camera sequence: tag36h11 board, 40 frames (shared/data/markers/rbt_sequence).
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <map>
+
+using namespace arhost::test;
+
+namespace {
+
+std::string configuration(const std::string &tracker, const std::string &more = "") {
+    std::string markers;
+    for (int id = 0; id < 20; ++id)
+        markers += (id ? ", " : "") + ("{id: " + std::to_string(id) + ", side_mm: 95.5}");
+    return "version: 1\nsource: {plugin: source_file, path: \"" + shared_data("markers/rbt_sequence").string() +
+           "/color_image_%04d.png\", fps: 30}\n"
+           "camera: {width: 640, height: 480, fx: 607.178466796875, fy: 607.2342529296875, cx: 321.39129638671875, cy: 241.91822814941406}\n"
+           "tracker:\n  plugin: " + tracker + "\n  markers: [" + markers + "]\n"
+           "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml}\n"
+           "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n"
+           "stats: stats.json\n" + more;
+}
+
+const char *const aruco = "tracker_aruco\n  options: {dictionary: DICT_APRILTAG_36h11}";
+const char *const apriltag = "tracker_apriltag\n  options: {family: tag36h11}";
+
+void expect_same_results(const ArhostRun &a, const ArhostRun &b) {
+    EXPECT_EQ(a.read("poses.jsonl"), b.read("poses.jsonl"));
+    for (int frame = 0; frame < 40; ++frame) {
+        char name[32];
+        std::snprintf(name, sizeof name, "frames/%04d.png", frame);
+        ASSERT_TRUE(a.exists(name)) << name;
+        ASSERT_EQ(a.read(name), b.read(name)) << name;
+    }
+}
+
+} // namespace
+
+TEST(RealFrames, BothTrackersAugmentEveryFrame) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
+    for (const char *tracker : {aruco, apriltag}) {
+        ArhostRun run(configuration(tracker));
+        ASSERT_EQ(run.run(), 0) << run.output();
+        EXPECT_EQ(run.stats()["frames"]["augmented"], 40);
+        std::istringstream lines(run.read("poses.jsonl"));
+        std::uint64_t frame = 0;
+        for (std::string line; std::getline(lines, line); ++frame) {
+            const auto record = nlohmann::json::parse(line);
+            EXPECT_EQ(record["frame"], frame);
+            EXPECT_EQ(record["clock"], "media");
+            EXPECT_GE(record["markers"].size(), 1u);
+            EXPECT_EQ(record["markers"][0]["family"], "tag36h11");
+            EXPECT_EQ(record["camera"]["eye"].size(), 3u);
+        }
+        EXPECT_EQ(frame, 40u);
+    }
+}
+
+TEST(RealFrames, TwoRunsGiveTheSameBytes) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
+    ArhostRun first(configuration(apriltag)), second(configuration(apriltag));
+    ASSERT_EQ(first.run(), 0) << first.output();
+    ASSERT_EQ(second.run(), 0) << second.output();
+    expect_same_results(first, second);
+}
+
+TEST(RealFrames, ARunInWhichEveryWorkerIsKilledGivesTheSameBytes) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
+    ArhostRun clean(configuration(aruco)), killed(configuration(aruco));
+    ASSERT_EQ(clean.run(), 0) << clean.output();
+    killed.start();
+    int frame = 3;
+    for (const char *plugin : {"source_file", "tracker_aruco", "rt_embree", "sink_poses", "sink_images"}) {
+        char name[32];
+        std::snprintf(name, sizeof name, "frames/%04d.png", frame += 4);
+        while (killed.running() && !killed.exists(name))
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        const pid_t worker = killed.worker(plugin);
+        ASSERT_NE(worker, 0) << plugin << "\n" << killed.output();
+        ::kill(worker, SIGKILL);
+    }
+    ASSERT_EQ(killed.wait(), 0) << killed.output();
+    expect_same_results(clean, killed);
+    for (const char *component : {"source", "tracker", "raytracer", "sink_poses", "sink_images"})
+        EXPECT_EQ(killed.stats()["restarts"][component], 1) << component << "\n" << killed.output();
+}

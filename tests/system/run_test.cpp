@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A run from its start to its end, in lockstep.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+void expect_every_frame_augmented(const ArhostRun &run, std::uint64_t frames) {
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), frames);
+    for (std::uint64_t i = 0; i < frames; ++i) {
+        EXPECT_EQ(lines[i].sequence, i);
+        EXPECT_EQ(lines[i].video, i);
+        EXPECT_EQ(lines[i].overlay, std::to_string(i)) << "the overlay belongs to another frame";
+    }
+}
+
+} // namespace
+
+TEST(Run, TakesEveryFrameThroughAllStagesInOrder) {
+    ArhostRun run(counting("lockstep", "frames: 300", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_every_frame_augmented(run, 300);
+    const auto stats = run.stats();
+    EXPECT_EQ(stats["frames"]["in"], 300);
+    EXPECT_EQ(stats["frames"]["tracked"], 300);
+    EXPECT_EQ(stats["frames"]["composited"], 300);
+    EXPECT_EQ(stats["stages"]["raytracer"]["count"], 300);
+    EXPECT_EQ(stats["restarts"]["tracker"], 0);
+    EXPECT_GT(stats["cpu_seconds"]["host"], 0.0);
+    EXPECT_GT(stats["fps"], 0.0);
+}
+
+TEST(Run, StopsAfterTheFramesThatAreAskedFor) {
+    ArhostRun run(counting("lockstep", "frames: 300", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--frames", "7"}), 0) << run.output();
+    expect_every_frame_augmented(run, 7);
+}
+
+TEST(Run, TakesValuesFromTheCommandLine) {
+    ArhostRun run(counting("lockstep", "frames: 300", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "source.options.frames=4", "--set", "outputs[0].path=other.txt"}), 0)
+        << run.output();
+    EXPECT_TRUE(run.exists("other.txt"));
+    EXPECT_FALSE(run.exists("counted.txt"));
+}
+
+TEST(Run, PassesTheVideoOnWhileNoMarkerIsInView) {
+    ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 10, lost_to: 20", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 30u);
+    for (std::uint64_t i = 0; i < 30; ++i)
+        EXPECT_EQ(lines[i].overlay, i >= 10 && i < 20 ? "none" : std::to_string(i));
+}
+
+TEST(Run, HoldsTheLastPoseForTheGraceThatIsConfigured) {
+    ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 10, lost_to: 20", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.hold_frames=4"}), 0) << run.output();
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 30u);
+    EXPECT_EQ(lines[13].overlay, "9"); // held
+    EXPECT_EQ(lines[13].kind, 2);
+    EXPECT_EQ(lines[14].overlay, "none");
+}
+
+TEST(Run, GoesOnWithoutTrackerAndRayTracer) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
+                  "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(counted(run).size(), 5u);
+}
+
+TEST(Run, FeedsSeveralOutputs) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, options: {delay_ms: 1}}\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(counted(run).size(), 50u);
+    EXPECT_EQ(run.read("counted.txt"), run.read("second.txt"));
+}
+
+TEST(Run, FinishesItsFilesOnCtrlCAndExitsWith130) {
+    for (const int signal : {SIGINT, SIGTERM}) {
+        ArhostRun run(counting("lockstep", "frames: 100000", "", "delay_ms: 1"));
+        run.write("scene.yaml", small_scene);
+        run.start();
+        while (run.running() && counted(run).size() < 20)
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        ::kill(run.pid(), signal);
+        ASSERT_EQ(run.wait(), 130) << run.output();
+        const auto lines = counted(run);
+        expect_every_frame_augmented(run, lines.size());
+        EXPECT_EQ(run.stats()["frames"]["composited"], lines.size());
+    }
+}
+
+TEST(Run, LeavesNoProcessBehindWhenItIsKilled) {
+    ArhostRun run(counting("lockstep", "frames: 100000", "", "delay_ms: 1"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    while (run.running() && counted(run).size() < 5)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const std::vector<pid_t> workers = run.workers();
+    ASSERT_EQ(workers.size(), 4u);
+    ::kill(run.pid(), SIGKILL);
+    EXPECT_EQ(run.wait(), 128 + SIGKILL);
+    for (const pid_t worker : workers) {
+        for (int i = 0; i < 1000 && ::kill(worker, 0) == 0; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        EXPECT_NE(::kill(worker, 0), 0) << "a worker outlived its host";
+    }
+}
+
+TEST(Run, ShowsItsProgressInPlainLinesWhereThereIsNoTerminal) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0);
+    EXPECT_THAT(run.output(), HasSubstr("frame 5/5"));
+    EXPECT_THAT(run.output(), testing::Not(HasSubstr("\033")));
+}
+
+TEST(CommandLine, TellsVersionHelpAndPlugins) {
+    ArhostRun run;
+    EXPECT_EQ(run.run({"--version"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("arhost 0."));
+    EXPECT_EQ(run.run({"--help"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("--config"));
+    EXPECT_EQ(run.run({"plugins", "--options"}), 1) << "broken ones are among the test plugins";
+    EXPECT_THAT(run.output(), HasSubstr("rt_counter"));
+    EXPECT_THAT(run.output(), HasSubstr("delay_ms"));
+    EXPECT_THAT(run.output(), HasSubstr("broken_version     can't be used: "));
+    EXPECT_THAT(run.output(), HasSubstr("no_plugin          can't be used: "));
+    EXPECT_THAT(run.output(), HasSubstr("while its library was loaded"));
+    EXPECT_EQ(run.run({}), 2);
+    EXPECT_EQ(run.run({"--nonsense"}), 2);
+}
+
+TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml: fine"));
+    EXPECT_FALSE(run.exists("counted.txt"));
+}

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Plugins that die, hang and err; the video goes on.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+void expect_all_frames_in_order(const ArhostRun &run, std::uint64_t frames) {
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), frames) << run.output();
+    for (std::uint64_t i = 0; i < frames; ++i) {
+        ASSERT_EQ(lines[i].sequence, i);
+        ASSERT_EQ(lines[i].video, i);
+        if (lines[i].overlay != "none") {
+            ASSERT_EQ(lines[i].overlay, std::to_string(i)) << "the overlay belongs to another frame";
+        }
+    }
+}
+
+// Waits until so many frames have been written.
+void wait_for_frames(const ArhostRun &run, std::size_t frames) {
+    while (run.running() && counted(run).size() < frames)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
+
+} // namespace
+
+TEST(Supervision, APluginThatDiesOnAFrameIsTriedOnceMoreAndThenPassedBy) {
+    struct Case {
+        const char *tracker, *raytracer, *component;
+    };
+    for (const Case &c : {Case{"crash_at: 20", "", "tracker"}, Case{"", "crash_at: 20", "raytracer"}}) {
+        ArhostRun run(counting("lockstep", "frames: 60", c.tracker, c.raytracer));
+        run.write("scene.yaml", small_scene);
+        ASSERT_EQ(run.run(), 0) << run.output();
+        expect_all_frames_in_order(run, 60);
+        const auto lines = counted(run);
+        for (std::uint64_t i = 0; i < 60; ++i)
+            EXPECT_EQ(lines[i].overlay == "none", i == 20) << i;
+        const auto stats = run.stats();
+        EXPECT_EQ(stats["restarts"][c.component], 2);
+        EXPECT_EQ(stats["frames"]["passed_unaugmented"][c.component], 1);
+        ASSERT_EQ(stats["crashes"].size(), 2u);
+        EXPECT_EQ(stats["crashes"][0]["component"], c.component);
+        EXPECT_EQ(stats["crashes"][0]["frame"], 20);
+        EXPECT_THAT(stats["crashes"][0]["how"].get<std::string>(), HasSubstr("signal 11"));
+        EXPECT_THAT(stats["crashes"][0]["how"].get<std::string>(), HasSubstr("in its per-frame call"));
+    }
+}
+
+TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
+    ArhostRun run(counting("lockstep", "frames: 40", "", "hang_at: 20"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 40);
+    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within 700 ms"));
+    EXPECT_EQ(counted(run)[20].overlay, "none");
+}
+
+TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {
+    ArhostRun run(counting("lockstep", "frames: 30", "error_at: 5", "error_at: 8"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(counted(run)[5].overlay, "none");
+    EXPECT_EQ(counted(run)[8].overlay, "none");
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+    EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
+}
+
+TEST(Supervision, ATrackerThatReportsNonsenseIsEnded) {
+    ArhostRun run(counting("lockstep", "frames: 30", "nan_at: 15", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_THAT(run.output(), HasSubstr("broke the contract"));
+    EXPECT_EQ(counted(run)[15].overlay, "none");
+}
+
+TEST(Supervision, APluginThatNeverWorksIsGivenUpAndTheRunFails) {
+    ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
+                           "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
+    EXPECT_THAT(run.output(), HasSubstr("in create"));
+    EXPECT_FALSE(run.exists("counted.txt")) << "an output was begun by a run that could not begin";
+}
+
+TEST(Supervision, TheFallbackTakesOverFromAPluginThatIsGivenUp) {
+    ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
+                           "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
+    run.write("scene.yaml", small_scene);
+    // Without its options the same plugin works.
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("falling back to rt_counter"));
+    expect_all_frames_in_order(run, 30);
+}
+
+TEST(Supervision, AnyWorkerMayBeKilledAndTheResultIsTheSame) {
+    const std::string yaml = counting("lockstep", "frames: 400, delay_ms: 1", "", "");
+    ArhostRun clean(yaml);
+    clean.write("scene.yaml", small_scene);
+    ASSERT_EQ(clean.run(), 0);
+    ArhostRun run(yaml);
+    run.write("scene.yaml", small_scene);
+    run.start();
+    std::size_t at = 0;
+    for (const char *plugin : {"source_counter", "tracker_counter", "rt_counter", "sink_counter"}) {
+        wait_for_frames(run, at += 60);
+        const pid_t worker = run.worker(plugin);
+        ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
+        ::kill(worker, SIGKILL);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
+    for (const char *component : {"source", "tracker", "raytracer", "sink_counter"})
+        EXPECT_EQ(run.stats()["restarts"][component], 1) << component;
+}
+
+TEST(Supervision, SurvivesKillsAndStopsAtRandom) {
+    constexpr std::uint64_t frames = 3000;
+    ArhostRun run(counting("lockstep", "frames: " + std::to_string(frames) + ", delay_ms: 0.5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    wait_for_frames(run, 20);
+    std::minstd_rand random(7);
+    const std::string plugins[] = {"source_counter", "tracker_counter", "rt_counter", "sink_counter"};
+    int faults = 0;
+    while (run.running()) {
+        if (const pid_t worker = run.worker(plugins[random() % 4])) {
+            if (random() % 4 == 0) {
+                ::kill(worker, SIGSTOP);
+                std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));
+                ::kill(worker, SIGCONT);
+            } else {
+                ::kill(worker, SIGKILL);
+            }
+            ++faults;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(30 + random() % 40));
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    EXPECT_GT(faults, 15);
+    expect_all_frames_in_order(run, frames);
+}
+
+TEST(Supervision, ASinkThatCanNotWriteIsGivenUpAndTheOthersGoOn) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, options: {error_at: 5}}\n");
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_EQ(counted(run).size(), 50u);
+    EXPECT_THAT(run.output(), HasSubstr("can't write frame 5"));
+}
