@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_sequence.hpp"
+
+#include "pattern.hpp"
+
+#include <opencv2/imgcodecs.hpp>
+
+#include <cctype>
+#include <cstring>
+
+namespace arhost {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string size_text(const cv::Mat &image) {
+    return std::to_string(image.cols) + "×" + std::to_string(image.rows);
+}
+
+// 16 bits are scaled down, alpha is dropped, Exif's orientation is applied.
+cv::Mat read_image(const fs::path &file, int flags) {
+    cv::Mat image;
+    std::string reason = "it is damaged, or no image of a known format";
+    try {
+        image = cv::imread(file.string(), flags);
+    } catch (const cv::Exception &error) {
+        reason = error.err;
+    }
+    if (image.empty()) {
+        std::error_code error;
+        const auto size = fs::file_size(file, error);
+        if (error)
+            reason = error.message();
+        else if (size == 0)
+            reason = "it is empty";
+        throw Failure(ARHOST_ERROR_IO, "the image " + quoted(file) + " can't be read: " + reason);
+    }
+    if (image.cols > ARHOST_MAX_IMAGE_SIDE || image.rows > ARHOST_MAX_IMAGE_SIDE)
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +
+                                                      " px: no side may be longer than " +
+                                                      std::to_string(ARHOST_MAX_IMAGE_SIDE));
+    return image;
+}
+
+} // namespace
+
+bool is_image_name(const fs::path &path) {
+    std::string extension = path.extension().string();
+    for (char &c : extension)
+        c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char *known :
+         {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm", ".pnm", ".webp"})
+        if (extension == known)
+            return true;
+    return false;
+}
+
+ImageSequence::ImageSequence(std::vector<fs::path> files)
+    : files_(std::move(files)), image_(read_image(files_.front(), cv::IMREAD_ANYCOLOR)) {}
+
+arhost_frame_format ImageSequence::format() const {
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = image_.channels() == 1 ? ARHOST_GREY8 : ARHOST_BGR8;
+    format.width = static_cast<std::uint32_t>(image_.cols);
+    format.height = static_cast<std::uint32_t>(image_.rows);
+    return format;
+}
+
+arhost_status ImageSequence::go_to(std::uint64_t index) {
+    if (index >= files_.size())
+        return ARHOST_END;
+    if (index == current_)
+        return ARHOST_OK;
+    const cv::Mat next = read_image(files_[index], image_.channels() == 1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR);
+    if (next.size() != image_.size())
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "the size changes within the sequence: " + quoted(files_[index]) +
+                                                      " is " + size_text(next) + ", but " + quoted(files_.front()) +
+                                                      " is " + size_text(image_));
+    image_ = next;
+    current_ = index;
+    return ARHOST_OK;
+}
+
+void ImageSequence::copy_to(const arhost_frame_buffer &buffer) {
+    const std::size_t row_bytes = static_cast<std::size_t>(image_.cols) * image_.elemSize();
+    for (int y = 0; y < image_.rows; ++y)
+        std::memcpy(buffer.plane[0] + static_cast<std::size_t>(y) * buffer.format->stride[0], image_.ptr(y),
+                    row_bytes);
+}
+
+std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, const Host &host) {
+    const Pattern pattern = *Pattern::parse(path);
+    const auto found = pattern.scan();
+    if (start < 0 && !found.empty())
+        start = found.begin()->first;
+    auto next = found.find(start);
+    if (next == found.end()) {
+        std::string message = "path: no file matches the pattern " + quoted(path) + ": looked for " +
+                              quoted(pattern.file(std::max<std::int64_t>(start, 0))) + " first; ";
+        if (found.empty())
+            message += describe_folder(pattern.folder());
+        else
+            message.append("there are ")
+                .append(std::to_string(found.size()))
+                .append(" from number ")
+                .append(std::to_string(found.begin()->first))
+                .append(" to ")
+                .append(std::to_string(found.rbegin()->first))
+                .append(": set the option 'start'");
+        throw Failure(ARHOST_ERROR_CONFIGURATION, message);
+    }
+    std::vector<fs::path> files;
+    std::int64_t number = start;
+    for (; next != found.end() && next->first == number; ++next, ++number)
+        files.push_back(next->second);
+    if (next != found.end())
+        host.warn(quoted(pattern.file(number)) +
+                  " is missing: the sequence ends before it, though there are files up to number " +
+                  std::to_string(found.rbegin()->first));
+    return files;
+}
+
+} // namespace arhost

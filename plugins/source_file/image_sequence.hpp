@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "reader.hpp"
+
+#include <opencv2/core/mat.hpp>
+
+#include <filesystem>
+#include <vector>
+
+namespace arhost {
+
+// Whether the file's name ends like an image's: others are left to libav.
+bool is_image_name(const std::filesystem::path &path);
+
+// One image a file. The first decides on size and on grey or colour.
+class ImageSequence final : public Reader {
+public:
+    explicit ImageSequence(std::vector<std::filesystem::path> files); // at least one
+
+    arhost_frame_format format() const override;
+    std::uint64_t frame_count() const override { return files_.size(); }
+    arhost_status go_to(std::uint64_t index) override;
+    void copy_to(const arhost_frame_buffer &buffer) override;
+
+private:
+    std::vector<std::filesystem::path> files_;
+    std::uint64_t current_ = 0;
+    cv::Mat image_; // the current one, 8-bit, 1 or 3 channels
+};
+
+// The files of a pattern ("frames/image_%04d.png") from number `start` (−1: the lowest) up to the first
+// that is missing.
+std::vector<std::filesystem::path> numbered_files(const std::filesystem::path &path, std::int64_t start,
+                                                  const Host &host);
+
+} // namespace arhost

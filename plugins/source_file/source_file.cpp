@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// source_file: frames out of videos, numbered images and single images.
+#include "image_sequence.hpp"
+#include "pattern.hpp"
+#include "video.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+namespace {
+
+namespace fs = std::filesystem;
+using arhost::Failure;
+using arhost::quoted;
+
+std::int64_t now_ns() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+class FileSource {
+public:
+    FileSource(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), path_(options.text("path")), start_(options.integer("start")), loop_(options.boolean("loop")),
+          limit_(static_cast<std::uint64_t>(options.integer("frames"))) {}
+
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        open();
+        arhost_frame_format format = reader_->format();
+        // A rate that was asked for overrides the video's own times.
+        counts_time_ = setup.fps > 0 || !reader_->media_ns();
+        fps_ = setup.fps > 0 ? setup.fps : format.fps > 0 ? format.fps : 30;
+        paced_ = setup.paced != 0;
+        format.fps = fps_;
+        format.struct_size = properties.format.struct_size;
+        arhost_frame_layout(&format);
+        if (const arhost_intrinsics *camera = setup.intrinsics;
+            camera && (camera->width != format.width || camera->height != format.height))
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          quoted(path_) + " has frames of " + std::to_string(format.width) + "×" +
+                              std::to_string(format.height) + " px, but the camera's calibration is for " +
+                              std::to_string(camera->width) + "×" + std::to_string(camera->height));
+        properties.format = format;
+        const std::uint64_t count = reader_->frame_count();
+        properties.frame_count = loop_ ? limit_ : limit_ && count ? std::min(limit_, count) : count;
+
+        if (go_to(setup.first_sequence) == ARHOST_ERROR_CANCELLED)
+            throw Failure(ARHOST_ERROR_CANCELLED, "going to frame " + std::to_string(setup.first_sequence) + " of " +
+                                                      quoted(path_) + " was cancelled");
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        std::uint64_t frame = buffer.sequence + skipped_;
+        if (const arhost_status status = go_to(frame); status != ARHOST_OK)
+            return status;
+        if (paced_)
+            if (const arhost_status status = wait_for(frame, info); status != ARHOST_OK)
+                return status;
+        reader_->copy_to(buffer);
+        info.clock = ARHOST_CLOCK_MEDIA;
+        info.capture_ns = time_ns(frame);
+        return ARHOST_OK;
+    }
+
+    void stop() { reader_.reset(); }
+
+private:
+    void open() {
+        std::error_code error;
+        const fs::file_status status = fs::status(path_, error);
+        if (fs::is_directory(status))
+            throw Failure(
+                ARHOST_ERROR_CONFIGURATION,
+                "path: " + quoted(path_) +
+                    " is a folder: give a video, an image, or numbered images as 'folder/image_%04d.png'; " +
+                    arhost::describe_folder(path_));
+        // A file may have a percent sign in its name.
+        if (!fs::exists(status) && arhost::Pattern::parse(path_)) {
+            reader_ = std::make_unique<arhost::ImageSequence>(arhost::numbered_files(path_, start_, host_));
+            return;
+        }
+        if (!fs::exists(status)) {
+            std::string why = error ? error.message() : "there is no such file";
+            if (fs::is_directory(path_.parent_path(), error))
+                why += "; " + arhost::describe_folder(path_.parent_path());
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "path: " + quoted(path_) + " can't be opened: " + why);
+        }
+        if (!fs::is_regular_file(status))
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "path: " + quoted(path_) + " is no file; a camera is read by source_v4l2");
+        if (arhost::is_image_name(path_)) {
+            reader_ = std::make_unique<arhost::ImageSequence>(std::vector{path_});
+            limit_ = loop_ ? limit_ : std::max<std::uint64_t>(limit_, 1);
+            loop_ = true; // a still picture is repeated
+        } else {
+            reader_ = std::make_unique<arhost::Video>(path_, host_);
+        }
+    }
+
+    // Makes frame `frame`, counted over all rounds of a loop, the reader's current one.
+    arhost_status go_to(std::uint64_t frame) {
+        if (limit_ && frame >= limit_)
+            return ARHOST_END;
+        for (;;) {
+            const arhost_status status = reader_->go_to(round_frames_ ? frame % round_frames_ : frame);
+            if (status != ARHOST_END || !loop_ || round_frames_)
+                return status;
+            round_frames_ = reader_->frame_count(); // only the end tells a video's true length
+            round_ns_ = reader_->end_ns();
+        }
+    }
+
+    std::int64_t time_ns(std::uint64_t frame) const {
+        if (counts_time_)
+            return std::llround(static_cast<double>(frame) * 1e9 / fps_);
+        const std::uint64_t round = round_frames_ ? frame / round_frames_ : 0;
+        return static_cast<std::int64_t>(round) * round_ns_ + *reader_->media_ns();
+    }
+
+    // Waits until `frame` is due. Where that is past already, goes on to the frame that is due now.
+    arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
+        const auto period_ns = static_cast<std::int64_t>(1e9 / fps_);
+        if (!epoch_set_) {
+            epoch_ns_ = now_ns() - time_ns(frame);
+            epoch_set_ = true;
+        }
+        if (const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame); late_ns >= period_ns) {
+            // At most a second's frames: after a long halt the time in between was not meant to be seen.
+            info.skipped = static_cast<std::uint32_t>(std::min(late_ns, std::int64_t{1'000'000'000}) / period_ns);
+            frame += info.skipped;
+            skipped_ += info.skipped;
+            if (const arhost_status status = go_to(frame); status != ARHOST_OK)
+                return status;
+            // A decoder that can't keep up plays slower, instead of skipping ever more.
+            if (now_ns() - epoch_ns_ - time_ns(frame) >= period_ns)
+                epoch_ns_ = now_ns() - time_ns(frame);
+        }
+        for (;;) {
+            const std::int64_t left_ns = epoch_ns_ + time_ns(frame) - now_ns();
+            if (left_ns <= 0)
+                return ARHOST_OK;
+            if (host_.cancelled())
+                return ARHOST_ERROR_CANCELLED;
+            std::this_thread::sleep_for(std::chrono::nanoseconds(std::min<std::int64_t>(left_ns, 20'000'000)));
+        }
+    }
+
+    arhost::Host host_;
+    fs::path path_;
+    std::int64_t start_; // −1: the lowest number
+    bool loop_;
+    std::uint64_t limit_; // frames in all; 0: no limit
+
+    std::unique_ptr<arhost::Reader> reader_;
+    bool counts_time_ = true; // frame n is at n/fps; else the reader tells
+    double fps_ = 0;
+    std::uint64_t round_frames_ = 0; // of a loop, once known
+    std::int64_t round_ns_ = 0;
+
+    bool paced_ = false, epoch_set_ = false;
+    std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
+    std::uint64_t skipped_ = 0; // frames that were not given since they would have been late
+};
+
+using arhost::option;
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INPUT_PATH, "path", nullptr,
+           "A video, an image, or numbered images as a pattern: 'frames/image_%04d.png'."),
+    option(ARHOST_OPTION_INTEGER, "start", "-1",
+           "The first number of a pattern's images; -1: the lowest that there is.", -1, 2'147'483'647),
+    option(ARHOST_OPTION_BOOL, "loop", "false", "Whether to begin again at the end."),
+    option(ARHOST_OPTION_INTEGER, "frames", "0",
+           "End after so many frames; 0: all (and 1 of a single image, which is repeated).", 0, 2'147'483'647),
+};
+
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_SOURCE,
+                                          "source_file",
+                                          "Video and image files",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Frames from a video file, from numbered images or from one image.",
+                                          ARHOST_CAN_SEEK,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
+
+} // namespace
+
+ARHOST_SOURCE(FileSource, descriptor)

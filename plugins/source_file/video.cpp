@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "video.hpp"
+
+#include "pattern.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+namespace arhost {
+
+namespace {
+
+// Memory is the one failure that is not about the file.
+int checked(int code) {
+    if (code == AVERROR(ENOMEM))
+        throw std::bad_alloc();
+    return code;
+}
+
+template <class T> T *allocated(T *pointer) {
+    if (!pointer)
+        throw std::bad_alloc();
+    return pointer;
+}
+
+} // namespace
+
+Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
+    : name_("the video " + quoted(file)), host_(host), log_(log), packet_(allocated(av_packet_alloc())),
+      frame_(allocated(av_frame_alloc())) {
+    const auto refuse = [&](const std::string &why) {
+        if (host_.cancelled())
+            return Failure(ARHOST_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
+        return Failure(ARHOST_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
+    };
+    log_.take_reason();
+
+    AVFormatContext *context = allocated(avformat_alloc_context());
+    context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
+                                   this};
+    AVDictionary *options = nullptr; // a playlist must not lead anywhere but to files
+    av_dict_set(&options, "protocol_whitelist", "file", 0);
+    // "file:" keeps libav from taking the path for a URL. It frees the context where it fails.
+    const int opened = checked(avformat_open_input(&context, ("file:" + file.string()).c_str(), nullptr, &options));
+    av_dict_free(&options);
+    if (opened < 0)
+        throw refuse(libav_error(opened));
+    file_.reset(context);
+    if (const int found = checked(avformat_find_stream_info(context, nullptr)); found < 0)
+        throw refuse(libav_error(found));
+
+    const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+    if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
+        throw refuse("it has no video stream");
+    stream_ = context->streams[index];
+    for (unsigned i = 0; i < context->nb_streams; ++i)
+        if (context->streams[i] != stream_)
+            context->streams[i]->discard = AVDISCARD_ALL;
+
+    const AVCodec *decoder = avcodec_find_decoder(stream_->codecpar->codec_id);
+    if (!decoder)
+        throw refuse(std::string("this machine's libavcodec has no decoder for '") +
+                     avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
+    codec_.reset(allocated(avcodec_alloc_context3(decoder)));
+    checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
+    codec_->pkt_timebase = stream_->time_base;
+    // Threads share a picture, never a run of pictures: so damaged data gives the same pictures each time.
+    codec_->thread_type = FF_THREAD_SLICE;
+    codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
+    if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
+        throw refuse(std::string("the decoder '") + decoder->name + "' does not start: " + libav_error(ready));
+
+    const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
+    fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;
+    period_ns_ = std::llround(1e9 / fps_);
+
+    const arhost_status first = next();
+    if (first == ARHOST_ERROR_CANCELLED)
+        throw Failure(ARHOST_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
+    if (first == ARHOST_END)
+        throw refuse("not one picture of it can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
+}
+
+arhost_status Decoder::next() {
+    while (!ended_) {
+        const int received = checked(avcodec_receive_frame(codec_.get(), frame_.get()));
+        if (received == 0) {
+            if (damage_.empty() &&
+                (lost_data_ || frame_->flags & AV_FRAME_FLAG_CORRUPT || frame_->decode_error_flags))
+                damage_ = name_ + " is damaged near frame " + std::to_string(count_) + decoder_fault_ +
+                          "; the frames from there on may look wrong";
+            lost_data_ = false;
+            ++count_;
+            take_time();
+            return ARHOST_OK;
+        }
+        if (received == AVERROR_EOF) {
+            finish();
+            break;
+        }
+        if (received != AVERROR(EAGAIN))
+            lost_data_ = true;
+        else if (const arhost_status fed = feed(); fed != ARHOST_OK)
+            return fed;
+    }
+    return ARHOST_END;
+}
+
+// Gives the decoder the next packet, or tells it that there is none.
+arhost_status Decoder::feed() {
+    if (host_.cancelled())
+        return ARHOST_ERROR_CANCELLED;
+    if (const std::string fault = log_.take_reason(); !fault.empty())
+        decoder_fault_ = fault;
+    av_packet_unref(packet_.get());
+    const int read = checked(av_read_frame(file_.get(), packet_.get()));
+    if (read == AVERROR_EXIT && host_.cancelled())
+        return ARHOST_ERROR_CANCELLED;
+    if (read < 0) {
+        read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
+        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" is in no error code
+        checked(avcodec_send_packet(codec_.get(), nullptr));
+        return ARHOST_OK;
+    }
+    if (packet_->stream_index != stream_->index)
+        return ARHOST_OK;
+    // Half a packet is left out: a picture that is half grey would pass for a real one.
+    if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
+        lost_data_ = true;
+        return ARHOST_OK;
+    }
+    ++packets_;
+    if (checked(avcodec_send_packet(codec_.get(), packet_.get())) < 0)
+        lost_data_ = true;
+    return ARHOST_OK;
+}
+
+void Decoder::take_time() {
+    const std::int64_t pts = frame_->best_effort_timestamp;
+    if (count_ == 1) {
+        first_pts_ = pts;
+        return;
+    }
+    const std::int64_t time = pts == AV_NOPTS_VALUE || first_pts_ == AV_NOPTS_VALUE
+                                  ? media_ns_ + period_ns_
+                                  : av_rescale_q(pts - first_pts_, stream_->time_base, {1, 1'000'000'000});
+    media_ns_ = std::max(time, media_ns_);
+}
+
+void Decoder::finish() {
+    ended_ = true;
+    const std::uint64_t declared = declared_count();
+    if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && packets_ >= declared)
+        return;
+    cut_short_ = name_ + " is cut short: it ends after frame " + std::to_string(count_ - 1);
+    if (declared > count_)
+        cut_short_ += " of " + std::to_string(declared);
+    cut_short_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
+}
+
+std::uint64_t Decoder::declared_count() const {
+    return stream_->nb_frames > 0 ? static_cast<std::uint64_t>(stream_->nb_frames) : 0;
+}
+
+int Decoder::quarter_turns() const {
+    std::size_t size = 0;
+#if LIBAVCODEC_VERSION_MAJOR >= 61
+    const AVPacketSideData *side = av_packet_side_data_get(
+        stream_->codecpar->coded_side_data, stream_->codecpar->nb_coded_side_data, AV_PKT_DATA_DISPLAYMATRIX);
+    const std::uint8_t *data = side ? side->data : nullptr;
+    size = side ? side->size : 0;
+#else
+    const std::uint8_t *data = av_stream_get_side_data(stream_, AV_PKT_DATA_DISPLAYMATRIX, &size);
+#endif
+    if (!data || size < 9 * sizeof(std::int32_t))
+        return 0;
+    const auto *matrix = reinterpret_cast<const std::int32_t *>(data);
+    const double clockwise = -av_display_rotation_get(matrix);
+    const double quarters = std::round(clockwise / 90);
+    const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
+    if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
+        throw Failure(ARHOST_ERROR_CONFIGURATION,
+                      name_ + " asks to be shown " + (mirrored ? "mirrored" : "at an angle") +
+                          ", which is not supported: write it out upright with ffmpeg -i … -c:v libx264 …");
+    return (static_cast<int>(quarters) + 4) % 4;
+}
+
+Video::Video(std::filesystem::path file, const Host &host) : file_(std::move(file)), host_(host), log_(host) {
+    open();
+    const AVFrame &first = decoder_->picture();
+    width_ = first.width;
+    height_ = first.height;
+    if (width_ > ARHOST_MAX_IMAGE_SIDE || height_ > ARHOST_MAX_IMAGE_SIDE)
+        throw Failure(ARHOST_ERROR_CONFIGURATION,
+                      "the video " + quoted(file_) + " is " + std::to_string(width_) + "×" + std::to_string(height_) +
+                          " px: no side may be longer than " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
+    converter_.emplace(first, decoder_->quarter_turns());
+    const AVRational aspect = first.sample_aspect_ratio;
+    if (aspect.num > 0 && aspect.num != aspect.den)
+        host_.info("the video's pixels are not square (" + std::to_string(aspect.num) + ":" +
+                   std::to_string(aspect.den) + "); its frames are given as stored, " + std::to_string(width_) + "×" +
+                   std::to_string(height_));
+}
+
+void Video::open() {
+    decoder_.emplace(file_, host_, log_);
+}
+
+arhost_frame_format Video::format() const {
+    arhost_frame_format format = converter_->format();
+    format.fps = decoder_->fps();
+    return format;
+}
+
+std::uint64_t Video::frame_count() const {
+    return decoder_->ended() ? decoder_->count() : decoder_->declared_count();
+}
+
+arhost_status Video::go_to(std::uint64_t index) {
+    // Back means from the start again: every picture is then decoded from the same data in the same order
+    // as the first time, which seeking to a keyframe can't promise. At its end the decoder has no picture.
+    if (index < (decoder_->ended() ? decoder_->count() : decoder_->index()))
+        open();
+    const std::uint64_t from = decoder_->index();
+    auto told = std::chrono::steady_clock::now();
+    while (decoder_->index() < index || decoder_->ended()) {
+        const arhost_status status = decoder_->next();
+        tell(decoder_->damage(), damage_told_);
+        tell(decoder_->cut_short(), cut_short_told_);
+        if (status != ARHOST_OK)
+            return status;
+        check_size();
+        if (const auto now = std::chrono::steady_clock::now(); now - told > std::chrono::milliseconds(500)) {
+            told = now;
+            host_.progress(static_cast<double>(decoder_->index() - from) / static_cast<double>(index - from),
+                           ("decoding up to frame " + std::to_string(index)).c_str());
+        }
+    }
+    return ARHOST_OK;
+}
+
+void Video::check_size() const {
+    const AVFrame &picture = decoder_->picture();
+    if (picture.width != width_ || picture.height != height_)
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) + ": frame " +
+                                                      std::to_string(decoder_->index()) + " is " +
+                                                      std::to_string(picture.width) + "×" +
+                                                      std::to_string(picture.height) + ", those before it " +
+                                                      std::to_string(width_) + "×" + std::to_string(height_));
+}
+
+// Once: a loop meets the same place again and again.
+void Video::tell(const std::string &fault, bool &told) const {
+    if (fault.empty() || told)
+        return;
+    host_.warn(fault);
+    told = true;
+}
+
+void Video::copy_to(const arhost_frame_buffer &buffer) {
+    converter_->convert(decoder_->picture(), buffer);
+}
+
+} // namespace arhost

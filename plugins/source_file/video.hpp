@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "libav.hpp"
+#include "picture.hpp"
+#include "reader.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace arhost {
+
+// The pictures of a file's first video stream, in order of display, one after the other.
+class Decoder {
+public:
+    Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log);
+    Decoder(const Decoder &) = delete; // libav holds its address
+    Decoder &operator=(const Decoder &) = delete;
+
+    // Decodes the next picture: ARHOST_OK, ARHOST_END or ARHOST_ERROR_CANCELLED.
+    arhost_status next();
+
+    const AVFrame &picture() const { return *frame_; }
+    std::uint64_t index() const { return count_ - 1; } // of the picture, from 0
+    std::uint64_t count() const { return count_; }     // of the pictures so far
+    std::int64_t media_ns() const { return media_ns_; }
+    std::int64_t end_ns() const { return media_ns_ + period_ns_; }
+    bool ended() const { return ended_; }
+
+    double fps() const { return fps_; }
+    std::uint64_t declared_count() const; // as the header has it, 0: not told
+    int quarter_turns() const;            // clockwise, to be applied to the pictures
+
+    // What was wrong with the data so far, and with its end, in words for the user; "" where all is well.
+    const std::string &damage() const { return damage_; }
+    const std::string &cut_short() const { return cut_short_; }
+
+private:
+    arhost_status feed();
+    void take_time();
+    void finish();
+
+    std::string name_;
+    Host host_;
+    LibavLog &log_;
+    FormatPointer file_;
+    AVStream *stream_ = nullptr; // owned by file_
+    CodecPointer codec_;
+    PacketPointer packet_;
+    FramePointer frame_;
+    double fps_ = 0;
+    std::int64_t period_ns_ = 0;
+    std::uint64_t count_ = 0, packets_ = 0;
+    std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
+    bool lost_data_ = false; // since the last picture
+    bool ended_ = false;
+    int read_error_ = 0;                    // what ended the reading, if not the file's end
+    std::string decoder_fault_, end_fault_; // what libav said in passing, and when it met the end
+    std::string damage_, cut_short_;
+};
+
+class Video final : public Reader {
+public:
+    Video(std::filesystem::path file, const Host &host);
+
+    arhost_frame_format format() const override;
+    std::uint64_t frame_count() const override;
+    arhost_status go_to(std::uint64_t index) override;
+    std::optional<std::int64_t> media_ns() const override { return decoder_->media_ns(); }
+    std::int64_t end_ns() const override { return decoder_->end_ns(); }
+    void copy_to(const arhost_frame_buffer &buffer) override;
+
+private:
+    void open(); // from frame 0
+    void check_size() const;
+    void tell(const std::string &fault, bool &told) const;
+
+    std::filesystem::path file_;
+    Host host_;
+    LibavLog log_;
+    std::optional<Decoder> decoder_;
+    std::optional<PictureConverter> converter_;
+    int width_ = 0, height_ = 0; // of all pictures, before any turn
+    bool damage_told_ = false, cut_short_told_ = false;
+};
+
+} // namespace arhost

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// source_v4l2: frames from a camera of the kernel's (USB, built-in, capture cards).
+#include "device.hpp"
+#include "jpeg.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <iterator>
+#include <optional>
+#include <string>
+
+namespace {
+
+using arhost::CaptureDevice;
+using arhost::CaptureFormat;
+using arhost::CaptureStream;
+using arhost::Failure;
+using Clock = std::chrono::steady_clock;
+
+// A camera that gives nothing for so long counts as lost.
+constexpr auto silence_limit = std::chrono::seconds(5);
+constexpr int poll_slice_ms = 50;
+
+struct Size {
+    std::uint32_t width = 0, height = 0;
+    std::string text() const { return std::to_string(width) + "×" + std::to_string(height); }
+    bool operator==(const Size &) const = default;
+};
+
+bool offers(const CaptureFormat &format, const Size &size) {
+    if (format.any_size)
+        return size.width >= format.sizes.front().width && size.width <= format.sizes.back().width &&
+               size.height >= format.sizes.front().height && size.height <= format.sizes.back().height;
+    return format.sizes.empty() || // the driver does not tell
+           std::any_of(format.sizes.begin(), format.sizes.end(), [&](const arhost::CaptureSize &offered) {
+               return offered.width == size.width && offered.height == size.height;
+           });
+}
+
+std::int64_t clock_ns(clockid_t clock) {
+    timespec time{};
+    clock_gettime(clock, &time);
+    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
+}
+
+class V4l2Source {
+public:
+    V4l2Source(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), path_(options.text("device")), asked_{static_cast<std::uint32_t>(options.integer("width")),
+                                                             static_cast<std::uint32_t>(options.integer("height"))},
+          format_option_(options.text("format")),
+          buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
+        if ((asked_.width == 0) != (asked_.height == 0))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "width, height: give both or neither");
+    }
+
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        newest_only_ = setup.paced != 0;
+        device_.emplace(path_);
+        const v4l2_pix_format pixels = set_format(setup);
+        const double fps = device_->set_fps(setup.fps);
+        const std::string mode =
+            arhost::fourcc_text(pixels.pixelformat) + " " + Size{pixels.width, pixels.height}.text();
+        if (setup.fps > 0 && fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
+            host_.warn("the camera gives " + std::to_string(fps) + " frames a second at " + mode + ", not the " +
+                       std::to_string(setup.fps) + " asked for; it offers " + device_->describe_formats());
+
+        arhost_frame_format format{};
+        format.struct_size = properties.format.struct_size;
+        stream_.emplace(*device_, buffer_count_);
+        if (pixels.pixelformat == V4L2_PIX_FMT_YUYV) {
+            yuyv_stride_ = pixels.bytesperline;
+            format.pixel_format = ARHOST_YUYV;
+            format.width = pixels.width;
+            format.height = pixels.height;
+            set_colours(pixels, format);
+        } else {
+            describe_first_picture(format);
+            if (Size{format.width, format.height} != Size{pixels.width, pixels.height})
+                throw Failure(ARHOST_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
+                                                   ", but sends pictures of " +
+                                                   Size{format.width, format.height}.text());
+        }
+        format.fps = fps > 0 ? fps : setup.fps;
+        if (!arhost_frame_layout(&format))
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "the camera '" + path_ + "' gives " + mode + ", a size that can't be used here");
+        properties.format = format;
+        host_.info(device_->card() + " at " + path_ + ": " + mode + ", " + std::to_string(fps) + " frames a second");
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        const auto give_up = Clock::now() + silence_limit;
+        for (;;) {
+            const auto captured = next(give_up);
+            if (!captured)
+                return ARHOST_ERROR_CANCELLED;
+            const bool good = copy(stream_->bytes(*captured), buffer);
+            stream_->queue(captured->index);
+            if (!good) {
+                ++dropped_;
+                continue;
+            }
+            info.clock = ARHOST_CLOCK_MONOTONIC;
+            info.capture_ns = last_ns_ = std::max(last_ns_, capture_ns(*captured));
+            info.skipped = skipped_before(captured->sequence);
+            return ARHOST_OK;
+        }
+    }
+
+    void stop() {
+        stream_.reset();
+        device_.reset();
+    }
+
+private:
+    v4l2_pix_format set_format(const arhost_source_setup &setup) {
+        Size size = asked_;
+        std::string wanted_by = "set 'width' and 'height'";
+        if (setup.intrinsics) {
+            const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
+            if (size != Size{} && size != calibrated)
+                throw Failure(ARHOST_ERROR_CONFIGURATION, "width, height: " + size.text() +
+                                                              " is asked for, but the camera's calibration is for " +
+                                                              calibrated.text());
+            if (size == Size{})
+                wanted_by = "the camera's calibration is for " + calibrated.text() + ": calibrate for the size used";
+            size = calibrated;
+        }
+        const bool demanded = size != Size{};
+        if (!demanded) {
+            const v4l2_pix_format current = device_->current_format().fmt.pix;
+            size = {current.width, current.height};
+        }
+        const CaptureFormat &chosen = choose_format(size, setup.fps);
+        const v4l2_pix_format set = device_->set_format(chosen.fourcc, size.width, size.height).fmt.pix;
+        const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
+        if (set.pixelformat != chosen.fourcc)
+            throw Failure(ARHOST_ERROR_CONFIGURATION, camera + " does not give " +
+                                                          arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                                                          ", though it offers " + device_->describe_formats());
+        if (demanded && size != Size{set.width, set.height})
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
+                              " (it would give " + Size{set.width, set.height}.text() + "); the nearest are " +
+                              device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted_by);
+        if (set.pixelformat == V4L2_PIX_FMT_YUYV && set.bytesperline < 2 * set.width)
+            throw Failure(ARHOST_ERROR_IO, camera + " has a broken driver: rows of " +
+                                               std::to_string(set.bytesperline) + " bytes for " +
+                                               std::to_string(set.width) + " px");
+        return set;
+    }
+
+    // YUYV where that comes at the size and rate wanted, since it needs no decoding; else Motion-JPEG.
+    const CaptureFormat &choose_format(const Size &size, double fps) const {
+        std::vector<const CaptureFormat *> known;
+        for (const std::uint32_t fourcc : {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG})
+            if (const CaptureFormat *format = device_->find(fourcc);
+                format && (format_option_ == "auto" || (format_option_ == "yuyv") == (fourcc == V4L2_PIX_FMT_YUYV)))
+                known.push_back(format);
+        if (known.empty())
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "format: the camera '" + path_ + "' (" + device_->card() + ") offers no " +
+                              (format_option_ == "auto" ? "YUYV and no MJPG" : format_option_) + ", only " +
+                              device_->describe_formats());
+        const double wanted_fps = 0.95 * (fps > 0 ? fps : 25);
+        const CaptureFormat *best = known.front();
+        double best_fps = -1;
+        for (const CaptureFormat *format : known) {
+            if (!offers(*format, size))
+                continue;
+            const double offered = device_->max_fps(format->fourcc, size.width, size.height);
+            if (offered <= 0 || offered >= wanted_fps)
+                return *format;
+            if (offered > best_fps) {
+                best = format;
+                best_fps = offered;
+            }
+        }
+        return *best;
+    }
+
+    static void set_colours(const v4l2_pix_format &pixels, arhost_frame_format &format) {
+        const std::uint32_t encoding = pixels.ycbcr_enc == V4L2_YCBCR_ENC_DEFAULT
+                                           ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(pixels.colorspace)}
+                                           : pixels.ycbcr_enc;
+        format.yuv_matrix =
+            encoding == V4L2_YCBCR_ENC_709 || encoding == V4L2_YCBCR_ENC_XV709 ? ARHOST_BT709 : ARHOST_BT601;
+        const std::uint32_t range =
+            pixels.quantization == V4L2_QUANTIZATION_DEFAULT
+                ? std::uint32_t{V4L2_MAP_QUANTIZATION_DEFAULT(false, pixels.colorspace, encoding)}
+                : pixels.quantization;
+        format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_FULL_RANGE : ARHOST_LIMITED_RANGE;
+    }
+
+    // Only a picture tells how its chroma is subsampled.
+    void describe_first_picture(arhost_frame_format &format) {
+        for (const auto give_up = Clock::now() + silence_limit;;) {
+            host_.progress(-1, "waiting for the camera's first picture");
+            const auto captured = next(give_up);
+            if (!captured)
+                throw Failure(ARHOST_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
+            const bool good = jpeg_.describe(stream_->bytes(*captured), format);
+            stream_->queue(captured->index);
+            if (good)
+                return;
+            fault_ = "it is no JPEG";
+        }
+    }
+
+    // A frame that the driver holds for good: the newest in live use, else the oldest. None: cancelled.
+    std::optional<v4l2_buffer> next(Clock::time_point give_up) {
+        for (;;) {
+            if (host_.cancelled())
+                return std::nullopt;
+            std::optional<v4l2_buffer> found;
+            while (const auto captured = stream_->dequeue()) {
+                if (captured->flags & V4L2_BUF_FLAG_ERROR) {
+                    stream_->queue(captured->index);
+                    ++dropped_;
+                    continue;
+                }
+                if (found) {
+                    stream_->queue(found->index);
+                    ++dropped_;
+                }
+                found = captured;
+                if (!newest_only_)
+                    break;
+            }
+            if (found)
+                return found;
+            if (Clock::now() > give_up)
+                throw Failure(ARHOST_ERROR_DEVICE_LOST, "the camera '" + path_ + "' (" + device_->card() +
+                                                            ") has given no good picture for " +
+                                                            std::to_string(silence_limit.count()) + " s" +
+                                                            (fault_.empty() ? "" : "; of the last one: " + fault_));
+            stream_->wait(poll_slice_ms);
+        }
+    }
+
+    bool copy(std::span<const std::uint8_t> bytes, const arhost_frame_buffer &buffer) {
+        const arhost_frame_format &format = *buffer.format;
+        if (format.pixel_format != ARHOST_YUYV)
+            return jpeg_.decode(bytes, format, buffer.plane, fault_);
+        const std::size_t row_bytes = std::size_t{2} * format.width;
+        if (bytes.size() < std::size_t{yuyv_stride_} * (format.height - 1) + row_bytes) {
+            fault_ = "it has only " + std::to_string(bytes.size()) + " bytes";
+            return false;
+        }
+        if (yuyv_stride_ == format.stride[0])
+            std::memcpy(buffer.plane[0], bytes.data(), std::size_t{yuyv_stride_} * (format.height - 1) + row_bytes);
+        else
+            for (std::size_t y = 0; y < format.height; ++y)
+                std::memcpy(buffer.plane[0] + y * format.stride[0], bytes.data() + y * yuyv_stride_, row_bytes);
+        return true;
+    }
+
+    std::int64_t capture_ns(const v4l2_buffer &captured) {
+        const std::int64_t stamp_ns = captured.timestamp.tv_sec * std::int64_t{1'000'000'000} +
+                                      captured.timestamp.tv_usec * std::int64_t{1'000};
+        if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
+            return stamp_ns;
+        // Old drivers stamp with the wall clock, or with one that nothing is known of.
+        const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC), age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
+        const bool wall_clock = std::abs(age_ns) < 10'000'000'000;
+        if (!clock_told_)
+            host_.warn("the camera's driver does not stamp its frames with CLOCK_MONOTONIC; " +
+                       std::string(wall_clock ? "its wall-clock times are converted"
+                                              : "the time of their arrival is taken instead"));
+        clock_told_ = true;
+        return wall_clock ? now_ns - age_ns : now_ns;
+    }
+
+    // Frames lost since the last one given. The driver's numbers include what was dropped here, unless it
+    // does not number.
+    std::uint32_t skipped_before(std::uint32_t sequence) {
+        std::uint32_t skipped = dropped_;
+        if (last_sequence_) {
+            const std::uint32_t gap = sequence - *last_sequence_ - 1;
+            if (gap < 1'000'000) // else it went back
+                skipped = std::max(skipped, gap);
+        } else {
+            skipped = 0; // before the first frame nothing can have been lost
+        }
+        last_sequence_ = sequence;
+        dropped_ = 0;
+        return skipped;
+    }
+
+    arhost::Host host_;
+    std::string path_;
+    Size asked_; // 0×0: as the calibration or the driver has it
+    std::string format_option_;
+    std::uint32_t buffer_count_;
+
+    std::optional<CaptureDevice> device_;
+    std::optional<CaptureStream> stream_; // after device_: it must go first
+    arhost::JpegDecoder jpeg_;
+    bool newest_only_ = false;
+    std::uint32_t yuyv_stride_ = 0;
+    std::optional<std::uint32_t> last_sequence_;
+    std::uint32_t dropped_ = 0; // frames since the last one given
+    std::int64_t last_ns_ = 0;
+    bool clock_told_ = false;
+    std::string fault_; // of the last damaged picture
+};
+
+using arhost::option;
+constexpr const char *formats[] = {"auto", "yuyv", "mjpeg", nullptr};
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_TEXT, "device", "/dev/video0", "The camera's device node."),
+    option(ARHOST_OPTION_INTEGER, "width", "0",
+           "Of the frames, in px; 0: the calibration's, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_INTEGER, "height", "0",
+           "Of the frames, in px; 0: the calibration's, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_TEXT, "format", "auto",
+           "How the camera sends its pictures; auto: yuyv if that is fast enough, else mjpeg.", 0, 0, formats),
+    option(ARHOST_OPTION_INTEGER, "buffers", "4", "How many frames the driver may hold.", 2, 32),
+};
+constexpr const char *devices[] = {"/dev/video*", nullptr};
+
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_SOURCE,
+                                          "source_v4l2",
+                                          "V4L2 camera",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Frames from a camera through Video4Linux, uncompressed or Motion-JPEG.",
+                                          ARHOST_IS_LIVE,
+                                          std::size(options),
+                                          options,
+                                          devices};
+
+} // namespace
+
+ARHOST_SOURCE(V4l2Source, descriptor)

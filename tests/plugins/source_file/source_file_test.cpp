@@ -1,0 +1,795 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "source_under_test.hpp"
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <thread>
+
+namespace fs = std::filesystem;
+using arhost::test::ScratchFolder;
+using arhost::test::shared_data;
+using arhost::test::SourceFrame;
+using arhost::test::SourceUnderTest;
+using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
+
+#define ARHOST_REQUIRE_FFMPEG()                                                                                      \
+    if (std::string(ARHOST_FFMPEG).empty())                                                                          \
+    GTEST_SKIP() << "needs the command ffmpeg (package ffmpeg), which was not found when the build was configured"
+
+namespace {
+
+Bytes bytes_of(const fs::path &file) {
+    std::ifstream stream(file, std::ios::binary);
+    return Bytes(std::istreambuf_iterator<char>(stream), {});
+}
+
+void write_bytes(const fs::path &file, const Bytes &bytes) {
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char *>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+Bytes bytes_of(const cv::Mat &image) {
+    Bytes bytes;
+    for (int y = 0; y < image.rows; ++y)
+        bytes.insert(bytes.end(), image.ptr(y), image.ptr(y) + image.cols * static_cast<int>(image.elemSize()));
+    return bytes;
+}
+
+// Runs ffmpeg in `folder`; the arguments have nothing in them that a shell minds.
+void ffmpeg(const fs::path &folder, const std::string &arguments) {
+    const std::string command = "cd '" + folder.string() + "' && " ARHOST_FFMPEG " -nostdin -v error -y " + arguments;
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+}
+
+// The frames of a file, as the ffmpeg command decodes them.
+std::vector<Bytes> reference_frames(const fs::path &file, const std::string &pixel_format, std::size_t frame_bytes) {
+    const fs::path raw = file.string() + ".raw";
+    ffmpeg(file.parent_path(), "-noautorotate -i " + file.filename().string() +
+                                   " -vsync passthrough -f rawvideo -pix_fmt " + pixel_format + " " +
+                                   raw.filename().string());
+    const Bytes all = bytes_of(raw);
+    EXPECT_EQ(all.size() % frame_bytes, 0u);
+    std::vector<Bytes> frames;
+    for (std::size_t at = 0; at + frame_bytes <= all.size(); at += frame_bytes)
+        frames.emplace_back(all.begin() + static_cast<std::ptrdiff_t>(at),
+                            all.begin() + static_cast<std::ptrdiff_t>(at + frame_bytes));
+    return frames;
+}
+
+cv::Mat colourful(int width, int height, int seed = 0) {
+    cv::Mat image(height, width, CV_8UC3);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            image.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(7 * x + 31 * seed), static_cast<uchar>(5 * y),
+                                                  static_cast<uchar>(x * y + seed));
+    return image;
+}
+
+// n numbered images; number i shows colourful(…, i).
+void write_images(const fs::path &folder, const std::vector<int> &numbers, int width = 48, int height = 32) {
+    for (const int n : numbers) {
+        std::string digits = std::to_string(n);
+        digits.insert(0, 4 - digits.size(), '0');
+        ASSERT_TRUE(cv::imwrite((folder / ("image_" + digits + ".png")).string(), colourful(width, height, n)));
+    }
+}
+
+std::string pattern_in(const ScratchFolder &folder) {
+    return (folder.path() / "image_%04d.png").string();
+}
+
+// A status and a message at once, so that a test says both.
+void expect_refusal(const std::map<std::string, std::string> &options, arhost_status status,
+                    const std::vector<std::string> &words, arhost_source_setup setup = {}) {
+    SourceUnderTest source("source_file");
+    EXPECT_EQ(source.start(options, setup), status) << source.log();
+    const std::string errors = source.log(ARHOST_ERROR);
+    for (const std::string &word : words)
+        EXPECT_THAT(errors, HasSubstr(word));
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "one message, not:\n" << errors;
+}
+
+arhost_source_setup from(std::uint64_t sequence) {
+    arhost_source_setup setup{};
+    setup.first_sequence = sequence;
+    return setup;
+}
+
+// A scratch folder with a short video in it.
+class VideoFile {
+public:
+    // `format`: what follows the input in the ffmpeg command.
+    VideoFile(const std::string &name, const std::string &format, const std::string &size = "96x64", int frames = 40,
+              const std::string &picture = "testsrc2")
+        : file_(folder_.path() / name) {
+        ffmpeg(folder_.path(), "-f lavfi -i " + picture + (picture.find('=') == std::string::npos ? "=" : ":") +
+                                   "size=" + size + ":rate=25 -frames:v " + std::to_string(frames) + " " + format +
+                                   " " + name);
+    }
+    const fs::path &file() const { return file_; }
+    const fs::path &folder() const { return folder_.path(); }
+    std::map<std::string, std::string> options() const { return {{"path", file_.string()}}; }
+
+private:
+    ScratchFolder folder_;
+    fs::path file_;
+};
+
+const char *const h264 = "-c:v libx264 -preset veryfast -g 12 -bf 2 -pix_fmt yuv420p";
+
+} // namespace
+
+// ---- images ----
+
+TEST(ImageSequence, GivesARealSequenceByteForByteAsOpenCvReadsIt) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
+    SourceUnderTest source("source_file");
+    const fs::path folder = shared_data("markers/rbt_sequence");
+    ASSERT_EQ(source.start({{"path", (folder / "color_image_%04d.png").string()}}), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.format().pixel_format, ARHOST_BGR8);
+    EXPECT_EQ(source.format().width, 640u);
+    EXPECT_EQ(source.format().height, 480u);
+    EXPECT_EQ(source.format().fps, 30.0);
+    EXPECT_EQ(source.properties().frame_count, 40u);
+    for (std::uint64_t n = 0; n < 40; ++n) {
+        const SourceFrame frame = source.read(n);
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        std::string digits = std::to_string(n);
+        digits.insert(0, 4 - digits.size(), '0');
+        ASSERT_EQ(frame.bytes, bytes_of(cv::imread((folder / ("color_image_" + digits + ".png")).string())));
+        EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MEDIA);
+        EXPECT_EQ(frame.info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
+    }
+    EXPECT_EQ(source.read(40).status, ARHOST_END);
+    EXPECT_EQ(source.read(40).status, ARHOST_END);
+}
+
+TEST(ImageSequence, StartsAtTheLowestNumberOrWhereItIsTold) {
+    ScratchFolder folder;
+    write_images(folder.path(), {1, 2, 3, 4});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.properties().frame_count, 4u);
+    EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 1)));
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"start", "3"}}), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.properties().frame_count, 2u);
+    EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 3)));
+}
+
+TEST(ImageSequence, EndsBeforeAMissingFileAndSaysSo) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2, 5});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
+    EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end
+    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("image_0003.png' is missing"));
+    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("up to number 5"));
+}
+
+TEST(ImageSequence, TakesTheRateAskedFor) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2});
+    SourceUnderTest source("source_file");
+    arhost_source_setup setup{};
+    setup.fps = 8;
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, setup), ARHOST_OK);
+    EXPECT_EQ(source.format().fps, 8.0);
+    EXPECT_EQ(source.read(2).info.capture_ns, 250'000'000);
+}
+
+TEST(ImageSequence, RefusesASizeThatChangesAndNamesTheFile) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1});
+    write_images(folder.path(), {2}, 50, 32);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_OK);
+    EXPECT_EQ(source.read(2).status, ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0002.png' is 50×32"));
+    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0000.png' is 48×32"));
+}
+
+TEST(ImageSequence, KeepsTheFirstImagesChoiceOfGreyOrColour) {
+    ScratchFolder folder;
+    cv::Mat grey(32, 48, CV_8UC1, cv::Scalar(77));
+    cv::imwrite((folder.path() / "image_0000.png").string(), grey);
+    write_images(folder.path(), {1});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    EXPECT_EQ(source.read(0).bytes, bytes_of(grey));
+    EXPECT_EQ(source.read(1).bytes,
+              bytes_of(cv::imread((folder.path() / "image_0001.png").string(), cv::IMREAD_GRAYSCALE)));
+}
+
+TEST(ImageSequence, NamesAnImageThatIsDamaged) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2});
+    Bytes half = bytes_of(folder.path() / "image_0001.png");
+    half.resize(half.size() / 2);
+    write_bytes(folder.path() / "image_0001.png", half);
+    write_bytes(folder.path() / "image_0002.png", {});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_ERROR_IO);
+    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0001.png' can't be read: it is damaged"));
+    EXPECT_EQ(source.read(2).status, ARHOST_ERROR_IO);
+    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0002.png' can't be read: it is empty"));
+}
+
+TEST(ImageSequence, GivesAnyFrameAfterARestart) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2, 3, 4});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(3)), ARHOST_OK);
+    EXPECT_EQ(source.read(3).bytes, bytes_of(colourful(48, 32, 3)));
+    EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(48, 32, 1)));
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(5)), ARHOST_OK);
+    EXPECT_EQ(source.read(5).status, ARHOST_END);
+}
+
+TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}, {"frames", "7"}}), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 7u);
+    const auto frames = source.read_all();
+    ASSERT_EQ(frames.size(), 8u);
+    EXPECT_EQ(frames[7].status, ARHOST_END);
+    for (std::size_t n = 0; n < 7; ++n) {
+        EXPECT_EQ(frames[n].bytes, bytes_of(colourful(48, 32, static_cast<int>(n % 3))));
+        EXPECT_EQ(frames[n].info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
+    }
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}}), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 0u) << "endless";
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"frames", "2"}}), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 2u);
+    EXPECT_EQ(source.read_all().size(), 3u);
+}
+
+TEST(SingleImage, IsGivenOnceOrAsOftenAsAskedFor) {
+    ScratchFolder folder;
+    const fs::path file = folder.path() / "100%.png"; // an existing file is no pattern
+    cv::imwrite(file.string(), colourful(33, 21));
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.properties().frame_count, 1u);
+    EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(33, 21)));
+    EXPECT_EQ(source.read(1).status, ARHOST_END);
+    ASSERT_EQ(source.start({{"path", file.string()}, {"frames", "3"}}), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 3u);
+    EXPECT_EQ(source.read(2).bytes, bytes_of(colourful(33, 21)));
+    EXPECT_EQ(source.read(3).status, ARHOST_END);
+    ASSERT_EQ(source.start({{"path", file.string()}, {"loop", "true"}}), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 0u);
+    EXPECT_EQ(source.read(100'000).status, ARHOST_OK);
+}
+
+TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
+    ScratchFolder folder;
+    SourceUnderTest source("source_file");
+
+    cv::Mat deep(4, 6, CV_16UC1);
+    for (int i = 0; i < 24; ++i)
+        deep.at<std::uint16_t>(i / 6, i % 6) = static_cast<std::uint16_t>(i * 2849);
+    cv::imwrite((folder.path() / "deep.png").string(), deep);
+    ASSERT_EQ(source.start({{"path", (folder.path() / "deep.png").string()}}), ARHOST_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    const Bytes grey = source.read(0).bytes;
+    for (std::size_t i = 0; i < 24; ++i)
+        EXPECT_NEAR(grey.at(i), static_cast<double>(i) * 2849 / 257, 1);
+
+    const cv::Mat colour = colourful(6, 4);
+    cv::Mat with_alpha(4, 6, CV_8UC4);
+    for (int y = 0; y < 4; ++y)
+        for (int x = 0; x < 6; ++x) {
+            const auto c = colour.at<cv::Vec3b>(y, x);
+            with_alpha.at<cv::Vec4b>(y, x) = cv::Vec4b(c[0], c[1], c[2], static_cast<uchar>(20 * x));
+        }
+    cv::imwrite((folder.path() / "alpha.png").string(), with_alpha);
+    ASSERT_EQ(source.start({{"path", (folder.path() / "alpha.png").string()}}), ARHOST_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_BGR8);
+    EXPECT_EQ(source.read(0).bytes, bytes_of(colour));
+}
+
+// ---- what can't be read ----
+
+TEST(Refusal, NamesAFileThatIsNotThereAndWhatIs) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0});
+    expect_refusal({{"path", (folder.path() / "film.mp4").string()}}, ARHOST_ERROR_CONFIGURATION,
+                   {"film.mp4' can't be opened", "image_0000.png"});
+    expect_refusal({{"path", "/nowhere/film.mp4"}}, ARHOST_ERROR_CONFIGURATION, {"'/nowhere/film.mp4'"});
+}
+
+TEST(Refusal, TellsWhatAPatternLookedForAndWhatTheFolderHas) {
+    ScratchFolder folder;
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+                   {"no file matches", "looked for", "image_0000.png' first", "is empty"});
+    write_bytes(folder.path() / "image_1.png", {});    // too few digits for %04d
+    write_bytes(folder.path() / "image_-001.png", {}); // no sign is allowed
+    write_bytes(folder.path() / "notes.txt", {});
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+                   {"has 3 entries", "image_1.png", "notes.txt"});
+    write_images(folder.path(), {3, 4});
+    expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_ERROR_CONFIGURATION,
+                   {"image_0000.png' first", "2 from number 3 to 4", "'start'"});
+    expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_ERROR_CONFIGURATION,
+                   {"/nowhere/image_0.png", "can't be listed"});
+}
+
+TEST(Refusal, AllowsNothingInAPatternButOneDecimalNumber) {
+    for (const char *name : {"a_%s.png", "a_%n.png", "a_%4d.png", "a_%04x.png", "a_%00d.png", "a_%099d.png",
+                             "a_%-4d.png", "a_%*d.png", "a_%ld.png", "a_%", "a_%04", "a_%1$d.png"})
+        expect_refusal({{"path", std::string("/frames/") + name}}, ARHOST_ERROR_CONFIGURATION,
+                       {name, "is not allowed", "%04d"});
+    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_ERROR_CONFIGURATION, {"a second '%d'"});
+    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_ERROR_CONFIGURATION, {"no %d in its name"});
+    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_ERROR_CONFIGURATION, {"no %d in its name"});
+}
+
+TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
+    ScratchFolder folder;
+    cv::imwrite((folder.path() / "50%_9.png").string(), colourful(8, 8, 9));
+    cv::imwrite((folder.path() / "50%_10.png").string(), colourful(8, 8, 10));
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", (folder.path() / "50%%_%d.png").string()}}), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.properties().frame_count, 2u);
+    EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(8, 8, 10)));
+}
+
+TEST(Refusal, TellsThatAFolderIsNone) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0});
+    expect_refusal({{"path", folder.path().string()}}, ARHOST_ERROR_CONFIGURATION,
+                   {"is a folder", "image_%04d.png", "image_0000.png"});
+    expect_refusal({{"path", "/dev/null"}}, ARHOST_ERROR_CONFIGURATION, {"is no file"});
+}
+
+TEST(Refusal, EmptyAndGarbageFilesAreOneMessageEach) {
+    ScratchFolder folder;
+    Bytes garbage(20'000);
+    std::uint32_t random = 1;
+    for (std::uint8_t &byte : garbage)
+        byte = static_cast<std::uint8_t>((random = random * 1664525u + 1013904223u) >> 24);
+    for (const char *name : {"film.mp4", "film.avi", "film"}) {
+        write_bytes(folder.path() / name, {});
+        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_ERROR_CONFIGURATION,
+                       {name, "can't be read"});
+        write_bytes(folder.path() / name, garbage);
+        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_ERROR_CONFIGURATION,
+                       {name, "can't be read"});
+    }
+    write_bytes(folder.path() / "image.png", garbage);
+    expect_refusal({{"path", (folder.path() / "image.png").string()}}, ARHOST_ERROR_IO, {"image.png' can't be read"});
+}
+
+TEST(Refusal, NoPermissionIsToldAsSuch) {
+    ScratchFolder folder;
+    const fs::path file = folder.path() / "film.mp4";
+    write_bytes(file, {1, 2, 3});
+    fs::permissions(file, fs::perms::none);
+    fs::permissions(folder.path(), fs::perms::all);
+    const bool root = geteuid() == 0;
+    ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // root may read everything
+    expect_refusal({{"path", file.string()}}, ARHOST_ERROR_CONFIGURATION, {"film.mp4", "Permission denied"});
+    ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
+}
+
+TEST(Refusal, AFileWithoutVideoIsTold) {
+    ARHOST_REQUIRE_FFMPEG();
+    ScratchFolder folder;
+    ffmpeg(folder.path(), "-f lavfi -i sine=duration=0.2 tone.wav");
+    expect_refusal({{"path", (folder.path() / "tone.wav").string()}}, ARHOST_ERROR_CONFIGURATION,
+                   {"tone.wav", "no video stream"});
+}
+
+TEST(Refusal, AnUnknownCodecIsTold) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.avi", "-c:v mpeg4");
+    Bytes bytes = bytes_of(video.file());
+    const std::string fourcc = "FMP4", unknown = "QQQQ";
+    for (auto at = bytes.begin(); (at = std::search(at, bytes.end(), fourcc.begin(), fourcc.end())) != bytes.end();)
+        at = std::copy(unknown.begin(), unknown.end(), at);
+    write_bytes(video.file(), bytes);
+    expect_refusal(video.options(), ARHOST_ERROR_CONFIGURATION, {"film.avi", "no decoder"});
+}
+
+TEST(Refusal, ACameraOfAnotherSizeIsTold) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0});
+    arhost_intrinsics camera{};
+    camera.struct_size = sizeof camera;
+    camera.width = 640;
+    camera.height = 480;
+    arhost_source_setup setup{};
+    setup.intrinsics = &camera;
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+                   {"48×32", "calibration is for 640×480"}, setup);
+}
+
+// ---- videos ----
+
+TEST(Video, GivesPlanarYuvAsTheDecoderMadeIt) {
+    ARHOST_REQUIRE_FFMPEG();
+    struct Case {
+        const char *name, *codec;
+        arhost_yuv_range range;
+        arhost_yuv_matrix matrix;
+    };
+    const std::string tagged = std::string(h264) + " -colorspace bt709 -color_primaries bt709 -color_trc bt709";
+    for (const Case &c : {Case{"a.mp4", h264, ARHOST_LIMITED_RANGE, ARHOST_BT601},
+                          Case{"b.mp4", tagged.c_str(), ARHOST_LIMITED_RANGE, ARHOST_BT709},
+                          Case{"c.mp4", "-c:v mpeg4 -q:v 3", ARHOST_LIMITED_RANGE, ARHOST_BT601},
+                          Case{"d.avi", "-c:v mjpeg -q:v 3 -pix_fmt yuvj420p", ARHOST_FULL_RANGE, ARHOST_BT601}}) {
+        SCOPED_TRACE(c.name);
+        const VideoFile video(c.name, c.codec);
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+        EXPECT_EQ(source.format().pixel_format, ARHOST_I420);
+        EXPECT_EQ(source.format().yuv_matrix, c.matrix);
+        EXPECT_EQ(source.format().yuv_range, c.range);
+        EXPECT_EQ(source.format().fps, 25.0);
+        EXPECT_EQ(source.properties().frame_count, 40u);
+        const auto expected =
+            reference_frames(video.file(), c.range == ARHOST_FULL_RANGE ? "yuvj420p" : "yuv420p", 96 * 64 * 3 / 2);
+        const auto frames = source.read_all();
+        ASSERT_EQ(frames.size(), 41u);
+        ASSERT_EQ(expected.size(), 40u);
+        for (std::size_t n = 0; n < 40; ++n) {
+            ASSERT_EQ(frames[n].bytes, expected[n]) << "frame " << n;
+            EXPECT_EQ(frames[n].info.capture_ns, static_cast<std::int64_t>(n) * 40'000'000);
+            EXPECT_EQ(frames[n].info.clock, ARHOST_CLOCK_MEDIA);
+        }
+        EXPECT_EQ(frames[40].status, ARHOST_END);
+        EXPECT_EQ(source.read(40).status, ARHOST_END);
+        EXPECT_EQ(source.log(ARHOST_WARNING), "");
+        EXPECT_EQ(source.log(ARHOST_ERROR), "");
+    }
+}
+
+TEST(Video, GuessesBt709ForUntaggedHighDefinition) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("hd.mp4", h264, "1280x720", 2);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    EXPECT_EQ(source.format().yuv_matrix, ARHOST_BT709);
+}
+
+TEST(Video, GreyStaysGrey) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("grey.mkv", "-vf scale=33:21 -c:v ffv1 -pix_fmt gray", "96x64", 5);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    const auto expected = reference_frames(video.file(), "gray", 33 * 21);
+    ASSERT_EQ(expected.size(), 5u);
+    for (std::size_t n = 0; n < 5; ++n)
+        EXPECT_EQ(source.read(n).bytes, expected[n]);
+}
+
+TEST(Video, GreyOfLimitedRangeIsWidened) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("grey.mkv", "-c:v ffv1 -pix_fmt gray -color_range tv", "64x48", 1);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    const Bytes stored = reference_frames(video.file(), "gray", 64 * 48).at(0);
+    const Bytes given = source.read(0).bytes;
+    for (std::size_t i = 0; i < given.size(); ++i)
+        ASSERT_NEAR(given[i], std::clamp((stored[i] - 16) * 255.0 / 219, 0.0, 255.0), 0.51);
+}
+
+TEST(Video, OddSizesAndOtherFormatsBecomeBgrOfTheRightColours) {
+    ARHOST_REQUIRE_FFMPEG();
+    struct Case {
+        const char *name, *codec, *size;
+        int w, h;
+    };
+    for (const Case &c :
+         {Case{"odd.mkv", "-vf scale=97:65 -c:v ffv1 -pix_fmt yuv420p", "96x64", 97, 65},
+          Case{"full.mkv", "-c:v ffv1 -pix_fmt yuv444p", "96x64", 96, 64},
+          Case{"deep.mkv", "-vf scale=out_color_matrix=bt709 -c:v ffv1 -pix_fmt yuv420p10le -colorspace bt709",
+               "96x64", 96, 64},
+          Case{"rgb.mkv", "-c:v ffv1 -pix_fmt bgr0", "96x64", 96, 64}}) {
+        SCOPED_TRACE(c.name);
+        // One colour, so that neither the scaler's filter nor chroma siting matters.
+        const VideoFile video(c.name, c.codec, c.size, 1, "color=c=0xC86432");
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+        ASSERT_EQ(source.format().pixel_format, ARHOST_BGR8);
+        EXPECT_EQ(source.format().width, static_cast<unsigned>(c.w));
+        EXPECT_EQ(source.format().height, static_cast<unsigned>(c.h));
+        const Bytes frame = source.read(0).bytes;
+        ASSERT_EQ(frame.size(), static_cast<std::size_t>(c.w * c.h * 3));
+        for (std::size_t i = 0; i < frame.size(); i += 3) {
+            ASSERT_NEAR(frame[i], 0x32, 2) << "pixel " << i / 3;
+            ASSERT_NEAR(frame[i + 1], 0x64, 2);
+            ASSERT_NEAR(frame[i + 2], 0xC8, 2);
+        }
+    }
+}
+
+TEST(Video, RgbIsLossless) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("rgb.mkv", "-c:v ffv1 -pix_fmt bgr0", "50x30", 3);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    const auto expected = reference_frames(video.file(), "bgr24", 50 * 30 * 3);
+    for (std::size_t n = 0; n < 3; ++n)
+        EXPECT_EQ(source.read(n).bytes, expected.at(n));
+}
+
+// As ffmpeg turns it, which is the reference for players.
+TEST(Video, IsTurnedAsItsMetadataAsks) {
+    ARHOST_REQUIRE_FFMPEG();
+    for (const char *codec : {"-c:v libx264 -pix_fmt yuv420p", "-c:v libx264rgb -qp 0 -pix_fmt rgb24"})
+        for (const char *degrees : {"90", "180", "270"}) {
+            SCOPED_TRACE(std::string(codec) + " " + degrees);
+            const VideoFile video("film.mp4", codec, "96x64", 3);
+            ffmpeg(video.folder(),
+                   "-i film.mp4 -c copy -metadata:s:v rotate=" + std::string(degrees) + " turned.mp4");
+            SourceUnderTest source("source_file");
+            ASSERT_EQ(source.start({{"path", (video.folder() / "turned.mp4").string()}}), ARHOST_OK) << source.log();
+            const bool upright = std::string(degrees) == "180";
+            EXPECT_EQ(source.format().width, upright ? 96u : 64u);
+            EXPECT_EQ(source.format().height, upright ? 64u : 96u);
+            const bool rgb = source.format().pixel_format == ARHOST_BGR8;
+            ffmpeg(video.folder(),
+                   std::string("-i turned.mp4 -f rawvideo -pix_fmt ") + (rgb ? "bgr24" : "yuv420p") + " turned.raw");
+            const Bytes expected = bytes_of(video.folder() / "turned.raw");
+            Bytes given;
+            for (int n = 0; n < 3; ++n) {
+                const Bytes frame = source.read(static_cast<std::uint64_t>(n)).bytes;
+                given.insert(given.end(), frame.begin(), frame.end());
+            }
+            EXPECT_EQ(given, expected);
+        }
+}
+
+TEST(Video, EveryFrameIsTheSameAfterARestartThere) {
+    ARHOST_REQUIRE_FFMPEG();
+    for (const char *codec :
+         {h264, "-c:v libx264 -x264-params open-gop=1:keyint=10:bframes=3:b-pyramid=strict", "-c:v mpeg4 -bf 2"}) {
+        SCOPED_TRACE(codec);
+        const VideoFile video("film.mp4", codec);
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+        const auto whole = source.read_all();
+        ASSERT_EQ(whole.size(), 41u);
+        for (const std::size_t n : {0u, 1u, 9u, 10u, 11u, 25u, 39u}) {
+            ASSERT_EQ(source.start(video.options(), from(n)), ARHOST_OK);
+            for (std::size_t i = n; i < std::min<std::size_t>(n + 3, 40); ++i) {
+                const SourceFrame frame = source.read(i);
+                ASSERT_EQ(frame.bytes, whole[i].bytes) << "frame " << i << " after a restart at " << n;
+                EXPECT_EQ(frame.info.capture_ns, whole[i].info.capture_ns);
+            }
+        }
+        ASSERT_EQ(source.start(video.options(), from(40)), ARHOST_OK);
+        EXPECT_EQ(source.read(40).status, ARHOST_END);
+        EXPECT_EQ(source.read(39).bytes, whole[39].bytes) << "also back from the end";
+        EXPECT_EQ(source.read(2).bytes, whole[2].bytes);
+    }
+}
+
+TEST(Video, LoopsWithTimeThatGoesOn) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mp4", h264, "96x64", 6);
+    SourceUnderTest source("source_file");
+    auto options = video.options();
+    options["loop"] = "true";
+    options["frames"] = "15";
+    ASSERT_EQ(source.start(options), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 15u);
+    const auto frames = source.read_all();
+    ASSERT_EQ(frames.size(), 16u);
+    for (std::size_t n = 0; n < 15; ++n) {
+        EXPECT_EQ(frames[n].bytes, frames[n % 6].bytes);
+        EXPECT_EQ(frames[n].info.capture_ns, static_cast<std::int64_t>(n) * 40'000'000);
+    }
+    for (const std::size_t n : {6u, 13u}) {
+        ASSERT_EQ(source.start(options, from(n)), ARHOST_OK);
+        EXPECT_EQ(source.read(n).bytes, frames[n].bytes);
+        EXPECT_EQ(source.read(n + 1).info.capture_ns, frames[n + 1].info.capture_ns);
+    }
+}
+
+TEST(Video, KeepsTimesOfAVariableRateUnlessARateIsAskedFor) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    for (std::uint64_t n = 0; n < 5; ++n)
+        EXPECT_NEAR(static_cast<double>(source.read(n).info.capture_ns), static_cast<double>(n * n) * 4e7, 1e6);
+    arhost_source_setup setup{};
+    setup.fps = 10;
+    ASSERT_EQ(source.start(video.options(), setup), ARHOST_OK);
+    EXPECT_EQ(source.format().fps, 10.0);
+    EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
+}
+
+TEST(Video, OfOneFrameHasOneFrame) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("one.mp4", h264, "96x64", 1);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    EXPECT_EQ(source.properties().frame_count, 1u);
+    EXPECT_EQ(source.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_END);
+    EXPECT_EQ(source.log(ARHOST_WARNING), "");
+}
+
+TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
+    ARHOST_REQUIRE_FFMPEG();
+    struct Case {
+        const char *name, *codec;
+    };
+    for (const Case &c : {Case{"film.mp4", "-c:v libx264 -g 5 -movflags +faststart"},
+                          Case{"film.avi", "-c:v mjpeg -q:v 2"}, Case{"film.mkv", "-c:v libx264 -g 5"}}) {
+        SCOPED_TRACE(c.name);
+        const VideoFile video(c.name, c.codec, "160x120", 40);
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+        const auto whole = source.read_all();
+        Bytes half = bytes_of(video.file());
+        half.resize(half.size() * 6 / 10);
+        write_bytes(video.file(), half);
+        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+        const auto frames = source.read_all();
+        ASSERT_GT(frames.size(), 10u);
+        ASSERT_LT(frames.size(), 38u);
+        EXPECT_EQ(frames.back().status, ARHOST_END);
+        const std::size_t good = frames.size() - 1;
+        // The last few may have gaps between them: pictures that were stored after the cut.
+        for (std::size_t n = 0, same = 0; n < good; ++n, ++same) {
+            while (whole.at(same).info.capture_ns < frames[n].info.capture_ns)
+                ++same;
+            EXPECT_EQ(frames[n].bytes, whole[same].bytes) << "frame " << n;
+        }
+        EXPECT_THAT(
+            source.log(ARHOST_WARNING),
+            HasSubstr(std::string(c.name) + "' is cut short: it ends after frame " + std::to_string(good - 1)));
+        EXPECT_EQ(source.read(good).status, ARHOST_END);
+    }
+}
+
+TEST(Video, WithoutItsIndexSaysWhatIsMissing) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mp4", h264); // its index lies at the end
+    Bytes half = bytes_of(video.file());
+    half.resize(half.size() / 2);
+    write_bytes(video.file(), half);
+    expect_refusal(video.options(), ARHOST_ERROR_CONFIGURATION, {"film.mp4", "moov atom not found"});
+}
+
+TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 40);
+    Bytes bytes = bytes_of(video.file());
+    for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 1500; ++i)
+        bytes[i] = static_cast<std::uint8_t>(i * 37);
+    write_bytes(video.file(), bytes);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    const auto whole = source.read_all();
+    EXPECT_GT(whole.size(), 30u);
+    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("is damaged near frame"));
+    ASSERT_EQ(source.start(video.options(), from(25)), ARHOST_OK);
+    EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
+}
+
+TEST(Video, RefusesASizeThatChanges) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile small("a.ts", "-c:v libx264", "96x64", 10), large("b.ts", "-c:v libx264", "128x96", 10);
+    Bytes both = bytes_of(small.file());
+    const Bytes second = bytes_of(large.file());
+    both.insert(both.end(), second.begin(), second.end());
+    write_bytes(small.file(), both);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(small.options()), ARHOST_OK) << source.log();
+    EXPECT_EQ(source.read_all().back().status, ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr(" is 128×96, those before it 96×64"));
+}
+
+TEST(Video, NoisyDecodersReachTheLogAsDebugAndNotStderr) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 20);
+    Bytes bytes = bytes_of(video.file());
+    for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 1500; ++i)
+        bytes[i] = static_cast<std::uint8_t>(i * 37);
+    write_bytes(video.file(), bytes);
+    testing::internal::CaptureStderr();
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    source.read_all();
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_THAT(source.log(ARHOST_DEBUG), HasSubstr("libav: "));
+}
+
+TEST(Video, StopsDecodingWhenCancelled) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mp4", h264);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    source.plugin().cancel();
+    EXPECT_EQ(source.read(39).status, ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(source.log(ARHOST_ERROR), "");
+    EXPECT_EQ(source.start(video.options(), from(39)), ARHOST_ERROR_CANCELLED);
+}
+
+// ---- in real time ----
+
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+arhost_source_setup paced(double fps = 0) {
+    arhost_source_setup setup{};
+    setup.paced = 1;
+    setup.fps = fps;
+    return setup;
+}
+
+} // namespace
+
+TEST(Paced, GivesNoFrameBeforeItsTime) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(20)), ARHOST_OK);
+    std::chrono::steady_clock::time_point first;
+    std::uint64_t skipped = 0;
+    for (std::uint64_t n = 0; n < 6; ++n) {
+        const SourceFrame frame = source.read(n);
+        if (n == 0)
+            first = std::chrono::steady_clock::now();
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        skipped += frame.info.skipped;
+        EXPECT_EQ(frame.info.capture_ns, static_cast<std::int64_t>((n + skipped) * 50'000'000));
+        EXPECT_GT(seconds_since(first), static_cast<double>(n + skipped) * 0.05 - 0.005);
+    }
+}
+
+TEST(Paced, SkipsWhatIsLateAndCountsIt) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mp4", h264);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    const auto whole = source.read_all();
+    ASSERT_EQ(source.start(video.options(), paced()), ARHOST_OK);
+    ASSERT_EQ(source.read(0).info.skipped, 0u);
+    std::this_thread::sleep_for(std::chrono::milliseconds(330));
+    const SourceFrame late = source.read(1); // frame 8 is due at 320 ms
+    EXPECT_GE(late.info.skipped, 7u);
+    ASSERT_LT(late.info.skipped, 30u);
+    EXPECT_EQ(late.bytes, whole.at(1 + late.info.skipped).bytes);
+    EXPECT_EQ(late.info.capture_ns, whole.at(1 + late.info.skipped).info.capture_ns);
+    const SourceFrame next = source.read(2);
+    const std::size_t index = 2 + late.info.skipped + next.info.skipped;
+    EXPECT_EQ(next.bytes, whole.at(index).bytes);
+}
+
+TEST(Paced, StopsWaitingWhenCancelled) {
+    ScratchFolder folder;
+    write_images(folder.path(), {0, 1});
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(0.05)), ARHOST_OK);
+    ASSERT_EQ(source.read(0).status, ARHOST_OK);
+    std::thread canceller([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        source.plugin().cancel();
+    });
+    EXPECT_EQ(source.read(1).status, ARHOST_ERROR_CANCELLED); // would be due after 20 s
+    canceller.join();
+}

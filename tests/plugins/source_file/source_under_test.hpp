@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Calls a source as arhost-worker would, and hands its frames out without the padding of their rows.
+#pragma once
+
+#include "plugin_under_test.hpp"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace arhost::test {
+
+struct SourceFrame {
+    arhost_status status = 0;
+    arhost_frame_info info{};
+    std::vector<std::uint8_t> bytes; // plane after plane, row after row
+};
+
+class SourceUnderTest {
+public:
+    explicit SourceUnderTest(const std::string &id) : plugin_(id), source_(plugin_.functions<arhost_source>()) {}
+    ~SourceUnderTest() { stop(); }
+
+    // Creates and starts; the status of whichever failed first.
+    arhost_status start(const std::map<std::string, std::string> &options, arhost_source_setup setup = {}) {
+        stop();
+        if (const arhost_status status = plugin_.create(options); status != ARHOST_OK)
+            return status;
+        setup.struct_size = sizeof setup;
+        properties_ = {};
+        properties_.struct_size = sizeof properties_;
+        properties_.format.struct_size = sizeof properties_.format;
+        properties_.intrinsics.struct_size = sizeof properties_.intrinsics;
+        const arhost_status status = source_.start(plugin_.instance(), &setup, &properties_);
+        running_ = status == ARHOST_OK;
+        if (running_) {
+            arhost_frame_format again = properties_.format;
+            EXPECT_TRUE(arhost_frame_layout(&again));
+            EXPECT_EQ(again.byte_size, properties_.format.byte_size) << "the format was not laid out";
+            buffer_.emplace(properties_.format.byte_size);
+        }
+        return status;
+    }
+
+    SourceFrame read(std::uint64_t sequence) {
+        const arhost_frame_format &format = properties_.format;
+        arhost_frame_buffer buffer{sizeof buffer, 0, &format, {}, buffer_->data() + format.grey_offset, sequence};
+        for (std::uint32_t p = 0; p < format.plane_count; ++p)
+            buffer.plane[p] = buffer_->data() + format.offset[p];
+        SourceFrame frame;
+        frame.info.struct_size = sizeof frame.info;
+        frame.status = source_.read(plugin_.instance(), &buffer, &frame.info);
+        EXPECT_TRUE(buffer_->intact()) << "wrote past the slot at frame " << sequence;
+        if (frame.status != ARHOST_OK)
+            return frame;
+        for (std::uint32_t p = 0; p < format.plane_count; ++p) {
+            const std::size_t rows = p == 0 ? format.height : format.height / 2;
+            for (std::size_t y = 0; y < rows; ++y) {
+                const std::uint8_t *row = buffer.plane[p] + y * format.stride[p];
+                frame.bytes.insert(frame.bytes.end(), row, row + row_bytes(p));
+            }
+        }
+        return frame;
+    }
+
+    // Up to the first that is no ARHOST_OK, which is the last in the list.
+    std::vector<SourceFrame> read_all(std::uint64_t from = 0, std::size_t at_most = 1000) {
+        std::vector<SourceFrame> frames;
+        do
+            frames.push_back(read(from + frames.size()));
+        while (frames.back().status == ARHOST_OK && frames.size() < at_most);
+        return frames;
+    }
+
+    void stop() {
+        if (running_)
+            source_.stop(plugin_.instance());
+        running_ = false;
+        plugin_.destroy();
+    }
+
+    const arhost_source_properties &properties() const { return properties_; }
+    const arhost_frame_format &format() const { return properties_.format; }
+    PluginUnderTest &plugin() { return plugin_; }
+    std::string log() const { return plugin_.log(); }
+
+    // The messages of one severity, which is how tests tell warnings from debug chatter.
+    std::string log(arhost_severity severity) const {
+        std::string found, line;
+        for (const char c : plugin_.log()) {
+            line += c;
+            if (c != '\n')
+                continue;
+            if (line.starts_with(std::to_string(severity) + " "))
+                found += line;
+            line.clear();
+        }
+        return found;
+    }
+
+private:
+    std::size_t row_bytes(std::uint32_t plane) const {
+        const std::size_t w = properties_.format.width;
+        switch (properties_.format.pixel_format) {
+        case ARHOST_RGB8:
+        case ARHOST_BGR8:
+            return 3 * w;
+        case ARHOST_YUYV:
+            return 2 * w;
+        case ARHOST_I420:
+            return plane == 0 ? w : w / 2;
+        default: // GREY8, NV12
+            return w;
+        }
+    }
+
+    PluginUnderTest plugin_;
+    const arhost_source &source_;
+    arhost_source_properties properties_{};
+    std::optional<GuardedBuffer> buffer_;
+    bool running_ = false;
+};
+
+} // namespace arhost::test

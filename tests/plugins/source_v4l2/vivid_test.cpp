@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Captures from the kernel's virtual camera `vivid`, and injects its faults. Run it in the VM:
+//   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
+#include "../source_file/source_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fcntl.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <thread>
+
+namespace fs = std::filesystem;
+using arhost::test::SourceFrame;
+using arhost::test::SourceUnderTest;
+using testing::HasSubstr;
+
+namespace {
+
+const char *const device = "/dev/video0";
+
+// vivid's own controls, by number: its header is not installed.
+enum : std::uint32_t {
+    test_pattern = 0x00f0f000,     // 1: 100% colour bars
+    osd_text_mode = 0x00f0f001,    // 2: no text over the picture
+    timestamp_source = 0x00f0f018, // 0: end of frame, 1: start of exposure
+    colorspace = 0x00f0f019,       // 1: Rec. 709, 2: sRGB
+    quantization = 0x00f0f01c,     // 1: full range
+    percentage_of_dropped_buffers = 0x00f0f040,
+    disconnect = 0x00f0f041,
+    inject_buffer_error = 0x00f0f042,
+    inject_reqbufs_error = 0x00f0f043,
+    inject_qbuf_error = 0x00f0f044,
+    inject_streamon_error = 0x00f0f045,
+    inject_fatal_streaming_error = 0x00f0f046
+};
+
+class Vivid : public testing::Test {
+protected:
+    void SetUp() override {
+        fd_ = open(device, O_RDWR | O_CLOEXEC);
+        v4l2_capability capability{};
+        ASSERT_TRUE(fd_ >= 0 && ioctl(fd_, VIDIOC_QUERYCAP, &capability) == 0 &&
+                    std::string(reinterpret_cast<const char *>(capability.driver)) == "vivid")
+            << device << " is not vivid's: run this program through tools/vm/run-in-vm";
+        set(test_pattern, 1);
+        set(osd_text_mode, 2);
+        // Its frames end when the next one begins, by its count: some 30 ms after it hands them out.
+        set(timestamp_source, 1);
+        set(colorspace, 2);
+        set(quantization, 0);
+        set(percentage_of_dropped_buffers, 0);
+    }
+    void TearDown() override {
+        source_.stop();
+        close(fd_);
+    }
+    void set(std::uint32_t id, int value) const {
+        v4l2_ext_control control{};
+        control.id = id;
+        control.value = value;
+        v4l2_ext_controls controls{};
+        controls.which = V4L2_CTRL_WHICH_CUR_VAL;
+        controls.count = 1;
+        controls.controls = &control;
+        ASSERT_EQ(ioctl(fd_, VIDIOC_S_EXT_CTRLS, &controls), 0) << "control " << std::hex << id;
+    }
+    // Small and fast, since the machine is emulated.
+    arhost_status start(double fps = 60, std::map<std::string, std::string> options = {}, bool live = true) {
+        options.try_emplace("device", device);
+        if (!options.contains("width")) {
+            options["width"] = "320";
+            options["height"] = "180";
+        }
+        arhost_source_setup setup{};
+        setup.fps = fps;
+        setup.paced = live;
+        return source_.start(options, setup);
+    }
+
+    SourceUnderTest source_{"source_v4l2"};
+    int fd_ = -1;
+};
+
+std::int64_t monotonic_ns() {
+    timespec time{};
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
+}
+
+std::size_t open_files() {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), {}));
+}
+
+std::size_t device_mappings() {
+    std::ifstream maps("/proc/self/maps");
+    std::size_t count = 0;
+    for (std::string line; std::getline(maps, line);)
+        count += line.find("/dev/video") != std::string::npos;
+    return count;
+}
+
+[[maybe_unused]] std::size_t resident_kib() {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmRSS:"))
+            return std::stoul(line.substr(6));
+    return 0;
+}
+
+// What YUV of 8 bits shows, by the standard's formula.
+std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb, bool full) {
+    const double luma = full ? y : (y - 16) * 255 / 219;
+    const double scale = full ? 1 : 255.0 / 224;
+    const double cb = (u - 128) * scale, cr = (v - 128) * scale;
+    const double r = luma + 2 * (1 - kr) * cr, b = luma + 2 * (1 - kb) * cb;
+    return {r, (luma - kr * r - kb * b) / (1 - kr - kb), b};
+}
+
+} // namespace
+
+TEST_F(Vivid, GivesYuyvAtTheSizeAndRateAskedFor) {
+    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.format().pixel_format, ARHOST_YUYV);
+    EXPECT_EQ(source_.format().width, 320u);
+    EXPECT_EQ(source_.format().height, 180u);
+    EXPECT_EQ(source_.format().fps, 30.0);
+    EXPECT_EQ(source_.properties().frame_count, 0u);
+    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source_.log(ARHOST_WARNING), "");
+}
+
+TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
+    struct Case {
+        int colorspace, quantization;
+        arhost_yuv_matrix matrix;
+        arhost_yuv_range range;
+        double kr, kb;
+    };
+    for (const Case &c : {Case{2, 0, ARHOST_BT601, ARHOST_LIMITED_RANGE, 0.299, 0.114},
+                          Case{1, 0, ARHOST_BT709, ARHOST_LIMITED_RANGE, 0.2126, 0.0722},
+                          Case{2, 1, ARHOST_BT601, ARHOST_FULL_RANGE, 0.299, 0.114}}) {
+        SCOPED_TRACE("colorspace " + std::to_string(c.colorspace) + ", quantization " +
+                     std::to_string(c.quantization));
+        set(colorspace, c.colorspace);
+        set(quantization, c.quantization);
+        ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+        EXPECT_EQ(source_.format().yuv_matrix, c.matrix);
+        EXPECT_EQ(source_.format().yuv_range, c.range);
+        const SourceFrame frame = source_.read(0);
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        // White, yellow, cyan, green, magenta, red, blue, black; eight bars over 320 px.
+        const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
+                                                         {255, 255, 0},
+                                                         {0, 255, 255},
+                                                         {0, 255, 0},
+                                                         {255, 0, 255},
+                                                         {255, 0, 0},
+                                                         {0, 0, 255},
+                                                         {0, 0, 0}}};
+        for (const std::size_t y : {5u, 90u, 174u})
+            for (std::size_t bar = 0; bar < 8; ++bar) {
+                const std::uint8_t *pair = &frame.bytes[y * 640 + 2 * (bar * 40 + 20)];
+                const auto rgb = rgb_of(pair[0], pair[1], pair[3], c.kr, c.kb, c.range == ARHOST_FULL_RANGE);
+                for (std::size_t i = 0; i < 3; ++i)
+                    EXPECT_NEAR(rgb[i], bars[bar][i], 4) << "bar " << bar << ", row " << y << ", channel " << i;
+            }
+        source_.stop();
+    }
+}
+
+TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
+    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
+    std::int64_t last = 0;
+    for (std::uint64_t n = 0; n < 15; ++n) {
+        const SourceFrame frame = source_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
+        EXPECT_GT(frame.info.capture_ns, last);
+        const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
+        EXPECT_GE(age, 0);
+        EXPECT_LT(age, 1'000'000'000);
+        if (n > 0 && frame.info.skipped == 0) {
+            EXPECT_NEAR(static_cast<double>(frame.info.capture_ns - last), 33.3e6, 20e6);
+        }
+        last = frame.info.capture_ns;
+    }
+}
+
+TEST_F(Vivid, GivesTheNewestFrameInLiveUseAndCountsTheOthers) {
+    ASSERT_EQ(start(50), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    const std::int64_t asked = monotonic_ns();
+    const SourceFrame frame = source_.read(1);
+    ASSERT_EQ(frame.status, ARHOST_OK);
+    EXPECT_GE(frame.info.skipped, 2u) << "the driver had four buffers to fill";
+    // It had none left after that, but has them back now.
+    EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "all older frames were drained";
+}
+
+TEST_F(Vivid, GivesEveryFrameInOrderInLockstep) {
+    ASSERT_EQ(start(50, {}, false), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    const std::int64_t asked = monotonic_ns();
+    for (std::uint64_t n = 1; n < 4; ++n)
+        EXPECT_LT(source_.read(n).info.capture_ns, asked - 200'000'000) << "the oldest that the driver holds";
+}
+
+TEST_F(Vivid, CountsWhatTheDriverDropped) {
+    set(percentage_of_dropped_buffers, 50);
+    ASSERT_EQ(start(50), ARHOST_OK) << source_.log();
+    std::uint64_t skipped = 0;
+    const std::int64_t first = source_.read(0).info.capture_ns;
+    std::int64_t last = first;
+    for (std::uint64_t n = 1; n < 30; ++n) {
+        const SourceFrame frame = source_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        skipped += frame.info.skipped;
+        last = frame.info.capture_ns;
+    }
+    EXPECT_GT(skipped, 5u);
+    // Frames given and frames lost make up the time that passed.
+    EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
+}
+
+TEST_F(Vivid, DropsAFrameThatTheDriverMarksAsDamaged) {
+    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    set(inject_buffer_error, 1);
+    std::uint64_t skipped = 0;
+    for (std::uint64_t n = 1; n < 6; ++n) {
+        const SourceFrame frame = source_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_OK);
+        skipped += frame.info.skipped;
+    }
+    EXPECT_GE(skipped, 1u);
+}
+
+TEST_F(Vivid, GivesThreeHundredFramesAndLeaksNothing) {
+    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    source_.stop();
+    const std::size_t files = open_files();
+    [[maybe_unused]] const std::size_t memory = resident_kib();
+    for (int round = 0; round < 3; ++round) {
+        ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+        EXPECT_EQ(device_mappings(), 4u);
+        for (std::uint64_t n = 0; n < 100; ++n)
+            ASSERT_EQ(source_.read(n).status, ARHOST_OK) << source_.log();
+        source_.stop();
+        EXPECT_EQ(device_mappings(), 0u);
+        EXPECT_EQ(open_files(), files);
+    }
+#ifndef __SANITIZE_ADDRESS__ // that keeps freed memory for a while, and looks for leaks itself
+    EXPECT_LT(resident_kib(), memory + 2048);
+#endif
+}
+
+TEST_F(Vivid, TakesTheBuffersAskedFor) {
+    ASSERT_EQ(start(60, {{"buffers", "8"}}), ARHOST_OK) << source_.log();
+    EXPECT_EQ(device_mappings(), 8u);
+    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+}
+
+TEST_F(Vivid, TakesTheDriversSizeWhereNoneIsAskedFor) {
+    ASSERT_EQ(start(25, {{"width", "0"}, {"height", "0"}}), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source_.format().width * 9, source_.format().height * 16);
+}
+
+TEST_F(Vivid, TakesTheCalibrationsSize) {
+    arhost_intrinsics camera{};
+    camera.struct_size = sizeof camera;
+    camera.width = 640;
+    camera.height = 480;
+    arhost_source_setup setup{};
+    setup.intrinsics = &camera;
+    ASSERT_EQ(source_.start({{"device", device}}, setup), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.format().width, 640u);
+    EXPECT_EQ(source_.format().height, 480u);
+    EXPECT_EQ(source_.start({{"device", device}, {"width", "320"}, {"height", "180"}}, setup),
+              ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_ERROR),
+                HasSubstr("320×180 is asked for, but the camera's calibration is for 640×480"));
+}
+
+TEST_F(Vivid, RefusesASizeThatItDoesNotOfferAndNamesTheNearest) {
+    EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has no size 650×470 in YUYV"));
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("the nearest are 640×480"));
+}
+
+TEST_F(Vivid, RefusesAFormatThatItDoesNotOfferAndListsThoseThatItDoes) {
+    EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("offers no mjpeg"));
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
+}
+
+TEST_F(Vivid, WarnsOfARateThatItCantReach) {
+    ASSERT_EQ(start(120), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.format().fps, 60.0);
+    EXPECT_THAT(source_.log(ARHOST_WARNING), HasSubstr("asked for"));
+}
+
+TEST_F(Vivid, TellsThatAnotherProgramHasTheCamera) {
+    SourceUnderTest first("source_v4l2");
+    ASSERT_EQ(first.start({{"device", device}}), ARHOST_OK) << first.log();
+    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("in use by another program"));
+    first.stop();
+    EXPECT_EQ(start(), ARHOST_OK) << source_.log();
+}
+
+TEST_F(Vivid, ListsTheCamerasThereAreWhereTheNamedOneIsMissing) {
+    EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+}
+
+TEST_F(Vivid, StopsWaitingWhenCancelled) {
+    ASSERT_EQ(start(1), ARHOST_OK) << source_.log(); // a frame a second
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    std::thread canceller([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        source_.plugin().cancel();
+    });
+    const std::int64_t before = monotonic_ns();
+    EXPECT_EQ(source_.read(1).status, ARHOST_ERROR_CANCELLED);
+    EXPECT_LT(monotonic_ns() - before, 700'000'000);
+    canceller.join();
+    EXPECT_EQ(source_.log(ARHOST_ERROR), "");
+}
+
+TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
+    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    set(disconnect, 1);
+    std::uint64_t n = 1;
+    SourceFrame frame;
+    do
+        frame = source_.read(n);
+    while (frame.status == ARHOST_OK && ++n < 10);
+    EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has gone away: was it unplugged?"));
+    source_.stop();
+    EXPECT_EQ(device_mappings(), 0u);
+    // vivid plugs itself in again once everyone has let go of it.
+    close(fd_);
+    fd_ = open(device, O_RDWR | O_CLOEXEC);
+    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+}
+
+TEST_F(Vivid, TellsThatItsDriverGaveUp) {
+    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    set(inject_fatal_streaming_error, 1);
+    std::uint64_t n = 1;
+    SourceFrame frame;
+    do
+        frame = source_.read(n);
+    while (frame.status == ARHOST_OK && ++n < 10);
+    EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has stopped streaming"));
+}
+
+TEST_F(Vivid, ReportsFaultsOfTheDriverAtTheStart) {
+    set(inject_reqbufs_error, 1);
+    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at reserving 4 buffers"));
+    set(inject_qbuf_error, 1);
+    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at handing a buffer"));
+    set(inject_streamon_error, 1);
+    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at starting to stream"));
+    EXPECT_EQ(device_mappings(), 0u);
+    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+}
