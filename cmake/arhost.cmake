@@ -23,6 +23,7 @@ if(ARHOST_SANITIZE)
 endif()
 
 set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost)
+add_custom_target(plugins COMMENT "All plugins")
 
 # arhost_add_library(name SOURCES … [LIBRARIES …]): a room of core/, included as <room/header.h>.
 function(arhost_add_library name)
@@ -42,6 +43,9 @@ function(arhost_add_plugin name)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${ARHOST_PLUGIN_DIRECTORY})
   # arhost_entry is the one symbol that leaves the library.
   target_link_options(${name} PRIVATE -Wl,--version-script=${CMAKE_SOURCE_DIR}/cmake/plugin.map)
+  if(CMAKE_CURRENT_SOURCE_DIR MATCHES "^${CMAKE_SOURCE_DIR}/plugins/")
+    add_dependencies(plugins ${name})
+  endif()
   set_target_properties(${name} PROPERTIES LINK_DEPENDS ${CMAKE_SOURCE_DIR}/cmake/plugin.map)
 endfunction()
 

@@ -379,7 +379,9 @@ private:
     }
 
     std::string name_of(std::size_t object) const {
-        return "object " + std::to_string(object) + " '" + (names_.data() + objects_[object].name) + "'";
+        constexpr std::size_t shown = 64; // a million objects may share one name of a gigabyte
+        const char *name = names_.data() + objects_[object].name;
+        return "object " + std::to_string(object) + " '" + std::string(name, strnlen(name, shown)) + "'";
     }
 
     void check_object(std::size_t i) {
@@ -556,7 +558,7 @@ std::string validate(std::span<const std::byte> arena) {
         Checker(arena).run();
         return {};
     } catch (const Fault &found) {
-        return "the scene can't be used: " + found.text;
+        return found.text;
     }
 }
 

@@ -97,10 +97,11 @@ private:
     std::string names_;
 };
 
-// What is wrong with an arena that another process wrote: one sentence, empty where nothing is. Every
-// offset, count, index, enumeration and number is checked before it is used, so a ray tracer may use all
-// of them unchecked afterwards, provided that nobody can write the arena any more. Takes time in
-// proportion to the arena's size, whatever stands in it.
+// What is wrong with an arena that another process wrote, as the end of a sentence about the scene
+// ("object 2 'ball' has material 7, but there are 3"); empty where nothing is. Every offset, count, index,
+// enumeration and number is checked before it is used, so a ray tracer may use all of them unchecked
+// afterwards, provided that nobody can write the arena any more. Takes time in proportion to the arena's
+// size, whatever stands in it.
 std::string validate(std::span<const std::byte> arena);
 
 } // namespace arhost::scene

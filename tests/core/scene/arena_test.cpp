@@ -320,6 +320,20 @@ TEST(Validate, RefusesThatManyGeometriesShareOneLargeBuffer) {
     EXPECT_THAT(validate(arena.bytes()), HasSubstr("shares bytes with other buffers"));
 }
 
+TEST(Validate, IsQuickWhereManyObjectsShareOneVeryLongName) {
+    ArenaBuilder builder;
+    const std::uint32_t material = builder.add_material(grey());
+    const std::uint32_t geometry = builder.add_triangles(square());
+    builder.add_object(std::string(10'000'000, 'x'), geometry, material);
+    for (int i = 1; i < 10'000; ++i)
+        builder.add_object("", geometry, material);
+    Arena arena = std::move(builder).build();
+    for (int i = 1; i < 10'000; ++i)
+        objects(arena)[i].name = 0;
+    objects(arena)[9'999].role = 0;
+    EXPECT_EQ(validate(arena.bytes()), "object 9999 '" + std::string(64, 'x') + "' has a role of no known kind");
+}
+
 TEST(Validate, ReadsEveryBufferOnlyInsideTheArena) {
     const std::size_t buffer_count = [] {
         Arena arena = small_scene().build();

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One-way latency of a command from the host to a worker and of its result back, with a sleeping and with
+// a polling receiver, beside a bare pair of eventfds in the same run. Two processes.
+#include "ring/memory.hpp"
+#include "ring/protocol.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/wait.h>
+#include <vector>
+
+using namespace arhost::ring;
+using namespace std::chrono_literals;
+
+namespace {
+
+std::int64_t now_ns() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+struct Latencies {
+    std::vector<std::int64_t> there, back; // ns
+    void print(const char *name) {
+        const auto percentile = [](std::vector<std::int64_t> &samples, double share) {
+            std::sort(samples.begin(), samples.end());
+            return static_cast<double>(samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1))]) * 1e-3;
+        };
+        std::printf("%-28s %8.1f %8.1f   %8.1f %8.1f\n", name, percentile(there, 0.5), percentile(there, 0.99),
+                    percentile(back, 0.5), percentile(back, 0.99));
+    }
+};
+
+// The project's own way: command ring and futex there, result ring and doorbell back.
+Latencies link(int rounds, bool polling) {
+    const SharedMemory host_memory = SharedMemory::create("host", sizeof(HostPage));
+    const SharedMemory worker_memory = SharedMemory::create("worker", sizeof(WorkerPage));
+    const Mapping host = host_memory.map(Access::read_write);
+    const DoorbellPair bell = make_doorbell();
+    const auto spin = polling ? 1s : 0s;
+    const pid_t worker = ::fork();
+    if (worker == 0) {
+        const Mapping reader = host_memory.map(Access::read_only), mine = worker_memory.map(Access::read_write);
+        CommandConsumer commands(reader.as<HostPage>().commands, mine.as<WorkerPage>().commands);
+        ResultProducer results(mine.as<WorkerPage>().results, reader.as<HostPage>().results);
+        for (int i = 0; i < rounds;) {
+            const std::uint32_t seen = wake_count(reader.as<HostPage>().wake);
+            Command command;
+            if (commands.pop(command) != RingResult::done) {
+                wait_for_wake(reader.as<HostPage>().wake, seen, 1s, spin);
+                continue;
+            }
+            Result result{};
+            result.frame.capture_ns = now_ns() - command.capture_ns; // the way there
+            result.busy_ns = now_ns();
+            results.push(result);
+            ring_doorbell(bell.worker.get());
+            ++i;
+        }
+        ::_exit(0);
+    }
+    const Mapping theirs = worker_memory.map(Access::read_only);
+    CommandProducer commands(host.as<HostPage>().commands, theirs.as<WorkerPage>().commands);
+    ResultConsumer results(theirs.as<WorkerPage>().results, host.as<HostPage>().results);
+    Latencies latencies;
+    for (int i = 0; i < rounds; ++i) {
+        ::usleep(200); // let the other side fall asleep
+        Command command{};
+        command.capture_ns = now_ns();
+        commands.push(command);
+        wake(host.as<HostPage>().wake);
+        Result result;
+        while (results.pop(result) != RingResult::done)
+            if (!polling) {
+                pollfd ready{bell.host.get(), POLLIN, 0};
+                ::poll(&ready, 1, 1000);
+                drain_doorbell(bell.host.get());
+            }
+        latencies.back.push_back(now_ns() - result.busy_ns);
+        latencies.there.push_back(result.frame.capture_ns);
+        drain_doorbell(bell.host.get());
+    }
+    ::waitpid(worker, nullptr, 0);
+    return latencies;
+}
+
+// The bound: two eventfds and a page for the time stamps.
+Latencies eventfds(int rounds) {
+    const SharedMemory memory = SharedMemory::create("times", 4096);
+    const Mapping page = memory.map(Access::read_write);
+    auto *stamps = reinterpret_cast<volatile std::int64_t *>(page.bytes().data());
+    const UniqueFd there(::eventfd(0, EFD_CLOEXEC)), back(::eventfd(0, EFD_CLOEXEC));
+    const std::uint64_t one = 1;
+    std::uint64_t count = 0;
+    const pid_t worker = ::fork();
+    if (worker == 0) {
+        for (int i = 0; i < rounds; ++i) {
+            if (::read(there.get(), &count, sizeof count) < 0)
+                ::_exit(1);
+            stamps[1] = now_ns() - stamps[0];
+            stamps[2] = now_ns();
+            if (::write(back.get(), &one, sizeof one) < 0)
+                ::_exit(1);
+        }
+        ::_exit(0);
+    }
+    Latencies latencies;
+    for (int i = 0; i < rounds; ++i) {
+        ::usleep(200);
+        stamps[0] = now_ns();
+        if (::write(there.get(), &one, sizeof one) < 0 || ::read(back.get(), &count, sizeof count) < 0)
+            std::abort();
+        latencies.back.push_back(now_ns() - stamps[2]);
+        latencies.there.push_back(stamps[1]);
+    }
+    ::waitpid(worker, nullptr, 0);
+    return latencies;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    const int rounds = argc > 1 ? std::atoi(argv[1]) : 5000;
+    if (rounds < 1) {
+        std::fprintf(stderr, "usage: bench-handoff [ROUNDS]\n");
+        return 2;
+    }
+    std::printf("one-way latency, µs            host → worker        worker → host\n");
+    std::printf("%-28s %8s %8s   %8s %8s\n", "", "p50", "p99", "p50", "p99");
+    eventfds(rounds).print("bare eventfds, sleeping");
+    link(rounds, false).print("arhost's link, sleeping");
+    link(rounds, true).print("arhost's link, polling");
+    return 0;
+}

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How long a mesh takes from its file to a checked arena, beside the bound that no loader of a .gz can
+// beat: reading it and unpacking it with zlib into memory of the right size.
+//
+//   scene-loading-bench dragon_vrip.ply.gz [runs]
+#include "scene/arena.hpp"
+#include "scene/mesh.hpp"
+
+#include <sys/resource.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace arhost::scene;
+
+// The best and the median of its runs, in ms.
+struct Times {
+    const char *what;
+    std::vector<double> ms;
+    template <class Work> auto operator()(Work &&work) {
+        const auto start = std::chrono::steady_clock::now();
+        auto result = work();
+        ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+        return result;
+    }
+    void print() {
+        std::sort(ms.begin(), ms.end());
+        std::printf("%-34s %8.1f %8.1f\n", what, ms.front(), ms[ms.size() / 2]);
+    }
+};
+
+// The unpacked size, or the file's where it isn't packed. `out` is as large already from the second run on.
+std::size_t read_and_unzip(const char *path, std::vector<char> &out) {
+    std::ifstream stream(path, std::ios::binary | std::ios::ate);
+    std::vector<char> packed(static_cast<std::size_t>(stream.tellg()));
+    stream.seekg(0).read(packed.data(), static_cast<std::streamsize>(packed.size()));
+    if (!stream || packed.size() < 18 || packed[0] != '\x1f' || packed[1] != '\x8b')
+        return packed.size();
+    unsigned char told[4];
+    std::memcpy(told, packed.data() + packed.size() - 4, 4);
+    out.resize(told[0] | told[1] << 8 | told[2] << 16 | std::size_t(told[3]) << 24);
+    z_stream unzip{};
+    unzip.next_in = reinterpret_cast<Bytef *>(packed.data());
+    unzip.avail_in = static_cast<uInt>(packed.size());
+    unzip.next_out = reinterpret_cast<Bytef *>(out.data());
+    unzip.avail_out = static_cast<uInt>(out.size());
+    inflateInit2(&unzip, 16 + MAX_WBITS);
+    inflate(&unzip, Z_FINISH);
+    inflateEnd(&unzip);
+    return unzip.total_out;
+}
+
+ArenaBuilder scene_of(TriangleMesh mesh) {
+    arhost_material grey{};
+    grey.model = ARHOST_DIFFUSE;
+    grey.exponent = 1;
+    ArenaBuilder builder;
+    builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey));
+    return builder;
+}
+
+void run(const char *path, int runs) {
+    Times unzip{"read and unzip only (the bound)", {}}, load{"load: read, unzip, parse", {}},
+        normals{"smooth normals", {}}, write{"write the arena (flat)", {}}, check{"validate it", {}},
+        write_smooth{"write the arena (with normals)", {}}, check_smooth{"validate it", {}};
+    std::vector<char> text;
+    std::size_t bytes = 0, triangles = 0;
+    for (int i = 0; i < runs; ++i) {
+        bytes = unzip([&] { return read_and_unzip(path, text); });
+        TriangleMesh mesh = load([&] { return load_mesh(path); });
+        triangles = mesh.triangles.size();
+        TriangleMesh smooth = mesh;
+        smooth.normals = normals([&] { return smooth_normals(mesh); });
+        const auto fill = [](Times &write_times, Times &check_times, TriangleMesh &&content) {
+            ArenaBuilder builder = scene_of(std::move(content));
+            const Arena arena = write_times([&] { return std::move(builder).build(); });
+            if (const std::string fault = check_times([&] { return validate(arena.bytes()); }); !fault.empty())
+                throw std::runtime_error(fault);
+        };
+        fill(write, check, std::move(mesh));
+        fill(write_smooth, check_smooth, std::move(smooth));
+    }
+    std::printf("%s: %zu triangles, %.1f MB of text, %d runs\n%-34s %8s %8s\n", path, triangles,
+                static_cast<double>(bytes) / 1e6, runs, "ms", "best", "median");
+    for (Times *times : {&unzip, &load, &write, &check, &normals, &write_smooth, &check_smooth})
+        times->print();
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    std::printf("peak memory %ld MB\n", usage.ru_maxrss / 1000);
+}
+
+} // namespace
+
+int main(int count, char **arguments) {
+    if (count < 2) {
+        std::fprintf(stderr, "usage: scene-loading-bench MESH [RUNS]\n");
+        return 2;
+    }
+    try {
+        run(arguments[1], count > 2 ? std::max(1, std::atoi(arguments[2])) : 10);
+        return 0;
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "%s\n", error.what());
+        return 1;
+    }
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What arhost-cpp/plugin.hpp makes of a class.
+#include <arhost-cpp/plugin.hpp>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+class Thrower {
+public:
+    Thrower(const arhost::Host &, const arhost::Options &options) {
+        if (options.boolean("refuse"))
+            throw arhost::Failure(ARHOST_ERROR_CONFIGURATION, "refused");
+    }
+    void start(const arhost_tracker_setup &) { throw std::runtime_error("no luck"); }
+    void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
+};
+constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "refuse", "false", "Fails")};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_TRACKER, "thrower", "Thrower", "0", "arhost",
+                                          "Apache-2.0", "Throws.", 0, 1, options, nullptr};
+
+std::string logged;
+const arhost_host host = {sizeof host, ARHOST_ABI_VERSION, "test", "0", nullptr,
+                          [](const arhost_host *, arhost_severity, const char *text) { logged = text; },
+                          [](const arhost_host *, double, const char *) {}, [](const arhost_host *) { return 0; },
+                          [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+
+} // namespace
+
+ARHOST_TRACKER(Thrower, descriptor)
+
+TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
+    const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
+    arhost_answer answer{sizeof answer, 99, nullptr};
+    ASSERT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_OK);
+    EXPECT_EQ(answer.abi_version, ARHOST_ABI_VERSION);
+    const auto &tracker = *static_cast<const arhost_tracker *>(answer.plugin->functions);
+
+    arhost_option refuse{sizeof refuse, ARHOST_OPTION_BOOL, "refuse", 1, 0, ""};
+    arhost_instance *instance = nullptr;
+    EXPECT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(logged, "refused");
+    EXPECT_EQ(instance, nullptr);
+
+    refuse.integer = 0;
+    ASSERT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_OK);
+    EXPECT_EQ(tracker.start(instance, nullptr), ARHOST_ERROR_INTERNAL);
+    EXPECT_EQ(logged, "no luck");
+    EXPECT_EQ(tracker.track(instance, nullptr, nullptr), ARHOST_ERROR_OUT_OF_MEMORY);
+    tracker.stop(instance);
+    answer.plugin->destroy(instance);
+
+    EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_ERROR_INVALID_ARGUMENT) << "an option is missing";
+}
+
+TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {
+    const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION + 1, ARHOST_ABI_VERSION + 9};
+    arhost_answer answer{sizeof answer, 99, nullptr};
+    EXPECT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_EQ(answer.plugin, nullptr);
+}

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A component without a pipeline around it: start, commands, death, end.
+#include "supervise/component.hpp"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+
+using namespace arhost::supervise;
+using namespace arhost::ring;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Bench {
+    Reactor reactor;
+    Launcher launcher;
+    std::string log;
+    Context context{reactor, launcher, ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
+                    [this](arhost_severity, const std::string &component, const std::string &text) {
+                        log += component + ": " + text + "\n";
+                    }};
+    std::vector<std::string> events;
+    std::unique_ptr<Component> component;
+
+    void make(const std::string &plugin, Limits limits = {}, Json options = Json::object()) {
+        Component::Hooks hooks;
+        hooks.hello = [this, options](const PluginDescription &description, std::size_t) {
+            events.push_back("hello " + description.id);
+            std::vector<OptionValue> values;
+            for (const OptionDeclaration &o : description.options)
+                values.push_back({o.key, o.type, options.value(o.key, o.default_value ? std::atoi(o.default_value->c_str()) : 0), 0.0, ""});
+            for (OptionValue &value : values)
+                if (value.key == "width" || value.key == "height")
+                    value.integer = 8;
+            return Component::Create{{{"options", to_json(values)},
+                                      {"setup", {{"first_sequence", 0}, {"fps", 0.0}, {"paced", false}}}},
+                                     {}};
+        };
+        hooks.ready = [this](const Json &ready) {
+            events.push_back("ready");
+            return SlotLayout{format_from_json(ready.at("format")).byte_size, 4};
+        };
+        hooks.running = [this] { events.push_back("running"); };
+        hooks.result = [this](const Command &command, const Result &result) {
+            events.push_back("result " + std::to_string(command.sequence) + (result.status == ARHOST_OK ? "" : " failed"));
+        };
+        hooks.lost = [this](const std::vector<Command> &unanswered) {
+            events.push_back("lost " + std::to_string(unanswered.size()));
+        };
+        hooks.given_up = [this](const std::string &, bool by_configuration) {
+            events.push_back(by_configuration ? "misconfigured" : "given up");
+        };
+        hooks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
+        component = std::make_unique<Component>(context, "source",
+                                                std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
+                                                limits, std::move(hooks));
+        component->start();
+    }
+    // Runs until the event has come, or the time is over.
+    bool until(const std::string &event, std::size_t times = 1) {
+        bool over = false;
+        const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { over = true; });
+        while (!over) {
+            if (static_cast<std::size_t>(std::count(events.begin(), events.end(), event)) >= times)
+                return true;
+            reactor.run_once();
+        }
+        return false;
+    }
+    void read(std::uint64_t sequence) {
+        Command command{};
+        command.kind = CommandKind::read;
+        command.slot = static_cast<std::uint32_t>(sequence % 4);
+        command.sequence = sequence;
+        component->submit(command);
+    }
+};
+
+} // namespace
+
+TEST(Component, StartsServesAndStops) {
+    Bench bench;
+    bench.make("source_counter", {}, {{"frames", 100}, {"crash_at", -1}});
+    ASSERT_TRUE(bench.until("running")) << bench.log;
+    bench.read(0);
+    bench.read(1);
+    ASSERT_TRUE(bench.until("result 1")) << bench.log;
+    const RegionPointer &output = bench.component->output();
+    EXPECT_EQ(output->layout.slot(output->mapping, 1)[0], std::byte(1)) << "the frame's first pixel is its number";
+    bench.component->stop();
+    ASSERT_TRUE(bench.until("stopped"));
+    EXPECT_EQ(bench.events, (std::vector<std::string>{"hello source_counter", "ready", "running", "result 0", "result 1", "stopped"}));
+    EXPECT_EQ(bench.component->restarts(), 0u);
+}
+
+TEST(Component, ReturnsWhatWasLostAndGetsNewMemoryAfterADeath) {
+    Bench bench;
+    bench.make("source_counter", {.restart = {.first_delay = 1ms}}, {{"frames", 100}, {"crash_at", 2}});
+    ASSERT_TRUE(bench.until("running"));
+    const RegionPointer first = bench.component->output();
+    for (std::uint64_t i = 0; i < 4; ++i)
+        bench.read(i);
+    ASSERT_TRUE(bench.until("lost 2")) << "0 and 1 were answered";
+    ASSERT_TRUE(bench.until("running", 2));
+    EXPECT_NE(bench.component->output(), first);
+    EXPECT_GT(bench.component->output()->generation, first->generation);
+    ASSERT_EQ(bench.component->crashes().size(), 1u);
+    EXPECT_EQ(bench.component->crashes()[0].frame, 2u);
+}
+
+TEST(Component, IsEndedWhenItIsStoppedForLongerThanItsDeadline) {
+    Bench bench;
+    bench.make("source_counter", {.frame = 200ms, .restart = {.first_delay = 1ms}}, {{"frames", 100}, {"crash_at", -1}});
+    ASSERT_TRUE(bench.until("running"));
+    ::kill(bench.component->pid(), SIGSTOP);
+    bench.read(0);
+    ASSERT_TRUE(bench.until("lost 1"));
+    EXPECT_NE(bench.component->crashes()[0].how.find("hung: no answer within 200 ms"), std::string::npos);
+    ASSERT_TRUE(bench.until("running", 2));
+}
+
+TEST(Component, IsNotTriedAgainWhenItsLibraryCanNotBeUsed) {
+    for (const char *plugin : {"broken_constructor", "none"}) {
+        Bench bench;
+        bench.make(plugin);
+        ASSERT_TRUE(bench.until("misconfigured")) << bench.log;
+        EXPECT_EQ(bench.component->state(), Component::State::given_up);
+        EXPECT_EQ(bench.component->restarts(), 0u);
+    }
+}
