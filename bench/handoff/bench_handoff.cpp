@@ -113,7 +113,7 @@ Latencies eventfds(int rounds) {
         if (::write(there.get(), &one, sizeof one) < 0 || ::read(back.get(), &count, sizeof count) < 0)
             std::abort();
         latencies.back.push_back(now_ns() - stamps[2]);
-        latencies.there.push_back(stamps[1]);
+        latencies.there.push_back(std::int64_t(stamps[1]));
     }
     ::waitpid(worker, nullptr, 0);
     return latencies;

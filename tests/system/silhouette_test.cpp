@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Registration from end to end, lens distortion on: where the silhouette of a virtual plate lands in the
+// augmented frames, against where the source's exact pose puts it.
+#include "arhost_run.hpp"
+#include "camera/lens.hpp"
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+using namespace arhost;
+using namespace arhost::test;
+
+namespace {
+
+constexpr int frames = 50;
+constexpr double half_side_mm = 45; // of the plate, which lies on the marker
+
+arhost_intrinsics lens() {
+    arhost_intrinsics i{};
+    i.struct_size = sizeof i;
+    i.width = 960;
+    i.height = 540;
+    i.fx = 760;
+    i.fy = 755;
+    i.cx = 489.3;
+    i.cy = 262.8;
+    i.distortion = ARHOST_DISTORTION_BROWN;
+    i.coefficient_count = 5;
+    const double coefficients[] = {-0.21, 0.09, 0.0012, -0.0008, 0.01};
+    std::copy(std::begin(coefficients), std::end(coefficients), i.coefficients);
+    return i;
+}
+
+std::string configuration(const std::string &tracker) {
+    return "version: 1\nsource: {plugin: source_synthetic, fps: 5, options: {frames: " + std::to_string(frames) +
+           ", family: tag36h11, id: 0, side_mm: 80}}\n"
+           "camera: {width: 960, height: 540, fx: 760, fy: 755, cx: 489.3, cy: 262.8,\n"
+           "  distortion: {model: brown, coefficients: [-0.21, 0.09, 0.0012, -0.0008, 0.01]}}\n"
+           "tracker: {plugin: " + tracker + ", markers: [{id: 0, side_mm: 80}]}\n"
+           "raytracer: {plugin: rt_embree, scene: plate.yaml}\n"
+           "outputs:\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n- {plugin: sink_poses, path: poses.jsonl}\n";
+}
+
+// Pure green whatever the light: a mask of it is the silhouette.
+const char *const plate = "version: 1\naxes: z-up\nambient: 1\n"
+                          "materials: {green: {model: diffuse, diffuse: 0, ambient: [0, 1, 0]}}\n"
+                          "objects: [{plane: {size: 90}, material: green}]\n";
+
+// The plate's outline in px by the exact pose, bent as the lens bends it. `mt` is in GL eye space.
+std::vector<cv::Point2d> true_outline(const std::vector<double> &mt) {
+    std::vector<cv::Point2d> outline;
+    const double corners[5][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}, {-1, 1}};
+    for (int side = 0; side < 4; ++side)
+        for (int step = 0; step < 100; ++step) {
+            const double t = step / 100.0;
+            const double x = half_side_mm * (corners[side][0] * (1 - t) + corners[side + 1][0] * t);
+            const double y = half_side_mm * (corners[side][1] * (1 - t) + corners[side + 1][1] * t);
+            const auto row = [&](std::size_t r) { return mt[r] * x + mt[4 + r] * y + mt[12 + r]; };
+            const auto pixel = camera::project(lens(), {row(0), -row(1), -row(2)});
+            outline.emplace_back(pixel->x, pixel->y);
+        }
+    return outline;
+}
+
+double distance_to_outline(cv::Point2d point, const std::vector<cv::Point2d> &outline) {
+    double nearest = 1e9;
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+        const cv::Point2d a = outline[i], b = outline[(i + 1) % outline.size()], ab = b - a;
+        const double t = std::clamp((point - a).dot(ab) / std::max(ab.dot(ab), 1e-12), 0.0, 1.0);
+        nearest = std::min(nearest, cv::norm(point - a - t * ab));
+    }
+    return nearest;
+}
+
+} // namespace
+
+class Silhouette : public testing::TestWithParam<const char *> {};
+
+TEST_P(Silhouette, LandsWhereTheTruePosePutsIt) {
+    ArhostRun run(configuration(GetParam()));
+    run.write("plate.yaml", plate);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    std::istringstream lines(run.read("poses.jsonl"));
+    double sum_px = 0, worst_px = 0, area_error = 0;
+    int seen = 0;
+    for (std::string line; std::getline(lines, line);) {
+        const auto record = nlohmann::json::parse(line);
+        const std::vector<cv::Point2d> outline = true_outline(record["truth"]["mt"]);
+        char name[32];
+        std::snprintf(name, sizeof name, "frames/%04d.png", record["frame"].get<int>());
+        const cv::Mat image = cv::imread(run.path(name).string());
+        cv::Mat mask;
+        cv::inRange(image, cv::Scalar(0, 255, 0), cv::Scalar(0, 255, 0), mask);
+        std::vector<std::vector<cv::Point>> contours;
+        cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+        ASSERT_EQ(contours.size(), 1u) << name;
+        // The outermost pixel centres lie up to a pixel inside the edge, half of one on average.
+        double frame_px = 0;
+        for (const cv::Point &point : contours[0])
+            frame_px += distance_to_outline(point, outline);
+        frame_px /= static_cast<double>(contours[0].size());
+        sum_px += frame_px;
+        worst_px = std::max(worst_px, frame_px);
+        std::vector<cv::Point2f> polygon(outline.begin(), outline.end());
+        area_error += cv::countNonZero(mask) / cv::contourArea(polygon) - 1;
+        ++seen;
+    }
+    ASSERT_EQ(seen, frames);
+    std::printf("silhouette, %s, %d frames, Brown distortion: mean %.2f px, worst frame %.2f px (target 1 px mean); area %+.2f %%\n",
+                GetParam(), seen, sum_px / seen, worst_px, 100 * area_error / seen);
+    EXPECT_LE(sum_px / seen, 1.0);
+    EXPECT_LE(std::abs(area_error / seen), 0.01) << "the silhouette is too large or too small";
+}
+
+INSTANTIATE_TEST_SUITE_P(Trackers, Silhouette,
+                         testing::Values("tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}",
+                                         "tracker_apriltag, options: {family: tag36h11}"),
+                         [](const auto &info) { return info.index == 0 ? "Aruco" : "AprilTag"; });
