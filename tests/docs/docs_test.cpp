@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <regex>
+
+using namespace arhost::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path root = ARHOST_SOURCE_DIRECTORY;
+
+std::vector<fs::path> documents() {
+    std::vector<fs::path> found = {root / "README.md", root / "CONTRIBUTING.md", root / "CHANGELOG.md"};
+    for (const char *folder : {"docs", "plugins"})
+        for (const auto &entry : fs::recursive_directory_iterator(root / folder))
+            if (entry.path().extension() == ".md")
+                found.push_back(entry.path());
+    return found;
+}
+
+std::vector<std::string> yaml_blocks(const std::string &markdown) {
+    std::vector<std::string> blocks;
+    for (std::size_t at = 0; (at = markdown.find("```yaml\n", at)) != std::string::npos;) {
+        at += 8;
+        const std::size_t end = markdown.find("```", at);
+        blocks.push_back(markdown.substr(at, end - at));
+        at = end;
+    }
+    return blocks;
+}
+
+} // namespace
+
+TEST(Documentation, ShowsConfigurationsThatArhostAccepts) {
+    int checked = 0;
+    for (const fs::path &document : {root / "README.md", root / "docs/config.md"})
+        for (const std::string &block : yaml_blocks(read_file(document))) {
+            ArhostRun run;
+            fs::create_directory_symlink(root / "config", run.path("config"));
+            // Beside the document, since paths are relative to the file.
+            const std::string file = (fs::relative(document, root).parent_path() / "snippet.yaml").string();
+            run.write(file, block);
+            EXPECT_EQ(run.run({"check", file}), 0) << document << ":\n" << block << run.output();
+            ++checked;
+        }
+    EXPECT_EQ(checked, 2);
+}
+
+TEST(Documentation, ShipsConfigurationsThatArhostAccepts) {
+    for (const auto &entry : fs::directory_iterator(root / "config"))
+        if (entry.path().extension() == ".yaml") {
+            ArhostRun run;
+            EXPECT_EQ(run.run({"check", entry.path().string()}), 0) << run.output();
+        }
+}
+
+TEST(Documentation, LinksToFilesThatAreThere) {
+    const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
+    for (const fs::path &document : documents()) {
+        const std::string text = read_file(document);
+        for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it)
+            EXPECT_TRUE(fs::exists(document.parent_path() / (*it)[1].str())) << document << ": " << (*it)[1];
+    }
+}
+
+TEST(Documentation, NamesCommandsThatAreThere) {
+    for (const char *command : {"tools/demo", "tools/test", "tools/bench", "tools/check-style", "tools/tidy", "tools/setup"})
+        EXPECT_EQ(::access((root / command).c_str(), X_OK), 0) << command;
+}
+
+// What config/lab.yaml promises where there is no camera: what is missing, and what to try.
+TEST(Documentation, TheLabConfigurationSaysWhatIsMissingWhereThereIsNoCamera) {
+    if (fs::exists("/dev/video0"))
+        GTEST_SKIP() << "this machine has a camera";
+    ArhostRun run;
+    EXPECT_EQ(run.run({"--config", (root / "config/lab.yaml").string()}), 2);
+    EXPECT_THAT(run.output(), testing::HasSubstr("/dev/video0"));
+    EXPECT_THAT(run.output(), testing::HasSubstr("source_synthetic"));
+}
