@@ -52,7 +52,7 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
                 node.fail("a tilted sensor (tauX, tauY) is not supported; calibrate without CALIB_TILTED_MODEL");
             k = k.first(12);
         }
-        if (k.size() != 0 && k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12)
+        if (!k.empty() && k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12)
             node.fail("the Brown model has 4, 5, 8 or 12 coefficients "
                       "(k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]), here are " +
                       count);

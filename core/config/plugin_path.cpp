@@ -24,17 +24,17 @@ fs::path PluginPath::resolve(const yaml::Node &node) const {
     const std::string name = node.text();
     std::error_code ignored;
     if (name.find('/') != std::string::npos || name.ends_with(".so")) {
-        const fs::path file = node.input_path();
+        fs::path file = node.input_path();
         if (!fs::is_regular_file(file, ignored))
             node.fail("there is no plugin '" + file.string() + "'");
         return file;
     }
     for (const fs::path &folder : folders_)
-        if (const fs::path file = folder / (name + ".so"); fs::is_regular_file(file, ignored))
+        if (fs::path file = folder / (name + ".so"); fs::is_regular_file(file, ignored))
             return file;
-    std::vector<std::string> known;
-    for (const fs::path &file : all())
-        known.push_back(file.stem().string());
+    const std::vector<fs::path> files = all();
+    std::vector<std::string> known(files.size());
+    std::transform(files.begin(), files.end(), known.begin(), [](const fs::path &file) { return file.stem().string(); });
     const std::vector<std::string_view> candidates(known.begin(), known.end());
     const std::string near = yaml::nearest(name, candidates);
     std::string folders;

@@ -547,7 +547,7 @@ bool Pipeline::compose() {
         if (!slot && !live_)
             return false; // the outputs are behind; the source waits for them in turn
         if (slot) {
-            auto output = std::make_shared<OutputFrame>(ready->first, std::move(*slot));
+            auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
             compose(*ready->second, output->slot.bytes());
             for (const auto &sink : sinks_)
                 sink->offer(output);

@@ -34,9 +34,11 @@ public:
     Node(const Node &) = default;
     // YAML::Node's own assignment would change the document that this node stands in.
     Node &operator=(const Node &other) {
-        node_.reset(other.node_);
-        path_ = other.path_;
-        document_ = other.document_;
+        if (this != &other) {
+            node_.reset(other.node_);
+            path_ = other.path_;
+            document_ = other.document_;
+        }
         return *this;
     }
 
@@ -94,8 +96,8 @@ private:
         std::string name;
         std::map<std::string, std::string> overrides; // path of keys → text after `--set`
     };
-    Node(YAML::Node node, std::string path, std::shared_ptr<Document> document)
-        : node_(std::move(node)), path_(std::move(path)), document_(std::move(document)) {}
+    Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
+        : node_(node), path_(std::move(path)), document_(std::move(document)) {}
     std::string scalar(const char *wanted) const;
 
     YAML::Node node_;

@@ -6,32 +6,27 @@
 
 #include "scalar.hpp"
 
+#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 
 namespace arhost::shading {
 
 // The cells split each power of two from 2^-13 (whose code is 0) to 1 into 128: finer than the codes
-// anywhere, so that a cell has at most two codes.
+// anywhere, so that a cell has at most two codes. Within a cell, floats differ in their low 16 bits only.
 struct Srgb8Table {
     static constexpr float smallest = 0x1p-13f;
-    static constexpr std::int32_t first_bits = (127 - 13) << 23, shift = 23 - 7, cell_count = 13 * 128 + 1;
-
-    struct Cell {
-        float threshold;   // from here on, the code is one higher
-        std::int32_t code; // at the cell's start
-    };
-    Cell cells[cell_count];
-
-    // The cell of a value in [smallest, 1].
-    static constexpr std::int32_t index(std::int32_t float_bits) { return (float_bits - first_bits) >> shift; }
+    static constexpr std::int32_t first_bits = (127 - 13) << 23, shift = 16, cell_count = 13 * 128 + 1;
+    // A cell: the code at its start, above the low bits from which on the code is one higher (1 << 16: none).
+    static constexpr std::int32_t code_shift = 17, threshold_mask = (1 << code_shift) - 1, low_mask = 0xffff;
+    std::int32_t cells[cell_count];
 
     std::int32_t operator()(float linear) const {
         const float x = linear > smallest ? (linear < 1 ? linear : 1.0f) : smallest; // NaN: black
-        const Cell &cell = cells[index(std::bit_cast<std::int32_t>(x))];
-        return cell.code + (x >= cell.threshold);
+        const auto bits = std::bit_cast<std::int32_t>(x);
+        const std::int32_t cell = cells[(bits - first_bits) >> shift];
+        return (cell >> code_shift) + ((bits & low_mask) >= (cell & threshold_mask));
     }
 };
 
@@ -40,21 +35,25 @@ inline std::int32_t srgb8_exact(double linear) {
 }
 
 inline Srgb8Table make_srgb8_table() {
+    // The smallest float of each code: the formula's inverse, then step to the exact one.
+    std::int32_t first_of_code[257] = {};
+    first_of_code[256] = std::numeric_limits<std::int32_t>::max();
+    for (std::int32_t code = 1; code <= 255; ++code) {
+        auto bits = std::bit_cast<std::int32_t>(static_cast<float>(srgb_decode((code - 0.5) / 255)));
+        while (srgb8_exact(std::bit_cast<float>(bits)) >= code)
+            --bits;
+        while (srgb8_exact(std::bit_cast<float>(bits)) < code)
+            ++bits;
+        first_of_code[code] = bits;
+    }
     Srgb8Table table;
+    std::int32_t code = 0;
     for (std::int32_t i = 0; i < Srgb8Table::cell_count; ++i) {
-        const float start = std::bit_cast<float>(Srgb8Table::first_bits + (i << Srgb8Table::shift));
-        const std::int32_t code = srgb8_exact(start);
-        // The smallest float of the next code: the formula's inverse, then step to the exact one.
-        const float infinity = std::numeric_limits<float>::infinity();
-        float threshold = infinity;
-        if (code < 255) {
-            threshold = static_cast<float>(srgb_decode((code + 0.5) / 255));
-            while (srgb8_exact(threshold) > code)
-                threshold = std::nextafter(threshold, 0.0f);
-            while (srgb8_exact(threshold) <= code)
-                threshold = std::nextafter(threshold, infinity);
-        }
-        table.cells[i] = {threshold, code};
+        const std::int32_t start = Srgb8Table::first_bits + (i << Srgb8Table::shift);
+        while (first_of_code[code + 1] <= start)
+            ++code;
+        const std::int32_t threshold = std::min(first_of_code[code + 1] - start, 1 << Srgb8Table::shift);
+        table.cells[i] = (code << Srgb8Table::code_shift) | threshold;
     }
     return table;
 }
