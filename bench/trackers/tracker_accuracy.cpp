@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Prints how exact and how quick the trackers are on a real sequence.
+//   tracker-accuracy [aruco:key=value …] [apriltag:key=value …]     options of the two plugins
+#include <common_planar_pose/rbt_sequence.hpp>
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+namespace {
+
+using namespace arhost::test;
+
+RbtSequence::Frames measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
+    Tracker tracker(plugin, options);
+    if (tracker.created() != ARHOST_OK)
+        throw std::runtime_error(plugin + ": " + tracker.log());
+    std::vector<double> ms;
+    const auto frames = sequence.run(tracker, &ms);
+    const auto accuracy = sequence.accuracy(frames);
+    std::printf("%-18s %6.2f %% (%d of %d) %8.3f %8.3f %10.3f %% %8.2f\n", plugin.c_str(),
+                100 * accuracy.found_share(), accuracy.found, accuracy.listed, mean(accuracy.corner_px),
+                percentile(accuracy.corner_px, 0.95), 100 * percentile(accuracy.distance, 0.5), percentile(ms, 0.5));
+    return frames;
+}
+
+} // namespace
+
+int main(int argc, char **argv) try {
+    Options aruco, april_tag;
+    for (int i = 1; i < argc; ++i) {
+        const std::string argument = argv[i];
+        const auto colon = argument.find(':'), equals = argument.find('=');
+        const std::string plugin = argument.substr(0, colon);
+        if ((plugin != "aruco" && plugin != "apriltag") || equals == std::string::npos || equals < colon) {
+            std::fprintf(stderr, "'%s' is not aruco:key=value or apriltag:key=value\n", argv[i]);
+            return 2;
+        }
+        (plugin == "aruco" ? aruco : april_tag)[argument.substr(colon + 1, equals - colon - 1)] =
+            argument.substr(equals + 1);
+    }
+    const auto folder = shared_data("markers/rbt_sequence");
+    if (!std::filesystem::exists(folder)) {
+        std::printf("skipped: needs %s, which is not here (see ARHOST_SHARED_DATA)\n", folder.c_str());
+        return 0;
+    }
+    const RbtSequence sequence;
+    std::printf("rbt_sequence: 40 frames 640x480, tag36h11 of 95.5 mm\n%-18s %23s %8s %8s %12s %8s\n", "tracker",
+                "found", "px mean", "px p95", "dist. p50", "ms p50");
+    const auto a = measure(sequence, "tracker_aruco", aruco);
+    const auto b = measure(sequence, "tracker_apriltag", april_tag);
+    std::printf("corners of the two trackers apart: p95 %.3f px\n",
+                percentile(RbtSequence::disagreement_px(a, b), 0.95));
+    return 0;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "tracker-accuracy: %s\n", error.what());
+    return 1;
+}

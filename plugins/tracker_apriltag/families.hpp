@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The families of AprilTag's library.
+#pragma once
+
+#include <apriltag.h>
+#include <tag16h5.h>
+#include <tag25h9.h>
+#include <tag36h10.h>
+#include <tag36h11.h>
+#include <tagCircle21h7.h>
+#include <tagCircle49h12.h>
+#include <tagCustom48h12.h>
+#include <tagStandard41h12.h>
+#include <tagStandard52h13.h>
+
+#include <array>
+
+namespace arhost::apriltag {
+
+struct FamilyType {
+    const char *name;
+    apriltag_family_t *(*create)();
+    void (*destroy)(apriltag_family_t *);
+};
+
+inline constexpr std::array family_types{
+    FamilyType{"tag36h11", tag36h11_create, tag36h11_destroy},
+    FamilyType{"tag36h10", tag36h10_create, tag36h10_destroy},
+    FamilyType{"tag25h9", tag25h9_create, tag25h9_destroy},
+    FamilyType{"tag16h5", tag16h5_create, tag16h5_destroy},
+    FamilyType{"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
+    FamilyType{"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
+    FamilyType{"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
+    FamilyType{"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
+    FamilyType{"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
+};
+
+} // namespace arhost::apriltag

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// AprilTags, found by AprilTag's own library (version 3).
+#include "families.hpp"
+
+#include <common_planar_pose/edge_refinement.hpp>
+#include <common_planar_pose/marker_report.hpp>
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace {
+
+using arhost::Failure;
+using arhost::apriltag::family_types;
+using arhost::apriltag::FamilyType;
+using arhost::planar::MarkerReport;
+using arhost::planar::Sighting;
+
+constexpr auto family_names = [] {
+    std::array<const char *, family_types.size() + 1> names{};
+    std::ranges::transform(family_types, names.begin(), &FamilyType::name);
+    return names;
+}();
+
+constexpr const char *refinements[] = {"edges", "none", nullptr};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Family of the tags.", 0, 0, family_names.data()),
+    arhost::option(ARHOST_OPTION_TEXT, "corner_refinement", "edges",
+                   "How corners are made exact: edges (arhost's own), or none, which leaves them to the library.", 0,
+                   0, refinements),
+    arhost::option(ARHOST_OPTION_REAL, "quad_decimate", "1.5",
+                   "Tags are searched for in an image made smaller by this factor: 1, 1.5 or a whole number; more is "
+                   "quicker, but small tags are lost.",
+                   1, 8),
+    arhost::option(ARHOST_OPTION_REAL, "quad_sigma", "0",
+                   "Standard deviation in px of a blur before the search (0.8 helps in noisy images); negative "
+                   "sharpens.",
+                   -4, 4),
+    arhost::option(ARHOST_OPTION_BOOL, "refine_edges", "true",
+                   "The library fits the edges again before it reads the bits."),
+    arhost::option(ARHOST_OPTION_REAL, "decode_sharpening", "0.25",
+                   "How much the bits are sharpened before they are read; helps small tags.", 0, 10),
+    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "2", "Wrong bits that are corrected.", 0, 2),
+    arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
+                   "Contrast of the bits, in grey levels from 0 to 255, below which a tag is ignored.", 0, 255),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads of the detector; the result is the same.", 1, 64),
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_TRACKER,
+    "tracker_apriltag",
+    "AprilTag tracker",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Finds AprilTags of one family with AprilTag's own library.",
+    0,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+using Detector = std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)>;
+using Detections = std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)>;
+
+// A family that holds the listed tags only: others are not reported, and the decoding table, which takes
+// gigabytes for the larger families, stays small. A detection's id is its index in `ids`.
+class ListedFamily {
+public:
+    ListedFamily(const FamilyType &type, const std::vector<int> &ids)
+        : destroy_(type.destroy), family_(type.create()), library_codes_(family_->codes) {
+        for (int id : ids)
+            codes_.push_back(library_codes_[id]);
+        family_->codes = codes_.data(); // the library's own table is static: not ours to change
+        family_->ncodes = static_cast<std::uint32_t>(codes_.size());
+    }
+    ~ListedFamily() {
+        family_->codes = library_codes_;
+        destroy_(family_);
+    }
+    ListedFamily(const ListedFamily &) = delete;
+    ListedFamily &operator=(const ListedFamily &) = delete;
+    apriltag_family_t *get() const { return family_; }
+
+private:
+    void (*destroy_)(apriltag_family_t *);
+    apriltag_family_t *family_;
+    std::uint64_t *library_codes_;
+    std::vector<std::uint64_t> codes_;
+};
+
+const FamilyType &family_type(const std::string &name) {
+    for (const FamilyType &type : family_types)
+        if (name == type.name)
+            return type;
+    throw Failure(ARHOST_ERROR_CONFIGURATION, "family: there is none named '" + name + "'");
+}
+
+class AprilTagTracker {
+public:
+    AprilTagTracker(const arhost::Host &, const arhost::Options &options)
+        : type_(family_type(options.text("family"))), fit_edges_(options.text("corner_refinement") == "edges"),
+          decimate_(options.real("quad_decimate")), sigma_(options.real("quad_sigma")),
+          refine_edges_(options.boolean("refine_edges")), sharpening_(options.real("decode_sharpening")),
+          max_hamming_(static_cast<int>(options.integer("max_hamming"))),
+          min_margin_(options.real("min_decision_margin")), threads_(static_cast<int>(options.integer("threads"))) {
+        // The library would decimate by the whole part and scale back by the fraction.
+        if (decimate_ != 1.5 && decimate_ != std::floor(decimate_))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or a whole number");
+    }
+
+    void start(const arhost_tracker_setup &setup) {
+        stop();
+        const std::unique_ptr<apriltag_family_t, decltype(type_.destroy)> whole(type_.create(), type_.destroy);
+        report_.emplace(setup, type_.name, whole->ncodes);
+        family_.emplace(type_, report_->ids());
+        detector_.reset(apriltag_detector_create());
+        detector_->quad_decimate = static_cast<float>(decimate_);
+        detector_->quad_sigma = static_cast<float>(sigma_);
+        detector_->refine_edges = refine_edges_;
+        detector_->decode_sharpening = sharpening_;
+        detector_->nthreads = threads_;
+        apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
+    }
+
+    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
+                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
+        std::vector<Sighting> sightings;
+        const Detections detections = detect(grey);
+        for (int i = 0; detections && i < zarray_size(detections.get()); ++i) {
+            apriltag_detection_t *tag = nullptr;
+            zarray_get(detections.get(), i, &tag);
+            if (tag->decision_margin < min_margin_)
+                continue;
+            Sighting sighting{static_cast<std::size_t>(tag->id), {}, tag->decision_margin - 256.0 * tag->hamming};
+            // AprilTag goes round from the bottom left against the clock, with pixel centres at +0.5.
+            for (int corner = 0; corner < 4; ++corner)
+                sighting.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
+            const auto corners = fit_edges_ ? arhost::planar::refine_edges(grey, sighting.corners_px, report_->lens())
+                                            : sighting.corners_px;
+            if (corners)
+                sightings.push_back({sighting.listed, *corners, sighting.quality});
+        }
+        report_->write(sightings, result);
+    }
+
+    void stop() {
+        detector_.reset();
+        family_.reset();
+    }
+
+private:
+    Detections detect(const cv::Mat &grey) {
+        // The library reads outside images of less than one of its 4×4 px tiles; no tag is that small.
+        if (std::min(grey.cols, grey.rows) < 8 * decimate_)
+            return {nullptr, apriltag_detections_destroy};
+        cv::Mat pixels = grey;
+        if (sigma_ != 0 && decimate_ == 1) // then the library blurs in place, and the frame is read-only
+            pixels = grey.clone();
+        image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
+        return {apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy};
+    }
+
+    const FamilyType &type_;
+    bool fit_edges_;
+    double decimate_, sigma_;
+    bool refine_edges_;
+    double sharpening_;
+    int max_hamming_;
+    double min_margin_;
+    int threads_;
+
+    std::optional<MarkerReport> report_;
+    std::optional<ListedFamily> family_;
+    Detector detector_{nullptr, apriltag_detector_destroy}; // goes before the family that it points to
+};
+
+} // namespace
+
+ARHOST_TRACKER(AprilTagTracker, descriptor)

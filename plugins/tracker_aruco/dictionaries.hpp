@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The dictionaries of OpenCV, under the names that the options and the records use.
+#pragma once
+
+#include "opencv_aruco.hpp"
+
+#include <array>
+
+namespace arhost::aruco {
+
+struct DictionaryType {
+    const char *option;
+    PredefinedDictionary name;
+    const char *family;     // of the records: AprilTag's own name where it has one
+    int april_tag_bits = 0; // AprilTag's families: the wrong bits that their minimum distance can bear,
+                            // which OpenCV leaves at 0
+};
+
+inline constexpr std::array dictionary_types{
+    DictionaryType{"DICT_APRILTAG_36h11", cv::aruco::DICT_APRILTAG_36h11, "tag36h11", 5},
+    DictionaryType{"DICT_APRILTAG_36h10", cv::aruco::DICT_APRILTAG_36h10, "tag36h10", 4},
+    DictionaryType{"DICT_APRILTAG_25h9", cv::aruco::DICT_APRILTAG_25h9, "tag25h9", 4},
+    DictionaryType{"DICT_APRILTAG_16h5", cv::aruco::DICT_APRILTAG_16h5, "tag16h5", 2},
+#define ARHOST_DICTIONARY(name) DictionaryType{#name, cv::aruco::name, #name}
+    ARHOST_DICTIONARY(DICT_4X4_50),
+    ARHOST_DICTIONARY(DICT_4X4_100),
+    ARHOST_DICTIONARY(DICT_4X4_250),
+    ARHOST_DICTIONARY(DICT_4X4_1000),
+    ARHOST_DICTIONARY(DICT_5X5_50),
+    ARHOST_DICTIONARY(DICT_5X5_100),
+    ARHOST_DICTIONARY(DICT_5X5_250),
+    ARHOST_DICTIONARY(DICT_5X5_1000),
+    ARHOST_DICTIONARY(DICT_6X6_50),
+    ARHOST_DICTIONARY(DICT_6X6_100),
+    ARHOST_DICTIONARY(DICT_6X6_250),
+    ARHOST_DICTIONARY(DICT_6X6_1000),
+    ARHOST_DICTIONARY(DICT_7X7_50),
+    ARHOST_DICTIONARY(DICT_7X7_100),
+    ARHOST_DICTIONARY(DICT_7X7_250),
+    ARHOST_DICTIONARY(DICT_7X7_1000),
+    ARHOST_DICTIONARY(DICT_ARUCO_ORIGINAL),
+#undef ARHOST_DICTIONARY
+};
+
+} // namespace arhost::aruco

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// OpenCV's ArUco detector under one interface: the contrib module up to 4.6, objdetect from 4.7 on.
+#pragma once
+
+#include <opencv2/core.hpp>
+#define ARHOST_OPENCV_HAS_ARUCO_DETECTOR (CV_VERSION_MAJOR * 100 + CV_VERSION_MINOR >= 407)
+#if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
+#include <opencv2/objdetect/aruco_detector.hpp>
+#else
+#include <opencv2/aruco.hpp>
+#endif
+
+#include <vector>
+
+namespace arhost::aruco {
+
+#if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
+using PredefinedDictionary = cv::aruco::PredefinedDictionaryType;
+#else
+using PredefinedDictionary = cv::aruco::PREDEFINED_DICTIONARY_NAME;
+#endif
+
+struct Found {
+    std::vector<int> ids;
+    std::vector<std::vector<cv::Point2f>> corners;
+};
+
+inline cv::aruco::Dictionary predefined(PredefinedDictionary name) {
+#if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
+    return cv::aruco::getPredefinedDictionary(name);
+#else
+    return *cv::aruco::getPredefinedDictionary(name);
+#endif
+}
+
+// One pixel a cell where `side_px` is markerSize + 2·border_bits.
+inline void draw(const cv::aruco::Dictionary &dictionary, int id, int side_px, cv::Mat &image, int border_bits) {
+#if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
+    dictionary.generateImageMarker(id, side_px, image, border_bits);
+#else
+    dictionary.drawMarker(id, side_px, image, border_bits);
+#endif
+}
+
+class Detector {
+public:
+#if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
+    Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
+        : detector_(dictionary, parameters) {}
+    Found detect(const cv::Mat &grey) const {
+        Found found;
+        detector_.detectMarkers(grey, found.corners, found.ids);
+        return found;
+    }
+
+private:
+    cv::aruco::ArucoDetector detector_;
+#else
+    Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
+        : dictionary_(cv::makePtr<cv::aruco::Dictionary>(dictionary)),
+          parameters_(cv::makePtr<cv::aruco::DetectorParameters>(parameters)) {}
+    Found detect(const cv::Mat &grey) const {
+        Found found;
+        cv::aruco::detectMarkers(grey, dictionary_, found.corners, found.ids, parameters_);
+        return found;
+    }
+
+private:
+    cv::Ptr<cv::aruco::Dictionary> dictionary_;
+    cv::Ptr<cv::aruco::DetectorParameters> parameters_;
+#endif
+};
+
+} // namespace arhost::aruco

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// ArUco markers and AprilTags, found by OpenCV.
+#include "dictionaries.hpp"
+#include "opencv_aruco.hpp"
+
+#include <common_planar_pose/edge_refinement.hpp>
+#include <common_planar_pose/marker_report.hpp>
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <opencv2/core/utility.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace {
+
+using arhost::Failure;
+using arhost::aruco::dictionary_types;
+using arhost::aruco::DictionaryType;
+using arhost::planar::MarkerReport;
+using arhost::planar::Sighting;
+
+constexpr auto dictionary_names = [] {
+    std::array<const char *, dictionary_types.size() + 1> names{};
+    std::ranges::transform(dictionary_types, names.begin(), &DictionaryType::option);
+    return names;
+}();
+constexpr const char *refinements[] = {"edges", "none", "subpix", "contour", "apriltag", nullptr};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_TEXT, "dictionary", "DICT_APRILTAG_36h11", "Predefined dictionary of the markers.",
+                   0, 0, dictionary_names.data()),
+    arhost::option(ARHOST_OPTION_INPUT_PATH, "dictionary_file", "",
+                   "A dictionary of one's own in OpenCV's YAML format, instead of `dictionary`."),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "corner_refinement", "edges",
+        "How corners are made exact: edges (arhost's own), or OpenCV's none, subpix, contour, or apriltag, "
+        "which finds the squares with AprilTag's method too.",
+        0, 0, refinements),
+    arhost::option(ARHOST_OPTION_INTEGER, "subpix_window_px", "5",
+                   "Half side in px of the window of the refinement subpix; less than a marker's cell.", 1, 50),
+    arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_min_px", "3",
+                   "Smallest window of the adaptive threshold (not for the refinement apriltag).", 3, 999),
+    arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_max_px", "23",
+                   "Largest window of the adaptive threshold (not for the refinement apriltag).", 3, 999),
+    arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_step_px", "10",
+                   "Step from the smallest window to the largest (not for the refinement apriltag).", 1, 999),
+    arhost::option(ARHOST_OPTION_REAL, "min_perimeter_rate", "0.03",
+                   "Smallest perimeter of a marker over the image's longer side (not for the refinement apriltag).",
+                   0.001, 4),
+    arhost::option(ARHOST_OPTION_REAL, "min_distance_rate", "0.02",
+                   "Of squares whose corners are nearer than this times their perimeter only the outer one is read; "
+                   "OpenCV's 0.05 loses prints with a narrow white margin.",
+                   0.001, 0.5),
+    arhost::option(ARHOST_OPTION_REAL, "error_correction_rate", "0.6",
+                   "Share of the wrong bits that the dictionary can bear which is corrected.", 0, 1),
+    arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width in cells of the marker's black border.", 1, 8),
+    arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Find white-on-black markers too."),
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_TRACKER,
+    "tracker_aruco",
+    "ArUco tracker",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Finds ArUco markers and AprilTags of one dictionary with OpenCV.",
+    0,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+const DictionaryType &dictionary_type(const std::string &name) {
+    for (const DictionaryType &type : dictionary_types)
+        if (name == type.option)
+            return type;
+    throw Failure(ARHOST_ERROR_CONFIGURATION, "dictionary: there is none named '" + name + "'");
+}
+
+// OpenCV reads past the end of strings that are too short.
+bool is_dictionary(const cv::FileNode &root) {
+    const cv::FileNode count = root["nmarkers"], size = root["markersize"];
+    if (!count.isInt() || !size.isInt() || static_cast<int>(count) < 1 || static_cast<int>(size) < 1 ||
+        static_cast<int>(size) > 32)
+        return false;
+    for (int i = 0; i < static_cast<int>(count); ++i) {
+        const cv::FileNode marker = root["marker_" + std::to_string(i)];
+        if (!marker.isString())
+            return false;
+        const std::string bits = marker.string();
+        if (bits.size() != static_cast<std::size_t>(static_cast<int>(size) * static_cast<int>(size)) ||
+            bits.find_first_not_of("01") != std::string::npos)
+            return false;
+    }
+    return true;
+}
+
+cv::aruco::Dictionary read_dictionary(const std::string &file) {
+    const auto refuse = [&](const std::string &reason) {
+        return Failure(ARHOST_ERROR_CONFIGURATION, "dictionary_file: " + file + " is no dictionary: " + reason);
+    };
+    if (!std::ifstream(file))
+        throw refuse("it can't be read");
+    try {
+        const cv::FileStorage storage(file, cv::FileStorage::READ);
+        cv::aruco::Dictionary dictionary;
+        if (storage.isOpened() && is_dictionary(storage.root())) {
+            dictionary.readDictionary(storage.root());
+            return dictionary;
+        }
+    } catch (const cv::Exception &) {
+        // OpenCV's parser says only which of its own lines failed.
+    }
+    throw refuse("give nmarkers, markersize, and marker_0, marker_1, … each a string of markersize² bits 0 or 1");
+}
+
+class ArucoTracker {
+public:
+    ArucoTracker(const arhost::Host &, const arhost::Options &options) {
+        if (const std::string file = options.text("dictionary_file"); !file.empty()) {
+            dictionary_ = read_dictionary(file);
+            family_ = std::filesystem::path(file).stem().string();
+        } else {
+            const DictionaryType &type = dictionary_type(options.text("dictionary"));
+            dictionary_ = arhost::aruco::predefined(type.name);
+            family_ = type.family;
+            // OpenCV's tables of AprilTag's families are turned by 180° against AprilTag's own.
+            half_turned_ = type.april_tag_bits > 0;
+            if (half_turned_)
+                dictionary_.maxCorrectionBits = type.april_tag_bits;
+        }
+        const std::string refinement = options.text("corner_refinement");
+        refine_edges_ = refinement == "edges";
+        parameters_.cornerRefinementMethod = refinement == "subpix"     ? cv::aruco::CORNER_REFINE_SUBPIX
+                                             : refinement == "contour"  ? cv::aruco::CORNER_REFINE_CONTOUR
+                                             : refinement == "apriltag" ? cv::aruco::CORNER_REFINE_APRILTAG
+                                                                        : cv::aruco::CORNER_REFINE_NONE;
+        parameters_.cornerRefinementWinSize = static_cast<int>(options.integer("subpix_window_px"));
+        parameters_.adaptiveThreshWinSizeMin = static_cast<int>(options.integer("threshold_window_min_px"));
+        parameters_.adaptiveThreshWinSizeMax = static_cast<int>(options.integer("threshold_window_max_px"));
+        parameters_.adaptiveThreshWinSizeStep = static_cast<int>(options.integer("threshold_window_step_px"));
+        parameters_.minMarkerPerimeterRate = options.real("min_perimeter_rate");
+        parameters_.minMarkerDistanceRate = options.real("min_distance_rate");
+        parameters_.errorCorrectionRate = options.real("error_correction_rate");
+        parameters_.markerBorderBits = static_cast<int>(options.integer("border_bits"));
+        parameters_.detectInvertedMarker = options.boolean("inverted");
+        if (parameters_.adaptiveThreshWinSizeMax < parameters_.adaptiveThreshWinSizeMin)
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "threshold_window_max_px must not be less than threshold_window_min_px");
+        if (refinement == "apriltag")
+            centre_shift_px_ = 0.5;
+    }
+
+    void start(const arhost_tracker_setup &setup) {
+        report_.emplace(setup, family_, static_cast<std::size_t>(dictionary_.bytesList.rows));
+        // Only the listed markers: quicker, and fewer chances to mistake clutter for one.
+        cv::Mat listed;
+        for (int id : report_->ids())
+            listed.push_back(dictionary_.bytesList.row(id));
+        detector_.emplace(cv::aruco::Dictionary(listed, dictionary_.markerSize, dictionary_.maxCorrectionBits),
+                          parameters_);
+    }
+
+    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
+                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
+        const arhost::aruco::Found found = detector_->detect(grey);
+        std::vector<Sighting> sightings;
+        for (std::size_t i = 0; i < found.ids.size(); ++i) {
+            Sighting sighting{static_cast<std::size_t>(found.ids[i]), {}};
+            for (int corner = 0; corner < 4; ++corner) {
+                const cv::Point2d px = found.corners[i][half_turned_ ? (corner + 2) % 4 : corner];
+                sighting.corners_px[corner] = px - cv::Point2d(centre_shift_px_, centre_shift_px_);
+            }
+            const auto corners = refine_edges_
+                                     ? arhost::planar::refine_edges(grey, sighting.corners_px, report_->lens())
+                                     : sighting.corners_px;
+            if (corners)
+                sightings.push_back({sighting.listed, *corners});
+        }
+        report_->write(sightings, result);
+    }
+
+    void stop() { detector_.reset(); }
+
+private:
+    cv::aruco::Dictionary dictionary_;
+    std::string family_;
+    bool half_turned_ = false, refine_edges_ = false;
+    cv::aruco::DetectorParameters parameters_;
+    double centre_shift_px_ = 0; // CORNER_REFINE_APRILTAG has pixel centres at +0.5
+
+    std::optional<MarkerReport> report_;
+    std::optional<arhost::aruco::Detector> detector_;
+};
+
+} // namespace
+
+ARHOST_TRACKER(ArucoTracker, descriptor)

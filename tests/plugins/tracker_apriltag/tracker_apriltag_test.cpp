@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <common_planar_pose/fiducial_tracker_test.hpp>
+#include <common_planar_pose/real_photos.hpp>
+
+namespace {
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+const std::vector<TrackerCase> cases{
+    {"Defaults", "tracker_apriltag", {}, {{"threads", "5"}}},
+    {"FullResolution", "tracker_apriltag", {{"quad_decimate", "1"}}, {{"threads", "4"}}},
+    {"HalfResolution", "tracker_apriltag", {{"quad_decimate", "2"}}, {{"threads", "3"}}},
+    {"BlurredFullResolution",
+     "tracker_apriltag",
+     {{"quad_decimate", "1"}, {"quad_sigma", "0.8"}},
+     {{"threads", "2"}}},
+};
+INSTANTIATE_TEST_SUITE_P(AprilTag, FiducialTracker, testing::ValuesIn(cases), case_name);
+
+class AprilTagFamily : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Families, AprilTagFamily,
+                         testing::Values("tag36h11", "tag36h10", "tag25h9", "tag16h5", "tagCircle21h7",
+                                         "tagCircle49h12", "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"),
+                         [](const auto &info) { return info.param; });
+
+TEST_P(AprilTagFamily, TagIsFoundUprightWithTheSquareThatItsCornersBound) {
+    Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
+    for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 160)}) {
+        ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {20, 80}}), ARHOST_OK) << tracker.log();
+        const Print print = april_tag(GetParam(), 20).with_margin(1);
+        const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+        ASSERT_EQ(markers.size(), 1u);
+        EXPECT_EQ(markers[0].id, 20);
+        EXPECT_EQ(markers[0].family, GetParam());
+        EXPECT_LT(angle_degrees(markers[0].mt, truth), 2);
+        EXPECT_NEAR(markers[0].mt[14] / truth[14], 1, 0.01);
+        for (int k = 0; k < 4; ++k)
+            EXPECT_LT(corner_distance_px(markers[0], k, corners_of(truth, test_camera, 80)[k]), 0.3);
+    }
+}
+
+TEST_P(AprilTagFamily, NamesTheValidRangeOfIds) {
+    Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
+    EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("marker id 100000 is not in " + GetParam() + ", whose ids are 0"));
+}
+
+TEST(AprilTagTracker, RefusesADecimationThatTheLibraryGetsWrong) {
+    Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
+    EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate must be 1, 1.5 or a whole number"));
+}
+
+TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
+    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
+    for (const auto &[margin, count] : {std::pair{"20", 1u}, std::pair{"200", 0u}}) {
+        Tracker tracker("tracker_apriltag", {{"min_decision_margin", margin}});
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        EXPECT_EQ(tracker.track(frame).size(), count);
+    }
+}
+
+TEST(AprilTagTracker, CorrectsAsManyWrongBitsAsConfigured) {
+    Print damaged = april_tag("tag36h11", 3);
+    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
+    damaged.cells(5, 6) = 255 - damaged.cells(5, 6);
+    const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
+    for (const auto &[bits, count] : {std::pair{"1", 0u}, std::pair{"2", 1u}}) {
+        Tracker tracker("tracker_apriltag", {{"max_hamming", bits}});
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        EXPECT_EQ(tracker.track(frame).size(), count) << bits;
+    }
+}
+
+TEST(AprilTagTracker, TheLibrarysOwnCornersHaveTheSameCentres) {
+    Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}});
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+    cv::Point2d bias;
+    for (int i = 0; i < 6; ++i) {
+        const Mt truth = pose_of(7 * i, -5 * i, 450, 10 * i - 25, 20 - 8 * i, 60 * i);
+        const auto markers = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
+        ASSERT_EQ(markers.size(), 1u);
+        for (int k = 0; k < 4; ++k)
+            bias += cv::Point2d(markers[0].corners_px[k][0], markers[0].corners_px[k][1]) -
+                    corners_of(truth, test_camera, 100)[k];
+    }
+    EXPECT_LT(cv::norm(bias) / 24, 0.06);
+}
+
+TEST(AprilTagTracker, FindsTheTagsOfTheVispPhoto) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/apriltag_photo");
+    Tracker tracker("tracker_apriltag");
+    expect_april_tag_photo(tracker);
+}
+
+TEST(AprilTagTracker, FindsTheTagsOfTheJuliaPhoto) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/julia");
+    Tracker tracker("tracker_apriltag");
+    expect_julia_photo(tracker);
+}
+
+TEST(AprilTagTracker, FindsTheTagsOfTheSwatboticsPhotos) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/swatbotics");
+    Tracker tracker("tracker_apriltag");
+    expect_swatbotics_photos(tracker);
+}
+
+} // namespace

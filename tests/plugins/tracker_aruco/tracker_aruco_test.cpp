@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <common_planar_pose/fiducial_tracker_test.hpp>
+#include <common_planar_pose/real_photos.hpp>
+
+#include <nlohmann/json.hpp>
+
+namespace {
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+const std::vector<TrackerCase> cases{{"Defaults", "tracker_aruco", {}, {}}};
+INSTANTIATE_TEST_SUITE_P(Aruco, FiducialTracker, testing::ValuesIn(cases), case_name);
+
+// Whether `name`'s print is one of AprilTag's, and its family there.
+std::string april_tag_family(const std::string &dictionary) {
+    const std::string prefix = "DICT_APRILTAG_";
+    return dictionary.starts_with(prefix) ? "tag" + dictionary.substr(prefix.size()) : "";
+}
+
+std::vector<std::string> dictionary_names() {
+    std::vector<std::string> names;
+    for (const auto &type : arhost::aruco::dictionary_types)
+        names.emplace_back(type.option);
+    return names;
+}
+
+class ArucoDictionary : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictionary_names()),
+                         [](const auto &info) { return info.param; });
+
+TEST_P(ArucoDictionary, MarkerIsFoundUpright) {
+    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    Tracker tracker("tracker_aruco", {{"dictionary", dictionary}});
+    ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_OK) << tracker.log();
+    // AprilTags as AprilTag's own library draws them, the others as OpenCV does.
+    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
+        const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+        ASSERT_EQ(markers.size(), 1u);
+        EXPECT_EQ(markers[0].id, 21);
+        EXPECT_EQ(std::string(markers[0].family), family.empty() ? dictionary : family);
+        EXPECT_LT(angle_degrees(markers[0].mt, truth), 2);
+        EXPECT_NEAR(markers[0].mt[14] / truth[14], 1, 0.005);
+    }
+}
+
+struct Refinement {
+    const char *name;
+    double mean_px, bias_px; // bounds
+};
+
+void PrintTo(const Refinement &refinement, std::ostream *out) {
+    *out << refinement.name;
+}
+
+class ArucoRefinement : public testing::TestWithParam<Refinement> {};
+INSTANTIATE_TEST_SUITE_P(Refinements, ArucoRefinement,
+                         testing::Values(Refinement{"edges", 0.05, 0.02}, Refinement{"none", 1.0, 0.2},
+                                         Refinement{"subpix", 0.4, 0.1}, Refinement{"contour", 0.9, 0.1},
+                                         Refinement{"apriltag", 0.2, 0.12}),
+                         [](const auto &info) { return std::string(info.param.name); });
+
+TEST_P(ArucoRefinement, HasPixelCentresAtIntegers) {
+    Tracker tracker("tracker_aruco", {{"corner_refinement", GetParam().name}});
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+    cv::Point2d bias;
+    double error = 0;
+    for (int i = 0; i < 6; ++i) {
+        const Mt truth = pose_of(7 * i, -5 * i, 450, 10 * i - 25, 20 - 8 * i, 60 * i);
+        const auto markers = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
+        ASSERT_EQ(markers.size(), 1u);
+        const auto corners = corners_of(truth, test_camera, 100);
+        for (int k = 0; k < 4; ++k) {
+            bias += cv::Point2d(markers[0].corners_px[k][0], markers[0].corners_px[k][1]) - corners[k];
+            error += corner_distance_px(markers[0], k, corners[k]);
+        }
+    }
+    EXPECT_LT(cv::norm(bias) / 24, GetParam().bias_px);
+    EXPECT_LT(error / 24, GetParam().mean_px);
+}
+
+TEST(ArucoTracker, ReadsADictionaryFile) {
+    const ScratchFolder scratch;
+    const auto file = scratch.path() / "mine.yml";
+    std::ofstream(file) << "%YAML:1.0\nnmarkers: 2\nmarkersize: 4\nmaxCorrectionBits: 1\n"
+                           "marker_0: \"1011010011100010\"\nmarker_1: \"0100111010011101\"\n";
+    Print print{cv::Mat_<uint8_t>(6, 6, uint8_t{0}), 6};
+    const std::string bits = "0100111010011101";
+    for (int i = 0; i < 16; ++i)
+        print.cells(1 + i / 4, 1 + i % 4) = bits[i] == '1' ? 255 : 0;
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
+    ASSERT_EQ(tracker.created(), ARHOST_OK) << tracker.log();
+    ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {1, 80}}), ARHOST_OK) << tracker.log();
+    const Mt truth = pose_of(10, 20, 400, 20, 20, 30);
+    const auto markers = tracker.track(GreyFrame(picture_of({{print.with_margin(1), 80, truth}})));
+    ASSERT_EQ(markers.size(), 1u);
+    EXPECT_EQ(markers[0].id, 1);
+    EXPECT_STREQ(markers[0].family, "mine");
+    EXPECT_LT(angle_degrees(markers[0].mt, truth), 1);
+    EXPECT_EQ(tracker.start(test_camera, {{2, 80}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("marker id 2 is not in mine, whose ids are 0 to 1"));
+}
+
+TEST(ArucoTracker, RefusesAFileThatIsNoDictionary) {
+    const ScratchFolder scratch;
+    const auto refused = [&](const std::string &text) {
+        const auto file = scratch.path() / "bad.yml";
+        std::ofstream(file) << text;
+        Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
+        EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION) << text;
+        EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: " + file.string() + " is no dictionary")) << text;
+    };
+    refused("");
+    refused("not yaml at all {");
+    refused("%YAML:1.0\nnmarkers: 2\n");
+    refused("%YAML:1.0\nnmarkers: 0\nmarkersize: 4\n");
+    refused("%YAML:1.0\nnmarkers: 2\nmarkersize: 4\nmarker_0: \"1011010011100010\"\n");
+    refused("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101\"\n");
+    refused("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101101001110001x\"\n");
+    refused("%YAML:1.0\nnmarkers: -1\nmarkersize: -4\nmarker_0: \"1\"\n");
+    refused("%YAML:1.0\nnmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n");
+
+    Tracker absent("tracker_aruco", {{"dictionary_file", (scratch.path() / "absent.yml").string()}});
+    EXPECT_EQ(absent.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(absent.log(), HasSubstr("absent.yml is no dictionary: it can't be read"));
+}
+
+TEST(ArucoTracker, RefusesThresholdWindowsThatContradict) {
+    Tracker tracker("tracker_aruco", {{"threshold_window_min_px", "31"}, {"threshold_window_max_px", "23"}});
+    EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("threshold_window_max_px must not be less than threshold_window_min_px"));
+}
+
+TEST(ArucoTracker, FindsInvertedMarkersWhereAskedTo) {
+    const GreyFrame frame(255 -
+                          picture_of({{aruco_marker("DICT_5X5_50", 9).with_margin(2), 80, pose_of(0, 0, 400)}}));
+    for (const auto &[inverted, count] : {std::pair{"false", 0u}, std::pair{"true", 1u}}) {
+        Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_50"}, {"inverted", inverted}});
+        ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_OK);
+        const auto markers = tracker.track(frame);
+        ASSERT_EQ(markers.size(), count) << inverted;
+        if (count) {
+            EXPECT_NEAR(markers[0].mt[14], -400, 2);
+        }
+    }
+}
+
+TEST(ArucoTracker, ReadsMarkersWithAWideBorder) {
+    Tracker tracker("tracker_aruco", {{"dictionary", "DICT_4X4_50"}, {"border_bits", "2"}});
+    ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_OK);
+    const auto markers =
+        tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_4X4_50", 9, 2), 80, pose_of(0, 0, 400)}})));
+    ASSERT_EQ(markers.size(), 1u);
+    EXPECT_NEAR(markers[0].mt[14], -400, 2);
+}
+
+TEST(ArucoTracker, CorrectsWrongBitsOfAprilTags) {
+    Print damaged = april_tag("tag36h11", 3);
+    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
+    damaged.cells(5, 6) = 255 - damaged.cells(5, 6);
+    const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
+    for (const auto &[rate, count] : {std::pair{"0", 0u}, std::pair{"0.6", 1u}}) {
+        Tracker tracker("tracker_aruco", {{"error_correction_rate", rate}});
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        EXPECT_EQ(tracker.track(frame).size(), count) << rate;
+    }
+}
+
+TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/ubiquity");
+    const auto folder = shared_data("markers/ubiquity");
+    const auto golden = nlohmann::json::parse(std::ifstream(folder / "golden.json"));
+    const auto &k = golden["camera"]["K"];
+    const std::vector<double> d = golden["camera"]["D"];
+    const auto camera = intrinsics_of({1280, 960}, k[0], k[4], k[2], k[5], ARHOST_DISTORTION_BROWN, d);
+    Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_1000"}, {"corner_refinement", "subpix"}});
+    ASSERT_EQ(tracker.start(camera, {{1, 145}}), ARHOST_OK);
+    const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"));
+    const auto markers = tracker.track(photo);
+    ASSERT_EQ(markers.size(), 1u);
+    const std::vector<double> expected = golden["corners"]["tag_01_d7_14cm.png"]["1"];
+    for (int corner = 0; corner < 4; ++corner)
+        EXPECT_LT(corner_distance_px(markers[0], corner, {expected[2 * corner], expected[2 * corner + 1]}), 0.1);
+    EXPECT_NEAR(markers[0].mt[14], -700, 35); // "d7": 70 cm
+}
+
+// OpenCV's own expectations, which are whole pixels of unrefined corners.
+void expect_opencv_corners(const std::string &photo, Options dictionary, const std::string &refinement,
+                           double tolerance_px) {
+    dictionary["corner_refinement"] = refinement;
+    const auto folder = shared_data("markers/opencv_doc");
+    const auto golden = nlohmann::json::parse(std::ifstream(folder / "golden.json"));
+    Tracker tracker("tracker_aruco", dictionary);
+    ASSERT_EQ(tracker.created(), ARHOST_OK) << tracker.log();
+    std::vector<Listed> listed;
+    for (const auto &[id, corners] : golden[photo]["corners"].items())
+        listed.push_back({std::stoi(id)});
+    const auto found = markers_in(tracker, folder / photo, listed);
+    EXPECT_EQ(found.size(), listed.size());
+    for (const auto &[id, marker] : found)
+        for (int k = 0; k < 4; ++k) {
+            const auto &expected = golden[photo]["corners"][std::to_string(id)];
+            for (int axis = 0; axis < 2; ++axis)
+                EXPECT_NEAR(marker.corners_px[k][axis], expected[2 * k + axis].get<double>(), tolerance_px) << id;
+        }
+}
+
+TEST(ArucoTracker, FindsTheMarkersOfOpenCvsDocumentation) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/opencv_doc");
+    const std::string file = shared_data("markers/opencv_doc/tutorial_dict.yml");
+    for (const auto &[refinement, tolerance_px] : {std::pair{"none", 1.0}, std::pair{"edges", 2.0}}) {
+        expect_opencv_corners("singlemarkersoriginal.jpg", {{"dictionary", "DICT_6X6_250"}}, refinement,
+                              tolerance_px);
+        expect_opencv_corners("choriginal.jpg", {{"dictionary", "DICT_6X6_250"}}, refinement, tolerance_px);
+        expect_opencv_corners("gboriginal.png", {{"dictionary_file", file}}, refinement, tolerance_px);
+    }
+
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file}});
+    std::vector<int> ids; // several of them are seen more than once
+    for (const auto &[id, marker] :
+         markers_in(tracker, shared_data("markers/opencv_doc/diamondmarkers.png"), ids_to(35)))
+        ids.push_back(id);
+    EXPECT_THAT(ids, testing::ElementsAre(2, 3, 4, 10, 11, 12));
+}
+
+TEST(ArucoTracker, FindsTheTagsOfTheVispPhoto) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/apriltag_photo");
+    Tracker tracker("tracker_aruco");
+    expect_april_tag_photo(tracker);
+}
+
+TEST(ArucoTracker, FindsTheTagsOfTheJuliaPhoto) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/julia");
+    Tracker tracker("tracker_aruco");
+    expect_julia_photo(tracker);
+}
+
+TEST(ArucoTracker, FindsTheTagsOfTheSwatboticsPhotos) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/swatbotics");
+    Tracker tracker("tracker_aruco");
+    expect_swatbotics_photos(tracker);
+}
+
+} // namespace
