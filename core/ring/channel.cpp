@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ring/channel.hpp"
 
-#include <cstring>
+#include "ring/fd_passing.hpp"
+
 #include <poll.h>
 #include <sys/socket.h>
 
@@ -20,29 +21,10 @@ std::pair<Channel, Channel> Channel::make_pair() {
 
 bool Channel::send(const Json &body, std::initializer_list<int> fds, bool wait) const {
     // Bytes that are no UTF-8 (a plugin's log) are replaced, not refused.
-    std::string text = body.dump(-1, ' ', false, Json::error_handler_t::replace);
-    if (text.size() > max_message_size || fds.size() > max_fds)
+    const std::string text = body.dump(-1, ' ', false, Json::error_handler_t::replace);
+    if (text.size() > max_message_size || fds.size() > max_passed_fds)
         throw std::length_error("a control message of " + std::to_string(text.size()) + " bytes is too long");
-    iovec part{text.data(), text.size()};
-    msghdr header{};
-    header.msg_iov = &part;
-    header.msg_iovlen = 1;
-    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * max_fds)] = {};
-    if (fds.size() > 0) {
-        header.msg_control = ancillary;
-        header.msg_controllen = CMSG_SPACE(sizeof(int) * fds.size());
-        cmsghdr *control = CMSG_FIRSTHDR(&header);
-        control->cmsg_level = SOL_SOCKET;
-        control->cmsg_type = SCM_RIGHTS;
-        control->cmsg_len = CMSG_LEN(sizeof(int) * fds.size());
-        std::memcpy(CMSG_DATA(control), fds.begin(), sizeof(int) * fds.size());
-    }
-    for (;;) {
-        if (::sendmsg(fd_.get(), &header, MSG_NOSIGNAL | (wait ? 0 : MSG_DONTWAIT)) >= 0)
-            return true;
-        if (errno != EINTR)
-            return false;
-    }
+    return send_with_fds(fd_.get(), std::as_bytes(std::span(text)), fds, wait ? 0 : MSG_DONTWAIT) >= 0;
 }
 
 ReceiveState Channel::receive(Message &message, int timeout_ms) const {
@@ -54,29 +36,11 @@ ReceiveState Channel::receive(Message &message, int timeout_ms) const {
             return ReceiveState::none;
     }
     std::vector<char> text(max_message_size);
-    iovec part{text.data(), text.size()};
-    msghdr header{};
-    header.msg_iov = &part;
-    header.msg_iovlen = 1;
-    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * max_fds)] = {};
-    header.msg_control = ancillary;
-    header.msg_controllen = sizeof ancillary;
-    const ssize_t size = ::recvmsg(fd_.get(), &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-    if (size < 0)
-        return errno == EAGAIN || errno == EINTR ? ReceiveState::none : ReceiveState::closed;
-    for (cmsghdr *control = CMSG_FIRSTHDR(&header); control; control = CMSG_NXTHDR(&header, control)) {
-        if (control->cmsg_level != SOL_SOCKET || control->cmsg_type != SCM_RIGHTS)
-            continue;
-        const std::size_t count = (control->cmsg_len - CMSG_LEN(0)) / sizeof(int);
-        for (std::size_t i = 0; i < count; ++i) {
-            int fd = -1;
-            std::memcpy(&fd, CMSG_DATA(control) + i * sizeof(int), sizeof fd);
-            message.fds.emplace_back(fd);
-        }
-    }
-    if (size == 0)
-        return ReceiveState::closed;
-    if (header.msg_flags & (MSG_TRUNC | MSG_CTRUNC))
+    const auto [size, truncated] =
+        receive_with_fds(fd_.get(), std::as_writable_bytes(std::span(text)), message.fds, MSG_DONTWAIT);
+    if (size <= 0)
+        return size < 0 && errno == EAGAIN ? ReceiveState::none : ReceiveState::closed;
+    if (truncated)
         return ReceiveState::breach;
     message.body = Json::parse(text.data(), text.data() + size, nullptr, false);
     if (!message.body.is_object() || !message.body.contains("type") || !message.body["type"].is_string())

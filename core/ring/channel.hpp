@@ -29,7 +29,6 @@ enum class ReceiveState { message, none, closed, breach };
 class Channel {
 public:
     static constexpr std::size_t max_message_size = 128 * 1024;
-    static constexpr std::size_t max_fds = 4;
 
     Channel() = default;
     explicit Channel(UniqueFd fd) : fd_(std::move(fd)) {}

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/launcher.hpp"
 
+#include "ring/fd_passing.hpp"
 #include "ring/wake.hpp"
 
-#include <array>
 #include <climits>
 #include <csignal>
 #include <cstdlib>
@@ -32,57 +32,15 @@ struct Reply {
     Exit exit; // `spawned`: only pid, and its pidfd comes along
 };
 
-// Sends a struct, with descriptors.
-bool send_struct(int socket, const void *data, std::size_t size, std::initializer_list<int> fds) {
-    iovec part{const_cast<void *>(data), size};
-    msghdr header{};
-    header.msg_iov = &part;
-    header.msg_iovlen = 1;
-    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * 3)] = {};
-    if (fds.size() > 0) {
-        header.msg_control = ancillary;
-        header.msg_controllen = CMSG_SPACE(sizeof(int) * fds.size());
-        cmsghdr *control = CMSG_FIRSTHDR(&header);
-        control->cmsg_level = SOL_SOCKET;
-        control->cmsg_type = SCM_RIGHTS;
-        control->cmsg_len = CMSG_LEN(sizeof(int) * fds.size());
-        std::memcpy(CMSG_DATA(control), fds.begin(), sizeof(int) * fds.size());
-    }
-    ssize_t sent;
-    do
-        sent = ::sendmsg(socket, &header, MSG_NOSIGNAL);
-    while (sent < 0 && errno == EINTR);
-    return sent == static_cast<ssize_t>(size);
+template <class Struct> bool send_struct(int socket, const Struct &data, std::initializer_list<int> fds = {}) {
+    return ring::send_with_fds(socket, std::as_bytes(std::span(&data, 1)), fds) == sizeof data;
 }
-
-// Takes a struct and up to three descriptors; false at the end.
-bool receive_struct(int socket, void *data, std::size_t size, std::array<UniqueFd, 3> &fds) {
-    iovec part{data, size};
-    msghdr header{};
-    header.msg_iov = &part;
-    header.msg_iovlen = 1;
-    alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * 3)] = {};
-    header.msg_control = ancillary;
-    header.msg_controllen = sizeof ancillary;
-    ssize_t received;
-    do
-        received = ::recvmsg(socket, &header, MSG_CMSG_CLOEXEC);
-    while (received < 0 && errno == EINTR);
-    if (received != static_cast<ssize_t>(size))
-        return false;
-    if (const cmsghdr *control = CMSG_FIRSTHDR(&header); control && control->cmsg_type == SCM_RIGHTS) {
-        const std::size_t count = (control->cmsg_len - CMSG_LEN(0)) / sizeof(int);
-        for (std::size_t i = 0; i < count && i < fds.size(); ++i) {
-            int fd = -1;
-            std::memcpy(&fd, CMSG_DATA(control) + i * sizeof(int), sizeof fd);
-            fds[i].reset(fd);
-        }
-    }
-    return true;
+template <class Struct> bool receive_struct(int socket, Struct &data, std::vector<UniqueFd> &fds) {
+    return ring::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds).size == sizeof data;
 }
 
 // In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
-[[noreturn]] void become(const char *program, const std::array<UniqueFd, 3> &fds, pid_t launcher) {
+[[noreturn]] void become(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != launcher) // it died before the line above
         ::_exit(127);
@@ -111,7 +69,7 @@ bool receive_struct(int socket, void *data, std::size_t size, std::array<UniqueF
     ::_exit(127);
 }
 
-void spawn_for(int socket, const Request &request, const std::array<UniqueFd, 3> &fds) {
+void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &fds) {
     const pid_t launcher = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0)
@@ -120,14 +78,14 @@ void spawn_for(int socket, const Request &request, const std::array<UniqueFd, 3>
     if (pid < 0) {
         reply.kind = Reply::failed;
         reply.error = errno;
-        send_struct(socket, &reply, sizeof reply, {});
+        send_struct(socket, reply);
         return;
     }
     // No race: the child stays a zombie until this process reaps it.
     const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
     reply.kind = Reply::spawned;
     reply.exit.pid = pid;
-    send_struct(socket, &reply, sizeof reply, {pidfd.get()});
+    send_struct(socket, reply, {pidfd.get()});
 }
 
 void reap(int socket) {
@@ -140,7 +98,7 @@ void reap(int socket) {
             return;
         const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
         reply.exit.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-        send_struct(socket, &reply, sizeof reply, {});
+        send_struct(socket, reply);
     }
 }
 
@@ -166,8 +124,8 @@ void reap(int socket) {
         }
         if (ready[0].revents) {
             Request request;
-            std::array<UniqueFd, 3> fds;
-            if (!receive_struct(socket, &request, sizeof request, fds))
+            std::vector<UniqueFd> fds;
+            if (!receive_struct(socket, request, fds) || fds.size() != 3)
                 ::_exit(0); // the host is gone; the workers follow
             spawn_for(socket, request, fds);
         }
@@ -212,18 +170,18 @@ Spawned Launcher::spawn(const std::filesystem::path &program) {
     const UniqueFd output_end(pipe_ends[1]);
     ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
 
-    if (!send_struct(socket_.get(), &request, sizeof request, {theirs.fd(), doorbell.worker.get(), output_end.get()}))
+    if (!send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()}))
         throw std::runtime_error("the launcher is gone");
     for (;;) {
         Reply reply;
-        std::array<UniqueFd, 3> fds;
-        if (!receive_struct(socket_.get(), &reply, sizeof reply, fds))
+        std::vector<UniqueFd> fds;
+        if (!receive_struct(socket_.get(), reply, fds))
             throw std::runtime_error("the launcher is gone");
         if (reply.kind == Reply::exited) {
             exits_.push_back(reply.exit);
             continue;
         }
-        if (reply.kind == Reply::failed || !fds[0])
+        if (reply.kind == Reply::failed || fds.size() != 1 || !fds[0])
             throw std::runtime_error(std::string("no process can be started: ") + std::strerror(reply.error));
         spawned.pid = reply.exit.pid;
         spawned.pidfd = std::move(fds[0]);
@@ -242,8 +200,8 @@ Exit Launcher::wait_exit(pid_t pid) {
                 return found;
             }
         Reply reply;
-        std::array<UniqueFd, 3> fds;
-        if (!receive_struct(socket_.get(), &reply, sizeof reply, fds))
+        std::vector<UniqueFd> fds;
+        if (!receive_struct(socket_.get(), reply, fds))
             throw std::runtime_error("the launcher is gone");
         exits_.push_back(reply.exit);
     }

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes frames and drops them: for measuring everything else, and for trying out a slow sink.
+#include <arhost-cpp/plugin.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace {
+
+using namespace std::chrono_literals;
+
+class NullSink {
+public:
+    NullSink(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), delay_(options.integer("delay_ms")) {}
+
+    void start(const arhost_sink_setup &) {}
+
+    arhost_status write(const arhost_output &) {
+        const auto end = std::chrono::steady_clock::now() + delay_;
+        for (auto left = end - std::chrono::steady_clock::now(); left > 0ns;
+             left = end - std::chrono::steady_clock::now()) {
+            if (host_.cancelled())
+                return ARHOST_ERROR_CANCELLED;
+            std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, 10ms));
+        }
+        return ARHOST_OK;
+    }
+
+private:
+    arhost::Host host_;
+    std::chrono::milliseconds delay_;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_INTEGER, "delay_ms", "0", "How long each frame takes, in milliseconds.", 0, 600000),
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SINK,
+    "sink_null",
+    "Nothing",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Takes frames and drops them, at once or after a delay.",
+    0,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+} // namespace
+
+ARHOST_SINK(NullSink, descriptor)

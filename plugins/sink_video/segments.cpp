@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "segments.hpp"
+
+#include "common_files/files.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+
+namespace arhost::video {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view name_middle = ".from", name_end = ".mkv";
+
+void check_written(int code, const fs::path &path) {
+    if (code < 0)
+        throw files::io_failure("can't write", path, AVUNERROR(code));
+}
+
+// As libav is told it: no part of the path may be taken for a protocol.
+std::string url(const fs::path &path) {
+    return "file:" + path.string();
+}
+
+OutputPointer open_output(const fs::path &path, const char *format) {
+    AVFormatContext *context = nullptr;
+    if (avformat_alloc_output_context2(&context, nullptr, format, url(path).c_str()) < 0)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("this machine's libavformat can't write ") + format);
+    OutputPointer output(context);
+    output->flags |= AVFMT_FLAG_BITEXACT; // no dates and versions
+    check_written(avio_open(&output->pb, url(path).c_str(), AVIO_FLAG_WRITE), path);
+    return output;
+}
+
+AVStream &add_stream(AVFormatContext &output, AVRational fps) {
+    AVStream *stream = avformat_new_stream(&output, nullptr);
+    if (!stream)
+        throw std::bad_alloc();
+    stream->time_base = av_inv_q(fps);
+    stream->avg_frame_rate = stream->r_frame_rate = fps;
+    return *stream;
+}
+
+bool same_codec(const AVCodecParameters &a, const AVCodecParameters &b) {
+    return a.codec_id == b.codec_id && a.width == b.width && a.height == b.height &&
+           std::ranges::equal(std::span(a.extradata, static_cast<std::size_t>(a.extradata_size)),
+                              std::span(b.extradata, static_cast<std::size_t>(b.extradata_size)));
+}
+
+// The film that is being joined. Its file and header are made with the first frame.
+class Film {
+public:
+    Film(const fs::path &path, const char *format, AVRational fps) : path_(path), format_(format), fps_(fps) {}
+
+    std::int64_t frames() const { return frames_; }
+
+    // Takes the segment's frames below `end`.
+    void append(AVFormatContext &segment, const fs::path &segment_path, std::int64_t end,
+                const std::function<void(double)> &progress) {
+        check_fits(*segment.streams[0]->codecpar, segment_path);
+        const AVStream &in = *segment.streams[0];
+        const PacketPointer packet = allocated<PacketPointer>(av_packet_alloc());
+        for (; av_read_frame(&segment, packet.get()) >= 0; av_packet_unref(packet.get())) {
+            const std::int64_t number = av_rescale_q(packet->pts, in.time_base, av_inv_q(fps_));
+            if (packet->flags & AV_PKT_FLAG_CORRUPT || number >= end)
+                return; // cut off by a kill, or sent again to the next segment
+            if (frames_ == 0)
+                begin(*in.codecpar, number);
+            packet->pts = packet->dts = av_rescale_q(number - first_, av_inv_q(fps_), out_->time_base);
+            packet->duration = av_rescale_q(1, av_inv_q(fps_), out_->time_base);
+            packet->pos = -1;
+            packet->stream_index = 0;
+            check_written(av_write_frame(output_.get(), packet.get()), path_);
+            check_written(output_->pb->error, path_);
+            if (++frames_ % 256 == 0)
+                progress(static_cast<double>(avio_tell(segment.pb)) / static_cast<double>(avio_size(segment.pb)));
+        }
+        if (segment.pb->error < 0) // the disk's; where the segment was cut off is no error of its
+            throw files::io_failure("can't read", segment_path, AVUNERROR(segment.pb->error));
+    }
+
+    void finish() {
+        check_written(av_write_trailer(output_.get()), path_);
+        check_written(output_->pb->error, path_);
+        check_written(avio_closep(&output_->pb), path_);
+    }
+
+private:
+    void check_fits(const AVCodecParameters &segment, const fs::path &segment_path) const {
+        if (out_ && !same_codec(*out_->codecpar, segment))
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "'" + segment_path.string() + "' was encoded with other options than what came before it");
+    }
+
+    void begin(const AVCodecParameters &codec, std::int64_t first) {
+        first_ = first;
+        output_ = open_output(path_, format_);
+        out_ = &add_stream(*output_, fps_);
+        if (avcodec_parameters_copy(out_->codecpar, &codec) < 0)
+            throw std::bad_alloc();
+        out_->codecpar->codec_tag = 0; // the container's own
+        out_->sample_aspect_ratio = codec.sample_aspect_ratio;
+        // MP4's index in front, so that a film can be watched while it loads; Matroska knows no such option.
+        av_opt_set(output_->priv_data, "movflags", "faststart", 0);
+        check_written(avformat_write_header(output_.get(), nullptr), path_);
+    }
+
+    fs::path path_;
+    const char *format_;
+    AVRational fps_;
+    OutputPointer output_;
+    AVStream *out_ = nullptr; // of output_
+    std::int64_t first_ = 0, frames_ = 0;
+};
+
+} // namespace
+
+Segment segment_of(const fs::path &film, std::int64_t first) {
+    return {files::hidden_beside(film, std::string(name_middle) + std::to_string(first) + std::string(name_end)),
+            first};
+}
+
+std::vector<Segment> find_segments(const fs::path &film) {
+    const std::string start = files::hidden_beside(film, name_middle).filename().string();
+    std::vector<Segment> found;
+    for (const fs::directory_entry &entry :
+         fs::directory_iterator(film.has_parent_path() ? film.parent_path() : fs::path("."))) {
+        const std::string name = entry.path().filename().string();
+        if (!name.starts_with(start) || !name.ends_with(name_end) || name.size() <= start.size() + name_end.size())
+            continue;
+        std::int64_t first = -1;
+        const char *end = name.data() + name.size() - name_end.size();
+        if (std::from_chars(name.data() + start.size(), end, first).ptr == end && first >= 0)
+            found.push_back({entry.path(), first});
+    }
+    std::ranges::sort(found, {}, &Segment::first);
+    return found;
+}
+
+SegmentWriter::SegmentWriter(const fs::path &path, const AVCodecContext &encoder)
+    : path_(path), time_base_(encoder.time_base), output_(open_output(path, "matroska")) {
+    AVStream &stream = add_stream(*output_, encoder.framerate);
+    if (avcodec_parameters_from_context(stream.codecpar, &encoder) < 0)
+        throw std::bad_alloc();
+    stream.sample_aspect_ratio = encoder.sample_aspect_ratio;
+    flush(avformat_write_header(output_.get(), nullptr));
+}
+
+void SegmentWriter::append(AVPacket &packet) {
+    av_packet_rescale_ts(&packet, time_base_, output_->streams[0]->time_base);
+    packet.stream_index = 0;
+    const int code = av_write_frame(output_.get(), &packet);
+    flush(code < 0 ? code : av_write_frame(output_.get(), nullptr)); // ends the cluster
+}
+
+void SegmentWriter::flush(int code) {
+    avio_flush(output_->pb);
+    check_written(code, path_);
+    check_written(output_->pb->error, path_);
+}
+
+std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, const char *format, AVRational fps,
+                  const std::function<void(double)> &progress, const std::function<void(const std::string &)> &warn) {
+    Film joined(film, format, fps);
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+        const fs::path &path = segments[i].path;
+        AVFormatContext *context = nullptr;
+        if (const int code =
+                avformat_open_input(&context, url(path).c_str(), av_find_input_format("matroska"), nullptr);
+            code < 0) {
+            if (code != AVERROR_EOF) // a header and no frame: a restart that was followed by none
+                warn(
+                    libav_failure(ARHOST_ERROR_IO, "no frame can be read from '" + path.string() + "'", code).what());
+            continue;
+        }
+        const InputPointer segment(context);
+        if (segment->nb_streams != 1)
+            throw Failure(ARHOST_ERROR_IO, "'" + path.string() + "' is no segment of a film: delete it");
+        joined.append(*segment, path,
+                      i + 1 < segments.size() ? segments[i + 1].first : std::numeric_limits<std::int64_t>::max(),
+                      progress);
+    }
+    if (joined.frames() > 0)
+        joined.finish();
+    return joined.frames();
+}
+
+} // namespace arhost::video

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Frames in a window. The fixed pipeline of OpenGL 2.1 does all that one textured rectangle needs, on
+// every driver.
+#include <arhost-cpp/plugin.hpp>
+
+#define GLFW_INCLUDE_GLEXT
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace arhost;
+
+Failure glfw_failure(const std::string &what) {
+    const char *reason = nullptr;
+    glfwGetError(&reason);
+    return Failure(
+        ARHOST_ERROR_CONFIGURATION,
+        what + (reason ? std::string(": ") + reason : "") +
+            ". A window needs a desktop (the variable DISPLAY) and OpenGL 2.1: start arhost there, or under "
+            "`xvfb-run -a`, or write to a file with sink_video or sink_images instead");
+}
+
+class Glfw {
+public:
+    Glfw() {
+        if (!glfwInit())
+            throw glfw_failure("can't open a window");
+    }
+    ~Glfw() { glfwTerminate(); }
+    Glfw(const Glfw &) = delete;
+    Glfw &operator=(const Glfw &) = delete;
+};
+
+struct DestroyWindow {
+    void operator()(GLFWwindow *window) const { glfwDestroyWindow(window); }
+};
+
+struct Rectangle {
+    int x, y, width, height;
+};
+
+// The largest rectangle of the image's aspect within `width`×`height`, in its middle.
+Rectangle fit(int image_width, int image_height, int width, int height) {
+    const double scale =
+        std::min(static_cast<double>(width) / image_width, static_cast<double>(height) / image_height);
+    const int w = std::max(1, static_cast<int>(std::lround(image_width * scale)));
+    const int h = std::max(1, static_cast<int>(std::lround(image_height * scale)));
+    return {(width - w) / 2, (height - h) / 2, w, h};
+}
+
+class WindowSink {
+public:
+    WindowSink(const Host &, const Options &options)
+        : title_(options.text("title")), scale_(options.real("scale")), vsync_(options.boolean("vsync")) {}
+
+    void start(const arhost_sink_setup &setup) {
+        width_ = static_cast<int>(setup.width);
+        height_ = static_cast<int>(setup.height);
+        glfw_.emplace();
+        open_window();
+        glfwMakeContextCurrent(window_.get());
+        glfwSwapInterval(vsync_);
+        make_texture();
+        draw();
+    }
+
+    arhost_status write(const arhost_output &output) {
+        upload(output);
+        draw();
+        return poll();
+    }
+
+    arhost_status idle() {
+        const arhost_status status = poll();
+        if (stale_)
+            draw();
+        return status;
+    }
+
+    void stop() {
+        window_.reset();
+        glfw_.reset();
+    }
+
+private:
+    static WindowSink &self(GLFWwindow *window) {
+        return *static_cast<WindowSink *>(glfwGetWindowUserPointer(window));
+    }
+
+    void open_window() {
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 2);
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 1);
+        glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+        int width = static_cast<int>(std::lround(width_ * scale_)),
+            height = static_cast<int>(std::lround(height_ * scale_));
+        if (GLFWmonitor *monitor = glfwGetPrimaryMonitor()) {
+            Rectangle area{};
+            glfwGetMonitorWorkarea(monitor, &area.x, &area.y, &area.width, &area.height);
+            if (width > area.width || height > area.height) {
+                area = fit(width_, height_, area.width, area.height);
+                width = area.width;
+                height = area.height;
+            }
+        }
+        window_.reset(glfwCreateWindow(std::max(1, width), std::max(1, height), title_.c_str(), nullptr, nullptr));
+        if (!window_)
+            throw glfw_failure("can't open a window");
+        glfwSetWindowUserPointer(window_.get(), this);
+        glfwSetFramebufferSizeCallback(window_.get(), [](GLFWwindow *w, int, int) { self(w).stale_ = true; });
+        glfwSetWindowRefreshCallback(window_.get(), [](GLFWwindow *w) { self(w).stale_ = true; });
+        glfwSetKeyCallback(window_.get(), [](GLFWwindow *w, int key, int, int action, int) {
+            if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS)
+                glfwSetWindowShouldClose(w, GLFW_TRUE);
+        });
+        // Letters as the keyboard's layout has them.
+        glfwSetCharCallback(window_.get(), [](GLFWwindow *w, unsigned letter) {
+            if (letter == 'q')
+                glfwSetWindowShouldClose(w, GLFW_TRUE);
+            else if (letter == 'f')
+                self(w).toggle_full_screen();
+        });
+    }
+
+    void make_texture() {
+        GLint largest = 0;
+        glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
+        if (width_ > largest || height_ > largest)
+            throw Failure(ARHOST_ERROR_UNSUPPORTED, "this machine's OpenGL shows images of at most " +
+                                                        std::to_string(largest) + " px a side: use smaller frames");
+        GLuint texture = 0; // goes with the context
+        glGenTextures(1, &texture);
+        glBindTexture(GL_TEXTURE_2D, texture);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+        glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+        const std::vector<std::uint8_t> black(3 * static_cast<std::size_t>(width_) *
+                                              static_cast<std::size_t>(height_));
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width_, height_, 0, GL_BGR, GL_UNSIGNED_BYTE, black.data());
+        glEnable(GL_TEXTURE_2D);
+        glTexEnvi(GL_TEXTURE_ENV, GL_TEXTURE_ENV_MODE, GL_REPLACE);
+        glDisable(GL_DITHER);
+    }
+
+    void upload(const arhost_output &output) {
+        const std::size_t row_size = 3 * std::size_t{output.width};
+        const std::uint8_t *pixels = output.bgr;
+        if (output.stride != row_size) { // OpenGL counts strides in whole pixels
+            packed_.resize(row_size * output.height);
+            for (std::size_t y = 0; y < output.height; ++y)
+                std::memcpy(packed_.data() + y * row_size, output.bgr + y * output.stride, row_size);
+            pixels = packed_.data();
+        }
+        glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<GLsizei>(output.width),
+                        static_cast<GLsizei>(output.height), GL_BGR, GL_UNSIGNED_BYTE, pixels);
+    }
+
+    void draw() {
+        stale_ = false;
+        int width = 0, height = 0;
+        glfwGetFramebufferSize(window_.get(), &width, &height);
+        if (width < 1 || height < 1)
+            return; // minimised
+        glViewport(0, 0, width, height);
+        glClear(GL_COLOR_BUFFER_BIT);
+        const Rectangle r = fit(width_, height_, width, height);
+        glViewport(r.x, height - r.y - r.height, r.width, r.height); // OpenGL counts from the bottom
+        glBegin(GL_TRIANGLE_STRIP);
+        for (const auto &[u, v] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+            glTexCoord2i(u, v);
+            glVertex2i(2 * u - 1, 1 - 2 * v); // the image's first row is at the top
+        }
+        glEnd();
+        glfwSwapBuffers(window_.get());
+    }
+
+    arhost_status poll() {
+        glfwPollEvents();
+        return glfwWindowShouldClose(window_.get()) ? ARHOST_END : ARHOST_OK;
+    }
+
+    void toggle_full_screen() {
+        stale_ = true;
+        GLFWwindow *window = window_.get();
+        if (glfwGetWindowMonitor(window)) {
+            glfwSetWindowMonitor(window, nullptr, windowed_.x, windowed_.y, windowed_.width, windowed_.height, 0);
+            return;
+        }
+        glfwGetWindowPos(window, &windowed_.x, &windowed_.y);
+        glfwGetWindowSize(window, &windowed_.width, &windowed_.height);
+        if (GLFWmonitor *monitor = monitor_in_view()) {
+            const GLFWvidmode *mode = glfwGetVideoMode(monitor);
+            glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+        }
+    }
+
+    // The one that the window's middle is on, else the primary one.
+    GLFWmonitor *monitor_in_view() const {
+        const int x = windowed_.x + windowed_.width / 2, y = windowed_.y + windowed_.height / 2;
+        int count = 0;
+        GLFWmonitor **monitors = glfwGetMonitors(&count);
+        for (int i = 0; i < count; ++i) {
+            int left = 0, top = 0;
+            glfwGetMonitorPos(monitors[i], &left, &top);
+            const GLFWvidmode *mode = glfwGetVideoMode(monitors[i]);
+            if (x >= left && x < left + mode->width && y >= top && y < top + mode->height)
+                return monitors[i];
+        }
+        return glfwGetPrimaryMonitor();
+    }
+
+    std::string title_;
+    double scale_;
+    bool vsync_;
+    int width_ = 0, height_ = 0; // px, of the frames
+    std::optional<Glfw> glfw_;
+    std::unique_ptr<GLFWwindow, DestroyWindow> window_;
+    Rectangle windowed_{}; // where the window was before full screen
+    bool stale_ = false;
+    std::vector<std::uint8_t> packed_;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_TEXT, "title", "arhost", "The window's title."),
+    option(ARHOST_OPTION_REAL, "scale", "1", "The window's first size, as a multiple of the frame's.", 0.05, 16),
+    option(ARHOST_OPTION_BOOL, "vsync", "true", "Whether frames wait for the screen, which avoids tearing."),
+};
+
+constexpr const char *devices[] = {"/dev/dri/*", "/dev/nvidia*", nullptr}; // OpenGL's; it does without
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SINK,
+    "sink_window",
+    "Window",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Shows frames in a window.",
+    ARHOST_NEEDS_DISPLAY | ARHOST_IS_REALTIME_SINK,
+    std::size(options),
+    options,
+    devices,
+};
+
+} // namespace
+
+ARHOST_SINK(WindowSink, descriptor)

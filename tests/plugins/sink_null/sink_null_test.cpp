@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sink_under_test.hpp"
+
+#include <chrono>
+#include <thread>
+
+using arhost::test::SinkUnderTest;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+TEST(SinkNull, TakesEveryFrameAtOnce) {
+    SinkUnderTest sink("sink_null", {});
+    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
+    EXPECT_EQ(sink.write(0, 100), ARHOST_OK);
+    EXPECT_EQ(sink.stop(), ARHOST_OK);
+    EXPECT_EQ(sink.log(), "");
+    EXPECT_EQ(sink.descriptor().capabilities, 0u);
+    EXPECT_EQ(sink.functions().idle, nullptr);
+}
+
+TEST(SinkNull, TakesAsLongAsItsDelay) {
+    SinkUnderTest sink("sink_null", {{"delay_ms", "25"}});
+    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
+    const auto begin = Clock::now();
+    EXPECT_EQ(sink.write(0, 4), ARHOST_OK);
+    EXPECT_GE(Clock::now() - begin, 100ms);
+}
+
+TEST(SinkNull, EndsADelayWhenItIsCancelled) {
+    SinkUnderTest sink("sink_null", {{"delay_ms", "600000"}});
+    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
+    std::jthread canceller([&] {
+        std::this_thread::sleep_for(20ms);
+        sink.cancel();
+    });
+    EXPECT_EQ(sink.write(0), ARHOST_ERROR_CANCELLED);
+}

@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+using namespace arhost::test;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+namespace {
+
+constexpr int width = 160, height = 96;
+
+std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end) {
+    std::vector<std::uint64_t> all(end - first);
+    std::iota(all.begin(), all.end(), first);
+    return all;
+}
+
+struct Difference {
+    double psnr_db, bias[3]; // bias: mean of film − frame, of B, G and R
+};
+
+Difference compare(const FilmFrame &film, const Picture &frame) {
+    double squares = 0, sums[3]{};
+    for (int y = 0; y < frame.height(); ++y)
+        for (int x = 0; x < frame.width(); ++x)
+            for (int c = 0; c < 3; ++c) {
+                const double d = film.pixel(x, y)[c] - frame.pixel(x, y)[c];
+                squares += d * d;
+                sums[c] += d;
+            }
+    const double count = static_cast<double>(frame.width()) * frame.height();
+    return {10 * std::log10(255 * 255 / (squares / (3 * count))),
+            {sums[0] / count, sums[1] / count, sums[2] / count}};
+}
+
+class SinkVideo : public testing::Test {
+protected:
+    std::filesystem::path path(const std::string &name = "demo.mp4") const { return folder_.path() / name; }
+    std::map<std::string, std::string> with_path(std::map<std::string, std::string> options = {}) const {
+        options.emplace("path", path().string());
+        return options;
+    }
+    SinkUnderTest sink(std::map<std::string, std::string> options = {}) const {
+        return SinkUnderTest("sink_video", with_path(std::move(options)));
+    }
+    // A whole run over frames [first, end) after a restart at `first`.
+    void run(SinkUnderTest &&s, std::uint64_t first, std::uint64_t end, double fps = 30) const {
+        ASSERT_EQ(s.start(width, height, first, fps), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.write(first, end), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.stop(), ARHOST_OK) << s.log();
+        EXPECT_EQ(s.log(), "");
+    }
+    // Frames [first, end) and then a kill.
+    void run_and_die(std::uint64_t first, std::uint64_t end) const {
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(width, height, first), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.write(first, end), ARHOST_OK) << s.log();
+    }
+    std::vector<std::string> names() const { return names_in(folder_.path()); }
+
+    ScratchFolder folder_;
+};
+
+} // namespace
+
+// The film
+
+TEST_F(SinkVideo, HoldsEveryFrameOnceInOrder) {
+    run(sink(), 0, 40);
+    EXPECT_THAT(names(), ElementsAre("demo.mp4"));
+    const Film film = read_film(path());
+    EXPECT_EQ(film.codec, "h264");
+    EXPECT_EQ(film.numbers(), numbers(0, 40));
+    EXPECT_EQ(av_cmp_q(film.fps, {30, 1}), 0);
+    EXPECT_NEAR(film.duration_s, 40 / 30.0, 1e-3);
+}
+
+TEST_F(SinkVideo, IsTaggedAsBt709OfLimitedRange) {
+    for (const std::string name : {"a.mp4", "a.mkv", "a.mov"}) {
+        run(sink({{"path", path(name).string()}}), 0, 1);
+        const Film film = read_film(path(name));
+        EXPECT_EQ(film.range, AVCOL_RANGE_MPEG) << name;
+        EXPECT_EQ(film.matrix, AVCOL_SPC_BT709) << name;
+        EXPECT_EQ(film.primaries, AVCOL_PRI_BT709) << name;
+        EXPECT_EQ(film.transfer, AVCOL_TRC_BT709) << name;
+    }
+}
+
+TEST_F(SinkVideo, ColoursAreRight) {
+    for (const std::string codec : {"h264", "mpeg4"}) {
+        SinkUnderTest s = sink({{"codec", codec}});
+        ASSERT_EQ(s.start(320, 240), ARHOST_OK);
+        ASSERT_EQ(s.write(0, 3), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_OK);
+        const Film film = read_film(path());
+        ASSERT_EQ(film.frames.size(), 3u);
+        for (std::uint64_t i = 0; i < 3; ++i) {
+            const Difference d = compare(film.frames[i], Picture(320, 240, i));
+            EXPECT_GE(d.psnr_db, 35) << codec;
+            for (const double bias : d.bias)
+                EXPECT_LT(std::abs(bias), 1.5) << codec;
+        }
+    }
+}
+
+TEST_F(SinkVideo, OddSizesArePaddedByRepeatingTheEdge) {
+    for (const auto &[w, h] : {std::pair{131, 97}, {130, 97}, {131, 96}}) {
+        const Picture picture(w, h, 5, 3 * w + 61);
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(w, h), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_OK);
+        const Film film = read_film(path());
+        ASSERT_EQ(film.frames.size(), 1u);
+        const FilmFrame &frame = film.frames[0];
+        EXPECT_EQ(frame.width, (w + 1) / 2 * 2);
+        EXPECT_EQ(frame.height, (h + 1) / 2 * 2);
+        EXPECT_GE(compare(frame, picture).psnr_db, 35);
+        for (int y = 0; y < frame.height; ++y)
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(frame.pixel(frame.width - 1, y)[c], picture.pixel(w - 1, std::min(y, h - 1))[c], 12);
+        for (int x = 0; x < frame.width; ++x)
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(frame.pixel(x, frame.height - 1)[c], picture.pixel(std::min(x, w - 1), h - 1)[c], 12);
+    }
+}
+
+TEST_F(SinkVideo, ReadsNoByteOutsideTheFrame) { // Picture faults there
+    for (const int w : {64, 128, 336, 1024})
+        for (const int h : {16, 64}) {
+            SinkUnderTest s = sink({{"preset", "ultrafast"}});
+            ASSERT_EQ(s.start(w, h), ARHOST_OK);
+            ASSERT_EQ(s.write(0, 2), ARHOST_OK);
+        }
+}
+
+TEST_F(SinkVideo, KeepsTheFrameRate) {
+    for (const auto &[fps, wanted] : {std::pair{25.0, AVRational{25, 1}},
+                                      {30000 / 1001.0, AVRational{30000, 1001}},
+                                      {59.94, AVRational{2997, 50}},
+                                      {0.0, AVRational{30, 1}},
+                                      {std::nan(""), AVRational{30, 1}}}) {
+        run(sink(), 0, 4, fps);
+        const Film film = read_film(path());
+        EXPECT_EQ(av_cmp_q(film.fps, wanted), 0) << fps << " became " << film.fps.num << "/" << film.fps.den;
+        EXPECT_EQ(film.numbers(), numbers(0, 4));
+    }
+}
+
+TEST_F(SinkVideo, EveryFrameIsFoundAgainAtHighAndLowFrameRates) {
+    for (const double fps : {500.0, 499.7, 240.0, 0.5}) {
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(width, height, 0, fps), ARHOST_OK);
+        ASSERT_EQ(s.write(0, 50), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_OK);
+        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 50)) << fps;
+        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3) << fps; // MP4 has it in whole ms
+    }
+}
+
+TEST_F(SinkVideo, AFrameRateThatNoFilmHasIsRefused) {
+    for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
+        SinkUnderTest s = sink();
+        EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_ERROR_CONFIGURATION) << fps;
+        EXPECT_THAT(s.log(), HasSubstr("set the source's fps"));
+    }
+}
+
+TEST_F(SinkVideo, FramesThatTheLiveModeLeftOutLeaveTheirTime) {
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    for (const std::uint64_t i : {3, 4, 9, 10, 20})
+        ASSERT_EQ(s.write(i), ARHOST_OK);
+    ASSERT_EQ(s.stop(), ARHOST_OK);
+    const Film film = read_film(path());
+    EXPECT_THAT(film.numbers(), ElementsAre(3, 4, 9, 10, 20));
+    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // begins with the first frame
+}
+
+TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
+    run(sink(), 0, 10);
+    run(sink({{"path", path("again.mp4").string()}}), 0, 10);
+    EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
+}
+
+TEST_F(SinkVideo, SeveralThreadsMakeTheSameFilmEachTime) {
+    run(sink({{"threads", "3"}}), 0, 10);
+    run(sink({{"threads", "3"}, {"path", path("again.mp4").string()}}), 0, 10);
+    EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 10));
+}
+
+TEST_F(SinkVideo, AHigherCrfMakesASmallerFilm) {
+    for (const std::string codec : {"h264", "mpeg4"}) {
+        run(sink({{"codec", codec}, {"path", path("fine.mp4").string()}}), 0, 5);
+        run(sink({{"codec", codec}, {"crf", "40"}, {"path", path("coarse.mp4").string()}}), 0, 5);
+        EXPECT_LT(read_text(path("coarse.mp4")).size() * 3, read_text(path("fine.mp4")).size() * 2) << codec;
+    }
+}
+
+TEST_F(SinkVideo, TheIndexStandsInFrontSoThatTheFilmCanBeStreamed) {
+    run(sink(), 0, 5);
+    const std::string film = read_text(path());
+    EXPECT_LT(film.find("moov"), film.find("mdat"));
+}
+
+// Kills and restarts
+
+TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
+    for (const std::uint64_t restart : {1, 2, 7, 10}) {
+        run_and_die(0, 10);
+        run(sink(), restart, 15);
+        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 15)) << "restarted at " << restart;
+        EXPECT_THAT(names(), ElementsAre("demo.mp4"));
+    }
+}
+
+TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
+    run_and_die(0, 1);
+    run_and_die(1, 2);
+    run_and_die(2, 2); // died before its first frame
+    run_and_die(2, 9);
+    run_and_die(5, 6); // went back
+    run_and_die(6, 6);
+    run(sink(), 6, 12);
+    const Film film = read_film(path());
+    EXPECT_EQ(film.numbers(), numbers(0, 12));
+    std::vector<std::int64_t> times(12);
+    std::iota(times.begin(), times.end(), 0);
+    EXPECT_EQ(film.times(), times);
+    EXPECT_THAT(names(), ElementsAre("demo.mp4"));
+}
+
+TEST_F(SinkVideo, ARestartWithoutAFurtherFrameStillMakesTheFilm) {
+    run_and_die(0, 5);
+    run(sink(), 5, 5);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 5));
+}
+
+TEST_F(SinkVideo, RestartsWorkForEveryCodecAndContainer) {
+    for (const std::string name : {"a.mkv", "a.mov", "a.mp4"})
+        for (const std::string codec : {"h264", "mpeg4"}) {
+            const std::map<std::string, std::string> options{{"path", path(name).string()}, {"codec", codec}};
+            {
+                SinkUnderTest s = sink(options);
+                ASSERT_EQ(s.start(width, height), ARHOST_OK);
+                ASSERT_EQ(s.write(0, 5), ARHOST_OK);
+            }
+            run(sink(options), 4, 8);
+            EXPECT_EQ(read_film(path(name)).numbers(), numbers(0, 8)) << name << " " << codec;
+        }
+}
+
+TEST_F(SinkVideo, SurvivesTheDeathOfItsProcessAtAnyMoment) {
+    std::uint64_t next = 0;
+    for (const std::uint64_t frames : {1, 12, 3, 5})
+        next = write_until_killed("sink_video", with_path(), width, height, next, frames);
+    run(sink(), next, next + 2);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, next + 2));
+    EXPECT_THAT(names(), ElementsAre("demo.mp4"));
+}
+
+TEST_F(SinkVideo, ASegmentCanBeWatchedAfterAKillWhateverItsLastByte) {
+    run_and_die(0, 6);
+    const auto segment = path(".demo.mp4.from0.mkv");
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
+    EXPECT_EQ(read_film(segment).numbers(), numbers(0, 6));
+    const std::string bytes = read_text(segment);
+    const std::size_t last_frame = bytes.rfind("\x1f\x43\xb6\x75"); // the id of a cluster
+    for (std::size_t size = last_frame; size < bytes.size(); size += 1 + (bytes.size() - last_frame) / 40) {
+        std::ofstream(segment, std::ios::binary | std::ios::trunc) << bytes.substr(0, size);
+        run(sink(), 5, 7);
+        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 7)) << "cut at " << size - last_frame;
+    }
+}
+
+TEST_F(SinkVideo, ASegmentThatDiedBeforeItsFirstByteHoldsNothing) {
+    run_and_die(0, 3);
+    std::ofstream(path(".demo.mp4.from3.mkv")) << "";
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height, 4), ARHOST_OK);
+    ASSERT_EQ(s.write(4, 6), ARHOST_OK);
+    ASSERT_EQ(s.stop(), ARHOST_OK);
+    EXPECT_THAT(s.log(), HasSubstr("3 no frame can be read from '" + path(".demo.mp4.from3.mkv").string()));
+    EXPECT_THAT(read_film(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
+}
+
+TEST_F(SinkVideo, AKillInTheMidstOfTheEndLeavesAWholeFilm) {
+    run_and_die(0, 5);
+    run_and_die(5, 8);
+    const std::string first = read_text(path(".demo.mp4.from0.mkv")), second = read_text(path(".demo.mp4.from5.mkv"));
+    run(sink(), 8, 8);
+    const std::string film = read_text(path());
+
+    // The film is in place and no segment gone yet.
+    std::ofstream(path(".demo.mp4.from0.mkv")) << first;
+    std::ofstream(path(".demo.mp4.from5.mkv")) << second;
+    run(sink(), 8, 8);
+    EXPECT_EQ(read_text(path()), film);
+
+    // The first segment is gone.
+    std::ofstream(path(".demo.mp4.from5.mkv")) << second;
+    run(sink(), 8, 8);
+    EXPECT_EQ(read_text(path()), film);
+
+    // All are.
+    run(sink(), 8, 8);
+    EXPECT_EQ(read_text(path()), film);
+    EXPECT_THAT(names(), ElementsAre("demo.mp4"));
+}
+
+TEST_F(SinkVideo, AFreshStartRemovesWhatAnEarlierRunLeft) {
+    run_and_die(0, 5);
+    run_and_die(5, 9);
+    std::ofstream(path(".demo.mp4.partial")) << "x";
+    std::ofstream(path(".demo.mp4.from7.txt")) << "another's";
+    run(sink(), 0, 3);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 3));
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from7.txt", "demo.mp4"));
+}
+
+TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsWhole) {
+    run(sink(), 0, 3);
+    const std::string old = read_text(path());
+    run_and_die(0, 5);
+    EXPECT_EQ(read_text(path()), old);
+    run(sink(), 5, 6);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
+}
+
+TEST_F(SinkVideo, ARestartWhoseFirstPartIsGoneSaysSoAndKeepsTheRest) {
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height, 5), ARHOST_OK);
+    EXPECT_THAT(s.log(), HasSubstr("3 the film's part before frame 5 is gone"));
+    ASSERT_EQ(s.write(5, 8), ARHOST_OK);
+    ASSERT_EQ(s.stop(), ARHOST_OK);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(5, 8));
+}
+
+TEST_F(SinkVideo, SegmentsOfOtherOptionsAreNotJoined) {
+    run_and_die(0, 3);
+    SinkUnderTest s = sink({{"preset", "ultrafast"}});
+    ASSERT_EQ(s.start(width, height, 3), ARHOST_OK);
+    ASSERT_EQ(s.write(3, 5), ARHOST_OK);
+    EXPECT_EQ(s.stop(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(s.log(), HasSubstr("encoded with other options"));
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // nothing is lost
+}
+
+TEST_F(SinkVideo, NoFrameMakesNoFilmAndAWarning) {
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    EXPECT_EQ(s.stop(), ARHOST_OK);
+    EXPECT_THAT(names(), IsEmpty());
+    EXPECT_THAT(s.log(), HasSubstr("3 no frame came: '" + path().string() + "' was not written"));
+}
+
+// What can go wrong
+
+TEST_F(SinkVideo, AnUnknownEndingIsRefused) {
+    for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
+        SinkUnderTest s = sink({{"path", path(name).string()}});
+        EXPECT_EQ(s.created(), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_THAT(s.log(), HasSubstr(".mp4, .mkv and .mov"));
+    }
+}
+
+TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndWhatWasWrittenBeforeStays) {
+    {
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(width, height), ARHOST_OK);
+        ASSERT_EQ(s.write(0, 3), ARHOST_OK);
+        const FileSizeLimit limit(std::filesystem::file_size(path(".demo.mp4.from0.mkv")) + 50);
+        EXPECT_EQ(s.write(3), ARHOST_ERROR_IO);
+        EXPECT_THAT(s.log(), HasSubstr("File too large"));
+        EXPECT_THAT(s.log(), HasSubstr(".demo.mp4.from0.mkv"));
+    }
+    run(sink(), 3, 6);
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
+}
+
+TEST_F(SinkVideo, ADiskThatIsFullAtTheEndKeepsTheFramesAndTheOlderFilm) {
+    run(sink(), 0, 2);
+    const std::string old = read_text(path());
+    {
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(width, height), ARHOST_OK);
+        ASSERT_EQ(s.write(0, 8), ARHOST_OK);
+        const FileSizeLimit limit(1500);
+        EXPECT_EQ(s.stop(), ARHOST_ERROR_IO);
+        EXPECT_THAT(s.log(), HasSubstr("the film's frames are kept in"));
+    }
+    EXPECT_EQ(read_text(path()), old);
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", "demo.mp4"));
+    run(sink(), 8, 8); // with room again, a restart finishes it
+    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 8));
+}
+
+TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
+    const UnwritableFolder locked(path("locked"));
+    SinkUnderTest s = sink({{"path", path("locked/demo.mp4").string()}});
+    EXPECT_EQ(s.start(width, height), ARHOST_ERROR_IO);
+    EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.from0.mkv': Permission denied"));
+}
+
+TEST_F(SinkVideo, NoPartOfThePathIsTakenForAProtocolOrPattern) {
+    const auto odd = path("a:b %d, c'd.mp4");
+    run(sink({{"path", odd.string()}}), 0, 2);
+    EXPECT_THAT(names(), ElementsAre("a:b %d, c'd.mp4"));
+    EXPECT_EQ(read_film(odd).numbers(), numbers(0, 2));
+}
+
+TEST_F(SinkVideo, MissingFoldersAreMade) {
+    run(sink({{"path", path("a/b/demo.mp4").string()}}), 0, 2);
+    EXPECT_EQ(read_film(path("a/b/demo.mp4")).numbers(), numbers(0, 2));
+}
+
+TEST_F(SinkVideo, AFolderAsPathIsRefused) {
+    std::filesystem::create_directory(path());
+    SinkUnderTest s = sink();
+    EXPECT_EQ(s.start(width, height), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(s.log(), HasSubstr("is a folder"));
+}
+
+TEST_F(SinkVideo, AFrameOfAnotherSizeIsRefused) {
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    EXPECT_EQ(s.write(Picture(width - 2, height, 0), make_record(0)), ARHOST_ERROR_INVALID_ARGUMENT);
+}

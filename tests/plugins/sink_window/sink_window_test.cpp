@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sink_under_test.hpp"
+#include "x_server.hpp"
+
+#include <gmock/gmock.h>
+
+#include <dlfcn.h>
+#include <link.h>
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+using namespace arhost::test;
+using testing::AllOf;
+using testing::HasSubstr;
+
+// Mesa's and Xlib's caches, which live as long as the process, are no leaks of the sink.
+extern "C" const char *__lsan_default_suppressions();
+extern "C" const char *__lsan_default_suppressions() {
+    return "leak:libX11\nleak:libGL\nleak:_dri.so\nleak:libLLVM\nleak:libxcb\n";
+}
+
+namespace {
+
+// Keeps the drivers loaded after the window is closed: the leak checker names only what is still there.
+void keep_libraries() {
+    dl_iterate_phdr(
+        [](dl_phdr_info *info, std::size_t, void *) {
+            dlopen(info->dlpi_name, RTLD_LAZY | RTLD_NOLOAD | RTLD_NODELETE);
+            return 0;
+        },
+        nullptr);
+}
+
+constexpr int screen_width = 640, screen_height = 480;
+
+// Where a pixel of the window lies in the frame, and what colour bilinear filtering gives it.
+double sampled(const Picture &picture, double x, double y, int channel) {
+    x = std::clamp(x, 0.0, picture.width() - 1.0);
+    y = std::clamp(y, 0.0, picture.height() - 1.0);
+    const int x0 = std::min(static_cast<int>(x), picture.width() - 1), x1 = std::min(x0 + 1, picture.width() - 1);
+    const int y0 = std::min(static_cast<int>(y), picture.height() - 1), y1 = std::min(y0 + 1, picture.height() - 1);
+    const double u = x - x0, v = y - y0;
+    return (1 - v) * ((1 - u) * picture.pixel(x0, y0)[channel] + u * picture.pixel(x1, y0)[channel]) +
+           v * ((1 - u) * picture.pixel(x0, y1)[channel] + u * picture.pixel(x1, y1)[channel]);
+}
+
+// The largest difference between a window and the frame that should fill [left, left + width) × … of it,
+// black elsewhere. The outermost pixels of the image are left out: there drivers' rounding differs.
+double worst_difference(const Screenshot &shot, const Picture &picture, int left, int top, int width, int height) {
+    double worst = 0;
+    for (int y = 0; y < shot.height; ++y)
+        for (int x = 0; x < shot.width; ++x) {
+            const int u = x - left, v = y - top;
+            const bool inside = u >= 0 && u < width && v >= 0 && v < height;
+            const bool scaled = width != picture.width() || height != picture.height();
+            const int edge = scaled ? 1 : 0;
+            if (inside && (u < edge || v < edge || u >= width - edge || v >= height - edge))
+                continue;
+            for (int c = 0; c < 3; ++c) {
+                const double wanted = inside ? sampled(picture, (u + 0.5) * picture.width() / width - 0.5,
+                                                       (v + 0.5) * picture.height() / height - 0.5, c)
+                                             : 0;
+                worst = std::max(worst, std::abs(shot.pixel(x, y)[c] - wanted));
+            }
+        }
+    return worst;
+}
+
+class SinkWindow : public testing::Test {
+protected:
+    void SetUp() override {
+        if (access(xvfb_path, X_OK) != 0)
+            GTEST_SKIP() << "needs Xvfb, which is not installed (Debian's package xvfb)";
+        server_.emplace(screen_width, screen_height);
+        setenv("DISPLAY", server_->name().c_str(), 1);
+        setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+        observer_.emplace(server_->name());
+    }
+    void TearDown() override {
+        sink_.reset(); // the clients first: Xlib ends the process of a client whose server is gone
+        observer_.reset();
+        server_.reset();
+    }
+    SinkUnderTest &start(int width, int height, const std::map<std::string, std::string> &options = {}) {
+        sink_.emplace("sink_window", options);
+        EXPECT_EQ(sink_->start(width, height), ARHOST_OK) << sink_->log();
+        keep_libraries();
+        return *sink_;
+    }
+    // Serves the window until `done` or for two seconds.
+    bool becomes(const std::function<bool()> &done) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+        while (std::chrono::steady_clock::now() < end) {
+            if (done())
+                return true;
+            sink_->idle();
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        return false;
+    }
+    // The difference between the window and the frame in that part of it, once it is small, or at last.
+    double difference(const Picture &picture, int left, int top, int width, int height) {
+        double worst = 255;
+        becomes(
+            [&] { return (worst = worst_difference(observer_->window(), picture, left, top, width, height)) <= 2; });
+        return worst;
+    }
+
+    std::optional<XServer> server_;
+    std::optional<XObserver> observer_;
+    std::optional<SinkUnderTest> sink_;
+};
+
+} // namespace
+
+TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
+    SinkUnderTest &sink = start(320, 200, {{"title", "a title"}});
+    EXPECT_EQ(observer_->title(), "a title");
+    for (const std::uint64_t i : {0, 300}) {
+        const Picture picture(320, 200, i);
+        ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_OK) << sink.log();
+        EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
+    }
+    const Screenshot shot = observer_->screen(); // and it is on the screen, not in the window's memory alone
+    const XWindowAttributes where = observer_->attributes();
+    const Picture picture(320, 200, 300);
+    for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(shot.pixel(where.x + 160, where.y + 100)[c], picture.pixel(160, 100)[c], 2);
+    EXPECT_EQ(sink.stop(), ARHOST_OK);
+}
+
+TEST_F(SinkWindow, TakesOddSizesAndPaddedRows) {
+    for (const auto &[width, height] : {std::pair{131, 97}, {130, 33}}) {
+        SinkUnderTest &sink = start(width, height);
+        const Picture picture(width, height, 9, 3 * width + 61);
+        ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+        EXPECT_LE(difference(picture, 0, 0, width, height), 2);
+    }
+}
+
+TEST_F(SinkWindow, IsBlackUntilTheFirstFrame) {
+    start(160, 120);
+    EXPECT_TRUE(becomes([&] {
+        const Screenshot shot = observer_->window();
+        return std::ranges::all_of(shot.bgr, [](std::uint8_t v) { return v == 0; });
+    }));
+}
+
+TEST_F(SinkWindow, KeepsTheAspectWhenTheWindowIsResized) {
+    SinkUnderTest &sink = start(160, 120);
+    const Picture picture(160, 120, 0);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    observer_->resize(400, 240); // wider: bars at the sides
+    EXPECT_LE(difference(picture, 40, 0, 320, 240), 2);
+    observer_->resize(160, 400); // higher: bars above and below
+    EXPECT_LE(difference(picture, 0, 140, 160, 120), 2);
+}
+
+TEST_F(SinkWindow, BeginsAtTheScaleThatIsAskedFor) {
+    SinkUnderTest &sink = start(160, 120, {{"scale", "2.5"}});
+    const Picture picture(160, 120, 0);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    const XWindowAttributes window = observer_->attributes();
+    EXPECT_EQ(window.width, 400);
+    EXPECT_EQ(window.height, 300);
+    EXPECT_LE(difference(picture, 0, 0, 400, 300), 2);
+}
+
+TEST_F(SinkWindow, IsNeverLargerThanTheScreen) {
+    start(1920, 1080);
+    const XWindowAttributes window = observer_->attributes();
+    EXPECT_EQ(window.width, screen_width);
+    EXPECT_EQ(window.height, screen_width * 1080 / 1920);
+}
+
+TEST_F(SinkWindow, EscapeAndQEndTheRun) {
+    for (const KeySym key : {XK_Escape, XK_q}) {
+        SinkUnderTest &sink = start(160, 120);
+        EXPECT_EQ(sink.idle(), ARHOST_OK);
+        observer_->press(XK_a);
+        EXPECT_EQ(sink.idle(), ARHOST_OK);
+        observer_->press(key);
+        EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_END; }));
+        EXPECT_EQ(sink.write(Picture(160, 120, 0), make_record(0)), ARHOST_END);
+        EXPECT_EQ(sink.stop(), ARHOST_OK);
+    }
+}
+
+TEST_F(SinkWindow, ClosingTheWindowEndsTheRun) {
+    SinkUnderTest &sink = start(160, 120);
+    EXPECT_EQ(sink.write(0), ARHOST_OK);
+    observer_->close_window();
+    EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_END; }));
+}
+
+TEST_F(SinkWindow, FGoesToFullScreenAndBack) {
+    SinkUnderTest &sink = start(160, 120);
+    const Picture picture(160, 120, 0);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    const auto has_size = [&](int width, int height) {
+        return [this, width, height] {
+            const XWindowAttributes window = observer_->attributes();
+            return window.width == width && window.height == height;
+        };
+    };
+    observer_->press(XK_f);
+    ASSERT_TRUE(becomes(has_size(screen_width, screen_height)));
+    EXPECT_LE(difference(picture, 0, 0, screen_width, screen_height), 2);
+    observer_->press(XK_f);
+    ASSERT_TRUE(becomes(has_size(160, 120)));
+    EXPECT_LE(difference(picture, 0, 0, 160, 120), 2);
+}
+
+TEST_F(SinkWindow, CanBeOpenedAgain) {
+    for (int i = 0; i < 2; ++i) {
+        SinkUnderTest &sink = start(160, 120);
+        EXPECT_EQ(sink.write(0), ARHOST_OK);
+        EXPECT_EQ(sink.stop(), ARHOST_OK);
+    }
+}
+
+TEST(SinkWindowWithoutScreen, SaysWhatIsMissingAndWhatToTry) {
+    for (const char *display : {"", ":54321"}) {
+        setenv("DISPLAY", display, 1);
+        SinkUnderTest sink("sink_window", {});
+        EXPECT_EQ(sink.start(160, 120), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_THAT(sink.log(), AllOf(HasSubstr("4 can't open a window: X11:"), HasSubstr("DISPLAY"),
+                                      HasSubstr("xvfb-run -a"), HasSubstr("sink_video")));
+    }
+}
+
+TEST(SinkWindowWithoutScreen, DeclaresThatItNeedsADisplayAndWantsTheNewestFrame) {
+    const SinkUnderTest sink("sink_window", {});
+    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_NEEDS_DISPLAY | ARHOST_IS_REALTIME_SINK});
+    EXPECT_NE(sink.functions().idle, nullptr);
+}
