@@ -116,7 +116,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart), scene.input_path(), scene};
         if (!configuration.tracker)
             node->fail("a ray tracer needs a 'tracker' that tells where the camera is");
-        if (!std::filesystem::exists(configuration.raytracer->scene))
+        if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
             scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
     }
     if (const auto node = root.find("coordinates")) {
@@ -126,13 +126,20 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", plugin_path, restart));
+    std::set<std::filesystem::path> files;
+    for (const ComponentConfiguration &output : configuration.outputs)
+        if (output.path && !files.insert(std::filesystem::absolute(output.path->text()).lexically_normal()).second)
+            output.path->fail("another output writes '" + output.path->text() + "' already");
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =
             std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
     }
     if (const auto node = root.find("stats"))
-        configuration.stats = std::filesystem::absolute(node->text());
+        configuration.stats = std::filesystem::absolute(node->text()).lexically_normal();
+    if (configuration.stats && (files.contains(*configuration.stats) ||
+                                *configuration.stats == std::filesystem::absolute(root.file()).lexically_normal()))
+        root.require("stats").fail("the file is in use already");
     return configuration;
 }
 

@@ -43,7 +43,7 @@ ring::OptionValue value_of(const ring::OptionDeclaration &declared, const yaml::
 ring::OptionValue default_of(const ring::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, 0, 0.0, ""};
-    const yaml::Node node = yaml::Node::parse("\"" + *declared.default_value + "\"", plugin + "'s default of '" + declared.key + "'");
+    const yaml::Node node = yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
     return value_of(declared, node);
 }
 

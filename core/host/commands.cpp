@@ -28,8 +28,9 @@ supervise::Context make_context(ring::Reactor &reactor, supervise::Launcher &lau
 
 // The options of the dissertation's figure 7 stand above the file's `coordinates:`.
 std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
-    const bool any = arguments.ar || arguments.rt || arguments.g1 || arguments.g2;
-    if (!any)
+    const auto given = [](const double (&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
+    if (!arguments.ar && !arguments.rt && !arguments.g1 && !arguments.g2 && !given(arguments.axis1) &&
+        !given(arguments.axis2))
         return std::nullopt;
     camera::Coordinates coordinates;
     coordinates.ar = arguments.ar.value_or(coordinates.ar);
@@ -39,6 +40,10 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
         coordinates.rotations.push_back({*arguments.g1, axis(arguments.axis1)});
     if (arguments.g2)
         coordinates.rotations.push_back({*arguments.g2, axis(arguments.axis2)});
+    if (!arguments.g1 && given(arguments.axis1))
+        throw yaml::Error("--x1, --y1 and --z1 need --g1, the angle in degrees");
+    if (!arguments.g2 && given(arguments.axis2))
+        throw yaml::Error("--x2, --y2 and --z2 need --g2, the angle in degrees");
     if (arguments.g2 && !arguments.g1)
         throw yaml::Error("--g2 needs --g1: the first rotation comes first");
     if (const std::string problem = camera::problem_with(coordinates); !problem.empty())
@@ -70,18 +75,22 @@ double cpu_seconds_of_host() {
 }
 
 // Whole under its name, or not there: written beside it and renamed.
-void write_statistics(const fs::path &file, const std::string &text) {
+bool write_statistics(const fs::path &file, Console &console, const std::string &text) {
     std::error_code ignored;
+    if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) { // /dev/null, say
+        std::ofstream stream(file);
+        return static_cast<bool>(stream << text << std::flush);
+    }
     fs::create_directories(file.parent_path(), ignored);
     const fs::path temporary = file.string() + ".tmp";
     std::ofstream stream(temporary);
     stream << text << std::flush;
     stream.close();
-    if (!stream || ::rename(temporary.c_str(), file.c_str()) != 0) {
-        const std::string why = std::strerror(errno);
-        fs::remove(temporary, ignored);
-        throw yaml::Error("stats: can't write " + file.string() + ": " + why);
-    }
+    if (stream && ::rename(temporary.c_str(), file.c_str()) == 0)
+        return true;
+    console.log(ARHOST_SEVERITY_ERROR, "stats", "can't write " + file.string() + ": " + std::strerror(errno));
+    fs::remove(temporary, ignored);
+    return false;
 }
 
 } // namespace
@@ -100,26 +109,36 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
     ::sigaddset(&signals, SIGTERM);
+    ::sigaddset(&signals, SIGHUP);
     ::sigprocmask(SIG_BLOCK, &signals, nullptr);
     const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
     bool stopped_by_signal = false;
+    auto first_signal = std::chrono::steady_clock::time_point::min();
     const auto watch = reactor.watch(signal_fd.get(), [&] {
         signalfd_siginfo info;
         while (::read(signal_fd.get(), &info, sizeof info) > 0) {
+            // A second signal ends the run at once, but not one that came with the first: timeout(1) sends two.
+            const auto now = std::chrono::steady_clock::now();
+            if (stopped_by_signal && now - first_signal < std::chrono::seconds(1))
+                continue;
+            if (!stopped_by_signal) {
+                first_signal = now;
+                console.log(ARHOST_SEVERITY_INFO, "arhost", "stopping: the frames under way and the files are finished first");
+            }
             stopped_by_signal = true;
-            console.log(ARHOST_INFO, "arhost", "stopping: the frames under way and the files are finished first");
             pipeline.interrupt();
         }
     });
 
     const bool whole = pipeline.run();
-    if (configuration.stats && pipeline.statistics().frames_in > 0)
-        write_statistics(*configuration.stats,
-                         report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host()).dump(2) + "\n");
-    if (!whole) {
-        console.log(ARHOST_ERROR, "arhost", pipeline.failure());
+    if (!whole)
+        console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
+    if (configuration.stats && pipeline.statistics().frames_in > 0 &&
+        !write_statistics(*configuration.stats, console,
+                          report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host()).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"))
+        return run_failed;
+    if (!whole)
         return pipeline.failed_by_configuration() ? bad_configuration : run_failed;
-    }
     return stopped_by_signal ? interrupted : success;
 }
 
@@ -151,7 +170,7 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
 
     if (configuration.raytracer) {
         std::optional<std::string> outcome;
-        const SceneLoading loading(context, configuration.raytracer->scene,
+        const SceneLoading loading(context, configuration.raytracer->scene, configuration.raytracer->limits.start,
                                    {[&](const ring::SharedMemory &) { outcome = ""; },
                                     [&](const std::string &reason) { outcome = reason; }});
         while (!outcome)

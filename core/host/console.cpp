@@ -36,15 +36,15 @@ void Console::clear_line() {
 }
 
 void Console::log(arhost_severity severity, const std::string &component, const std::string &text) {
-    const auto level = severity >= ARHOST_ERROR       ? spdlog::level::err
-                       : severity == ARHOST_WARNING ? spdlog::level::warn
-                       : severity == ARHOST_INFO    ? spdlog::level::info
+    const auto level = severity >= ARHOST_SEVERITY_ERROR       ? spdlog::level::err
+                       : severity == ARHOST_SEVERITY_WARNING ? spdlog::level::warn
+                       : severity == ARHOST_SEVERITY_INFO    ? spdlog::level::info
                                                     : spdlog::level::debug;
     if (!logger_->should_log(level))
         return;
     clear_line();
-    const char *blame = severity == ARHOST_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
-                        : severity == ARHOST_HOST_MISBEHAVING ? "the host misbehaves: "
+    const char *blame = severity == ARHOST_SEVERITY_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
+                        : severity == ARHOST_SEVERITY_HOST_MISBEHAVING ? "the host misbehaves: "
                                                               : "";
     logger_->log(level, "{}: {}{}", component, blame, one_line(text));
 }

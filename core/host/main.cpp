@@ -5,10 +5,29 @@
 
 #include <CLI/CLI.hpp>
 
+#include <csignal>
 #include <cstdio>
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace {
+
+// What the shell may have handed over: closed standard streams, whose numbers a socket must not get, and
+// signals that would end the run where an error message is meant.
+void prepare_process() {
+    int fd = ::open("/dev/null", O_RDWR);
+    while (fd >= 0 && fd <= 2)
+        fd = ::open("/dev/null", O_RDWR);
+    ::close(fd);
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
+}
+
+} // namespace
 
 int main(int argc, char **argv) {
     using namespace arhost::host;
+    prepare_process();
 
     CLI::App app("arhost lays ray-traced objects over live video. Its trackers, ray tracers, sources and outputs are\n"
                  "plugins, each in a process of its own; a YAML file says which run.");
@@ -27,7 +46,7 @@ int main(int argc, char **argv) {
     add_configuration_options(app);
     app.add_option("--frames", arguments.frames, "Stop after so many frames")
         ->type_name("N")
-        ->check(CLI::NonNegativeNumber);
+        ->check(CLI::Range(0.0, 1e15));
     CLI::Option_group &axes = *app.add_option_group(
         "Coordinates", "The dissertation's options (docs/camera.md); they stand above 'coordinates:' in the file");
     axes.add_option("--ar", arguments.ar, "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");

@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4, output_slot_count = 6;
+constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
 constexpr std::size_t reads_in_flight = 2;
 constexpr std::size_t live_sink_depth = 3;
 constexpr std::uint32_t max_tries = 2; // a frame that was in a worker's hands at two deaths is suspect
@@ -46,7 +46,8 @@ bool Pipeline::run() {
             fail(reason, true);
             scene_loading_.reset();
         };
-        scene_loading_ = std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene, std::move(hooks));
+        scene_loading_ = std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene,
+                                                        configuration_.raytracer->limits.start, std::move(hooks));
     }
     while (phase_ != Phase::over) {
         context_.reactor.run_once();
@@ -126,8 +127,8 @@ void Pipeline::make_source() {
     hooks.lost = [this](const std::vector<Command> &unanswered) {
         reads_.clear();
         source_slots_.reset();
-        if (!unanswered.empty())
-            next_read_ = std::min(next_read_, unanswered.front().sequence);
+        for (const Command &command : unanswered)
+            next_read_ = std::min(next_read_, command.sequence);
         const std::uint32_t capabilities = source_->description().capabilities;
         if (next_read_ > 0 && !(capabilities & (ARHOST_CAN_SEEK | ARHOST_IS_LIVE)) && !ended_) {
             ended_ = true;
@@ -167,7 +168,7 @@ void Pipeline::make_raytracer() {
     hooks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
         check_kind(plugin, ARHOST_KIND_RAYTRACER, raytracer.node);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS))
-            context_.log(ARHOST_WARNING, "raytracer",
+            context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
                          plugin.id + " can't trace through a distorted lens; the overlay will be off towards the corners");
         return Component::Create{
             {{"options", options_for(plugin, raytracer, candidate)},
@@ -187,17 +188,22 @@ void Pipeline::make_raytracer() {
 
 void Pipeline::make_outputs() {
     output_slots_ = std::make_shared<SlotPool>(supervise::make_host_region(
-        "arhost-outputs", {OutputSlot::byte_size(format_->width, format_->height), output_slot_count}));
+        "arhost-outputs", {OutputSlot::byte_size(format_->width, format_->height),
+                           // Sinks hold different frames when they are differently behind: none may take all.
+                           static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
     for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
         const config::ComponentConfiguration &output = configuration_.outputs[i];
         std::string name = output.plugins.front().stem().string();
         if (std::any_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return sink->component->name() == name; }))
             name += "#" + std::to_string(i);
-        sinks_.push_back(std::make_unique<SinkQueue>(live_ ? live_sink_depth : 0, statistics_));
+        sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
         SinkQueue *sink = sinks_.back().get();
+        sink->depth = live_ ? live_sink_depth : 0;
         Component::Hooks hooks = hooks_for(name, output.node);
         hooks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
             check_kind(plugin, ARHOST_KIND_SINK, output.node);
+            if (plugin.capabilities & ARHOST_IS_REALTIME_SINK)
+                sink->depth = live_sink_depth; // a window never makes a film wait
             const double fps = configuration_.source.fps > 0 ? configuration_.source.fps : format_->fps;
             return Component::Create{{{"options", options_for(plugin, output, candidate)},
                                       {"setup",
@@ -210,23 +216,22 @@ void Pipeline::make_outputs() {
         hooks.result = [this, sink, name](const Command &command, const Result &result) {
             sink->on_result(command, result);
             if (result.status == ARHOST_END)
-                interrupt();
+                end_run();
             if (result.status >= 0 || sink->failed)
                 return;
             // A full disk does not mend itself: what is whole is kept, the video goes on elsewhere.
-            sink->failed = true;
-            sink->clear();
-            fail(name + ": can't write frame " + std::to_string(command.sequence) + ": " + status_text(result.status) +
-                     "; its messages above say more",
-                 false);
+            const std::string reason = "can't write frame " + std::to_string(command.sequence) + ": " +
+                                       status_text(result.status) + "; its messages above say more";
+            context_.log(ARHOST_SEVERITY_ERROR, name, reason);
+            fail(name + ": " + reason, false);
+            give_up_sink(*sink);
             sink->component->stop();
         };
         hooks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
-        hooks.ended = [this] { interrupt(); };
+        hooks.ended = [this] { end_run(); };
         hooks.given_up = [this, sink, name, &output](const std::string &reason, bool by_configuration) {
-            sink->failed = true;
-            sink->clear();
             give_up(name, output.node, reason, by_configuration);
+            give_up_sink(*sink);
         };
         sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, std::move(hooks));
         sink->component->start();
@@ -262,7 +267,7 @@ void Pipeline::pump() {
             sink->pump();
             sinks_empty = sinks_empty && (sink->empty() || sink->failed);
         }
-        if (ended_ && reads_.empty() && frames_.empty() && sinks_empty)
+        if (no_more_frames() && reads_.empty() && frames_.empty() && sinks_empty)
             stop_components();
     }
     if (phase_ == Phase::stopping) {
@@ -301,11 +306,12 @@ void Pipeline::enter_next_phase() {
         phase_ = Phase::running;
 }
 
+bool Pipeline::no_more_frames() const {
+    return ended_ || (configuration_.frames && next_read_ >= configuration_.frames);
+}
+
 bool Pipeline::read() {
-    const std::uint64_t limit = configuration_.frames;
-    if (limit && next_read_ >= limit)
-        ended_ = true;
-    if (ended_ || !source_->running() || reads_.size() >= reads_in_flight)
+    if (no_more_frames() || !source_->running() || reads_.size() >= reads_in_flight)
         return false;
     std::optional<Lease> slot = source_slots_->acquire();
     if (!slot)
@@ -397,7 +403,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     }
     frame.tries = 0;
     if (result.status < 0) {
-        context_.log(ARHOST_WARNING, "tracker", "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        context_.log(ARHOST_SEVERITY_WARNING, "tracker", "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
         return pass(frame, "tracker");
     }
     const char *problem = take_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
@@ -465,7 +471,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
         return;
     }
     if (result.status < 0) {
-        context_.log(ARHOST_WARNING, "raytracer",
+        context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
                      "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
         return pass(frame, "raytracer");
     }
@@ -542,10 +548,12 @@ bool Pipeline::compose() {
     if (ready == frames_.end() || ready->second->stage != Frame::Stage::done)
         return false;
     const bool wanted = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->failed; });
+    bool shown_somewhere = true;
     if (wanted) {
         std::optional<Lease> slot = output_slots_->acquire();
         if (!slot && !live_)
             return false; // the outputs are behind; the source waits for them in turn
+        shown_somewhere = slot.has_value();
         if (slot) {
             auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
             compose(*ready->second, output->slot.bytes());
@@ -558,8 +566,8 @@ bool Pipeline::compose() {
         }
     }
     const std::uint64_t shown = ready->first;
-    ++statistics_.composited;
-    statistics_.augmented += ready->second->record.overlay != ARHOST_OVERLAY_NONE;
+    statistics_.composited += shown_somewhere;
+    statistics_.augmented += shown_somewhere && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
     statistics_.last_frame = Clock::now();
     statistics_.stages["latency"].add(statistics_.last_frame - ready->second->received);
     frames_.erase(ready);
@@ -599,11 +607,24 @@ void Pipeline::forget_overtaken(std::uint64_t shown) {
 
 // ---- the end ---------------------------------------------------------------------------------------
 
+void Pipeline::end_run() {
+    ended_ = true;
+    source_->cancel_call();
+}
+
+void Pipeline::give_up_sink(SinkQueue &sink) {
+    sink.failed = true;
+    sink.clear();
+    if (phase_ == Phase::running &&
+        std::all_of(sinks_.begin(), sinks_.end(), [](const auto &other) { return other->failed; }))
+        end_run(); // nobody is left to see a frame
+}
+
 void Pipeline::interrupt() {
     // Before the first frame nothing has been written: there is nothing to finish.
     abandoned_ = interrupted_ || phase_ < Phase::running;
-    interrupted_ = ended_ = true;
-    source_->cancel_call();
+    interrupted_ = true;
+    end_run();
 }
 
 void Pipeline::stop_components() {
@@ -622,10 +643,10 @@ void Pipeline::stop_components() {
 }
 
 void Pipeline::fail(const std::string &reason, bool by_configuration) {
-    context_.log(ARHOST_DEBUG, "arhost", reason);
+    context_.log(ARHOST_SEVERITY_DEBUG, "arhost", reason);
     if (failure_.empty()) {
         failure_ = reason;
-        failed_by_configuration_ = by_configuration;
+        failed_by_configuration_ = by_configuration && phase_ < Phase::running;
     }
     abandoned_ = abandoned_ || phase_ < Phase::running;
 }
@@ -636,7 +657,7 @@ void Pipeline::give_up(const std::string &name, const yaml::Node &node, const st
     fail(located ? reason : node.where() + ": " + name + ": " + reason, by_configuration);
     if (phase_ != Phase::running)
         return;
-    context_.log(ARHOST_ERROR, name, reason + "; the video goes on without it");
+    context_.log(ARHOST_SEVERITY_ERROR, name, reason + "; the video goes on without it");
     if (name == "source")
         ended_ = true;
 }

@@ -38,7 +38,7 @@ public:
     const std::string &failure() const { return failure_; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
-    // Lets what is under way finish, then ends. A second call ends at once. From the reactor.
+    // Ctrl-C: lets what is under way finish, then ends. A second call ends at once. From the reactor.
     void interrupt();
 
     const Statistics &statistics() const { return statistics_; }
@@ -55,6 +55,8 @@ private:
 
     void pump();
     void enter_next_phase();
+    void end_run(); // as if the source had no more
+    bool no_more_frames() const;
     bool read();
     bool track();
     bool render();
@@ -75,6 +77,7 @@ private:
     Frame *next_waiting(Frame::Stage stage);
     void forget_overtaken(std::uint64_t shown);
 
+    void give_up_sink(SinkQueue &sink);
     void fail(const std::string &reason, bool by_configuration);
     void give_up(const std::string &name, const yaml::Node &node, const std::string &reason, bool by_configuration);
 
@@ -100,7 +103,7 @@ private:
     std::deque<Lease> reads_; // the slots of the reads under way, oldest first
     std::uint64_t next_read_ = 0;
     std::int64_t last_capture_ns_ = INT64_MIN;
-    bool ended_ = false;       // the source has no more, or shall give no more
+    bool ended_ = false;       // the source has said so, or shall give no more
     bool interrupted_ = false;
     bool abandoned_ = false; // everything is to end at once
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;

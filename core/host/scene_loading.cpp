@@ -7,25 +7,35 @@ namespace arhost::host {
 
 using namespace ring;
 
-SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, Hooks hooks)
-    : context_(context), hooks_(std::move(hooks)) {
+SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene,
+                           std::chrono::milliseconds patience, Hooks hooks)
+    : context_(context), hooks_(std::move(hooks)), patience_(patience) {
     supervise::Process::Events events;
     events.message = [this](Message &message) {
         const std::string type = message.body.at("type").get<std::string>();
+        watch();
         if (type == "failed")
             failure_ = message.body.at("text").get<std::string>();
         else if (type == "loaded" && message.fds.size() == 1)
             arena_ = std::move(message.fds[0]);
         else if (type == "progress")
-            context_.log(ARHOST_DEBUG, "scene", message.body.at("what").get<std::string>());
+            context_.log(ARHOST_SEVERITY_DEBUG, "scene", message.body.at("what").get<std::string>());
     };
     events.result = [](const Result &) {};
     events.died = [this](const supervise::Death &death) { on_died(death); };
     process_ = std::make_unique<supervise::Process>(context, "scene", std::move(events),
                                                     Json{{"type", "load"}, {"scene", scene.string()}});
+    watch();
+}
+
+void SceneLoading::watch() {
+    deadline_ = context_.reactor.at(Reactor::Clock::now() + patience_, [this] {
+        process_->end("without a word of progress for " + std::to_string(patience_.count()) + " ms");
+    });
 }
 
 void SceneLoading::on_died(const supervise::Death &death) {
+    deadline_.cancel();
     const Hooks hooks = std::move(hooks_);
     if (!death.clean || !arena_)
         return hooks.failed(failure_.empty() ? "the scene loader was " + death.how : failure_);

@@ -21,15 +21,20 @@ public:
         std::function<void(ring::SharedMemory arena)> loaded; // frozen and valid
         std::function<void(const std::string &reason)> failed;
     };
-    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, Hooks hooks);
+    // `patience`: the longest time without a word of progress.
+    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, std::chrono::milliseconds patience,
+                 Hooks hooks);
 
 private:
+    void watch();
     void on_died(const supervise::Death &death);
 
     supervise::Context &context_;
     Hooks hooks_;
     std::string failure_;
     ring::UniqueFd arena_;
+    std::chrono::milliseconds patience_;
+    ring::Reactor::Registration deadline_;
     std::unique_ptr<supervise::Process> process_;
 };
 

@@ -9,7 +9,7 @@ void SinkQueue::offer(OutputFramePointer frame) {
     if (failed)
         return;
     waiting_.push_back(std::move(frame));
-    if (depth_ > 0 && waiting_.size() > depth_) {
+    if (depth > 0 && waiting_.size() > depth) {
         waiting_.pop_front();
         ++statistics_.dropped[component->name()];
     }

@@ -12,10 +12,11 @@ namespace arhost::host {
 
 class SinkQueue {
 public:
-    // In mode live `depth` frames wait at most; the oldest gives way. In lockstep none does (depth 0).
-    SinkQueue(std::size_t depth, Statistics &statistics) : depth_(depth), statistics_(statistics) {}
+    explicit SinkQueue(Statistics &statistics) : statistics_(statistics) {}
 
     std::unique_ptr<supervise::Component> component;
+    // So many frames wait at most; the oldest gives way. 0: none does, the run waits for the sink.
+    std::size_t depth = 0;
     bool failed = false; // takes no more frames
 
     void offer(OutputFramePointer frame);
@@ -31,7 +32,6 @@ public:
 
 private:
     static constexpr std::size_t in_flight_limit = 2;
-    std::size_t depth_;
     Statistics &statistics_;
     std::deque<OutputFramePointer> waiting_, unconfirmed_;
     std::uint64_t next_sequence_ = 0; // after the last confirmed one

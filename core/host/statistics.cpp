@@ -8,14 +8,27 @@ namespace arhost::host {
 
 using Json = nlohmann::ordered_json;
 
+namespace {
+const double log_growth = std::log(1.01);
+}
+
+void Timing::add(std::chrono::nanoseconds time) {
+    const std::int64_t ns = std::max<std::int64_t>(time.count(), 1);
+    const auto bucket = static_cast<std::size_t>(std::lround(std::log(static_cast<double>(ns)) / log_growth));
+    if (bucket >= buckets_.size())
+        buckets_.resize(bucket + 1);
+    ++buckets_[bucket];
+    ++count_;
+    max_ns_ = std::max(max_ns_, ns);
+}
+
 double Timing::percentile_ms(double share) const {
-    if (samples_ns_.empty())
-        return 0;
-    std::vector<std::int64_t> sorted = samples_ns_;
-    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(sorted.size())));
-    const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(std::clamp<std::size_t>(rank, 1, sorted.size()) - 1);
-    std::nth_element(sorted.begin(), nth, sorted.end());
-    return static_cast<double>(*nth) * 1e-6;
+    const auto rank = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
+    std::uint64_t seen = 0;
+    for (std::size_t bucket = 0; bucket < buckets_.size(); ++bucket)
+        if ((seen += buckets_[bucket]) >= std::max<std::uint64_t>(rank, 1))
+            return std::min(1e-6 * std::exp(static_cast<double>(bucket) * log_growth), max_ms());
+    return 0;
 }
 
 Json Timing::to_json() const {
@@ -23,7 +36,7 @@ Json Timing::to_json() const {
             {"p50_ms", percentile_ms(0.50)},
             {"p95_ms", percentile_ms(0.95)},
             {"p99_ms", percentile_ms(0.99)},
-            {"max_ms", percentile_ms(1.0)}};
+            {"max_ms", max_ms()}};
 }
 
 double Statistics::fps() const {

@@ -151,7 +151,9 @@ arhost_frame_format format_from_json(const Json &json) {
         (yuv && (f.yuv_matrix < ARHOST_BT601 || f.yuv_matrix > ARHOST_BT709 || f.yuv_range < ARHOST_LIMITED_RANGE ||
                  f.yuv_range > ARHOST_FULL_RANGE)) ||
         !arhost_frame_layout(&f))
-        throw std::runtime_error("the frame format is not valid: " + json.dump());
+        throw std::runtime_error("the frame format is not valid: pixel format " + std::to_string(f.pixel_format) + ", " +
+                                 std::to_string(f.width) + "x" + std::to_string(f.height) + " px, " +
+                                 std::to_string(f.fps) + " fps");
     return f;
 }
 

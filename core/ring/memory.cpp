@@ -59,7 +59,11 @@ SharedMemory SharedMemory::adopt_and_freeze(UniqueFd fd) {
 
 Mapping SharedMemory::map(Access access) const {
     const int protection = access == Access::read_write ? PROT_READ | PROT_WRITE : PROT_READ;
-    void *address = ::mmap(nullptr, size_, protection, MAP_SHARED, fd_.get(), 0);
+    // Linux before 6.7 refuses even a read-only shared mapping of what is sealed against writing; a
+    // private one is the same pages, since nobody can write them any more.
+    const bool frozen = (::fcntl(fd_.get(), F_GET_SEALS) & F_SEAL_WRITE) != 0;
+    const int sharing = frozen && access == Access::read_only ? MAP_PRIVATE : MAP_SHARED;
+    void *address = ::mmap(nullptr, size_, protection, sharing, fd_.get(), 0);
     if (address == MAP_FAILED)
         throw_errno("mmap of shared memory");
     return Mapping(static_cast<std::byte *>(address), size_);

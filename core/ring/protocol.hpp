@@ -5,13 +5,13 @@
 // core/supervise the other.
 //
 //   host → worker                                        worker → host
-//   {type: open, plugin, kind} + host page, worker page   {type: hello, descriptor}
+//   {type: open, plugin} + host page      , worker page   {type: hello, descriptor}
 //   {type: create, options, setup…} [+ arena, inputs]     {type: ready, properties…}
 //   {type: attach, role, generation, layout} + memory     {type: attached, role, generation}
 //   {type: detach, generation}                            {type: detached, generation}
 //   {type: stop}                                          {type: stopped, status}
 //   at any time                                           {type: log, severity, text}, {type: progress, what, fraction},
-//                                                         {type: failed, status, text}
+//                                                         {type: failed, status, text}, {type: end}
 //   the loader: {type: load, scene}                       {type: loaded, …} + arena
 //
 // Once a worker is ready, the host announces each further message by a `control` command in the ring, so

@@ -2,6 +2,7 @@
 #include "supervise/component.hpp"
 
 #include <algorithm>
+#include <csignal>
 
 namespace arhost::supervise {
 
@@ -27,13 +28,21 @@ void Component::start() { spawn(); }
 void Component::spawn() {
     state_ = State::starting;
     stop_sent_ = false;
+    stop_answer_.reset();
     configuration_error_.clear();
+    failure_.clear();
+    description_ = {};
     Process::Events events;
     events.message = [this](Message &message) { on_message(message); };
     events.result = [this](const Result &result) { on_result(result); };
     events.died = [this](const Death &death) { on_died(death); };
-    process_ = std::make_unique<Process>(context_, name_, std::move(events),
-                                         Json{{"type", "open"}, {"plugin", plugin().string()}});
+    try {
+        process_ = std::make_unique<Process>(context_, name_, std::move(events),
+                                             Json{{"type", "open"}, {"plugin", plugin().string()}});
+    } catch (const std::exception &error) { // no process or memory to be had: as if it had died at once
+        state_ = State::waiting;
+        return try_again(error.what());
+    }
     watch_start(limits_.start, "did not start");
 }
 
@@ -41,10 +50,8 @@ void Component::stop() {
     stop_requested_ = true;
     if (state_ == State::running)
         stop_when_idle();
-    else if (state_ == State::idle || state_ == State::given_up) {
-        state_ = State::stopped;
-        hooks_.stopped(ARHOST_OK, "");
-    }
+    else if (state_ == State::idle || state_ == State::given_up)
+        stopped(ARHOST_OK, "");
 }
 
 void Component::kill() {
@@ -103,13 +110,17 @@ void Component::on_message(Message &message) {
         on_ready(message.body);
     } else if (type == "attached") {
         on_attached(message.body);
-    } else if (type == "failed") {
+    } else if (type == "failed" && state_ == State::starting) {
         const auto status = message.body.at("status").get<arhost_status>();
         const std::string text = message.body.at("text").get<std::string>();
         if (status == ARHOST_ERROR_CONFIGURATION || status == ARHOST_ERROR_UNSUPPORTED)
             configuration_error_ = text;
+        else
+            failure_ = text;
     } else if (type == "stopped" && stop_sent_) {
         stop_answer_ = {message.body.at("status").get<arhost_status>(), message.body.at("text").get<std::string>()};
+    } else if (type == "failed") {
+        context_.log(ARHOST_SEVERITY_WARNING, name_, message.body.at("text").get<std::string>());
     } else if (type == "end") {
         hooks_.ended();
     } else if (type != "detached") {
@@ -127,7 +138,7 @@ void Component::on_hello(const Json &body) {
         else
             process_->send(create.body, {create.fds.front()});
         watch_start(limits_.start, "did not start");
-    } catch (const std::runtime_error &error) {
+    } catch (const std::exception &error) {
         configuration_error_ = error.what();
         process_->kill_now();
     }
@@ -175,7 +186,7 @@ void Component::run() {
 }
 
 void Component::stop_when_idle() {
-    if (state_ != State::running || !in_flight_.empty() || stop_sent_)
+    if (!running() || !in_flight_.empty() || stop_sent_)
         return;
     stop_sent_ = true;
     process_->send_in_turn({{"type", "stop"}});
@@ -190,8 +201,10 @@ void Component::on_result(const Result &result) {
     const Command command = in_flight_.front();
     in_flight_.pop_front();
     watch_frame();
-    policy_.frame_done();
     hooks_.result(command, result);
+    // An error is no proof that it works, nor is a result that made the host end it.
+    if (result.status > 0 && process_ && !process_->ending())
+        policy_.frame_done();
     if (stop_requested_)
         stop_when_idle();
 }
@@ -206,46 +219,72 @@ void Component::on_died(const Death &death) {
     const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());
     in_flight_.clear();
 
-    if (death.clean && stop_answer_) {
-        state_ = State::stopped;
-        return hooks_.stopped(stop_answer_->first, stop_answer_->second);
+    state_ = State::waiting;
+    hooks_.lost(unanswered);
+
+    const std::uint64_t frame = unanswered.empty() ? Crash::no_frame : unanswered.front().sequence;
+    const bool crash = !death.clean && configuration_error_.empty();
+    if (crash)
+        crashed({death.how, death.log_tail, frame});
+    std::string reason = failure_.empty() ? death.how : failure_;
+    if (frame != Crash::no_frame)
+        reason += ", at frame " + std::to_string(frame);
+
+    if (stop_answer_) { // it had finished; how it went after that does not matter
+        if (crash)
+            context_.log(ARHOST_SEVERITY_WARNING, name_, reason + ", after it had finished");
+        return stopped(stop_answer_->first, stop_answer_->second);
+    }
+    // Only a sink has files that are worth a second try.
+    if (stop_sent_ && (description_.kind != ARHOST_KIND_SINK || ++deaths_in_stop_ > 1)) {
+        context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
+        const bool matters = description_.kind == ARHOST_KIND_SINK;
+        return stopped(matters ? ARHOST_ERROR_INTERNAL : ARHOST_OK, reason);
     }
     if (!configuration_error_.empty())
         return give_up(configuration_error_, true);
-    if (description_.id.empty()) // it never even said hello: its library can't be used
+    // It never even said hello, by its own fault: its library can't be used.
+    if (description_.id.empty() && !death.by_host && death.signal != SIGKILL)
         return give_up(plugin().string() + ": " + death.how, true);
+    try_again(reason);
+}
 
-    const std::uint64_t frame = unanswered.empty() ? Crash::no_frame : unanswered.front().sequence;
-    crashes_.push_back({death.how, death.log_tail, frame});
+void Component::crashed(Crash crash) {
+    crashes_.push_back(std::move(crash));
+    if (crashes_.size() > 100)
+        crashes_.pop_front();
+}
+
+void Component::try_again(const std::string &reason) {
     const auto delay = policy_.died(std::uniform_real_distribution<double>(0, 1)(jitter_));
-    std::string report = death.how;
-    if (frame != Crash::no_frame)
-        report += ", at frame " + std::to_string(frame);
-    if (delay)
-        report += delay->count() ? "; starting it again in " + std::to_string(delay->count()) + " ms" : "; starting it again";
-    context_.log(ARHOST_WARNING, name_, report);
-    state_ = State::waiting;
-    hooks_.lost(unanswered);
-    if (!delay)
-        return give_up(death.how + "; it failed " + std::to_string(policy_.failures()) + " times in a row", false);
+    if (!delay) {
+        context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
+        return give_up(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row", false);
+    }
+    const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
+    context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; starting it again" + wait);
     ++restarts_;
     restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
 }
 
 void Component::give_up(const std::string &reason, bool by_configuration) {
     if (candidate_ + 1 < plugins_.size()) {
-        context_.log(ARHOST_WARNING, name_, reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
+        context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
         policy_ = RestartPolicy(limits_.restart);
         ++restarts_;
-        state_ = State::waiting;
         restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
         return;
     }
-    state_ = stop_requested_ ? State::stopped : State::given_up;
+    state_ = State::given_up;
     hooks_.given_up(reason, by_configuration);
     if (stop_requested_)
-        hooks_.stopped(ARHOST_ERROR_INTERNAL, reason);
+        stopped(ARHOST_ERROR_INTERNAL, reason);
+}
+
+void Component::stopped(arhost_status status, const std::string &text) {
+    state_ = State::stopped;
+    hooks_.stopped(status, text);
 }
 
 void Component::watch_start(std::chrono::milliseconds limit, const char *what) {

@@ -28,6 +28,11 @@ struct Region {
 };
 using RegionPointer = std::shared_ptr<const Region>;
 
+//   idle ─start─▶ starting ─ready, memory attached─▶ running ─stop, nothing in flight─▶ stopped
+//                  ▲  │ died                           │ died
+//                  │  ▼                                ▼
+//                  └─ waiting ◀────────────────────────┘     too many failures, or a configuration that
+//                                                            can't work: given_up (or the fallback starts)
 class Component {
 public:
     enum class State { idle, starting, running, waiting, given_up, stopped };
@@ -46,7 +51,8 @@ public:
         std::function<ring::SlotLayout(const ring::Json &ready)> ready;
         std::function<void()> running; // commands may be submitted
         std::function<void(const ring::Command &, const ring::Result &)> result;
-        // The process has ended. The unanswered commands, oldest first; that one was being worked on.
+        // The process has ended, whatever comes next. The unanswered commands, oldest first; that one
+        // was being worked on.
         std::function<void(const std::vector<ring::Command> &unanswered)> lost;
         // It will not be started again. `by_configuration`: it can't work as it is configured.
         std::function<void(const std::string &reason, bool by_configuration)> given_up;
@@ -75,7 +81,8 @@ public:
     // Its process is of no more use, for the reason given: ends it, and a new one follows.
     void end_process(const std::string &reason);
 
-    bool running() const { return state_ == State::running; }
+    // Takes commands. A process that is being ended does not, though its last results may still come.
+    bool running() const { return state_ == State::running && !process_->ending(); }
     State state() const { return state_; }
     const std::string &name() const { return name_; }
     const std::filesystem::path &plugin() const { return plugins_[candidate_]; }
@@ -91,7 +98,7 @@ public:
 
     std::uint32_t restarts() const { return restarts_; }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
-    const std::vector<Crash> &crashes() const { return crashes_; }
+    const std::deque<Crash> &crashes() const { return crashes_; } // the last hundred
 
 private:
     void spawn();
@@ -103,7 +110,10 @@ private:
     void on_died(const Death &death);
     void run();
     void stop_when_idle();
+    void crashed(Crash crash);
+    void try_again(const std::string &reason);
     void give_up(const std::string &reason, bool by_configuration);
+    void stopped(arhost_status status, const std::string &text);
     void watch_start(std::chrono::milliseconds limit, const char *what);
     void watch_frame();
 
@@ -117,7 +127,7 @@ private:
     State state_ = State::idle;
     bool stop_requested_ = false, stop_sent_ = false;
     std::optional<std::pair<arhost_status, std::string>> stop_answer_;
-    std::string configuration_error_;
+    std::string configuration_error_, failure_; // what the worker gave as its reason
     ring::PluginDescription description_;
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> output_being_attached_;
@@ -128,7 +138,8 @@ private:
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;
-    std::vector<Crash> crashes_;
+    std::deque<Crash> crashes_;
+    std::uint32_t deaths_in_stop_ = 0;
     ring::Reactor::Registration deadline_, restart_timer_;
     std::minstd_rand jitter_{std::random_device{}()};
 };

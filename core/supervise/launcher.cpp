@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <poll.h>
+#include <set>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
@@ -41,15 +42,19 @@ template <class Struct> bool receive_struct(int socket, Struct &data, std::vecto
 
 // In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
 [[noreturn]] void become(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
+    // A group of its own: what it forks ends with it, and the terminal's Ctrl-C, which the host alone
+    // interprets, does not reach it.
+    ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != launcher) // it died before the line above
         ::_exit(127);
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    // Ctrl-C reaches the whole terminal group; the host alone decides what it means.
     ::signal(SIGINT, SIG_IGN);
-    ::signal(SIGPIPE, SIG_IGN);
+    ::signal(SIGTERM, SIG_DFL);
+    ::signal(SIGHUP, SIG_IGN);
+    ::signal(SIGPIPE, SIG_IGN); // and SIGXFSZ, which the host ignores too: a full disk is an error value
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
     // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
@@ -69,7 +74,7 @@ template <class Struct> bool receive_struct(int socket, Struct &data, std::vecto
     ::_exit(127);
 }
 
-void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &fds) {
+void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &fds, std::set<pid_t> &spawned) {
     const pid_t launcher = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0)
@@ -83,12 +88,20 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     }
     // No race: the child stays a zombie until this process reaps it.
     const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
-    reply.kind = Reply::spawned;
     reply.exit.pid = pid;
+    if (!pidfd) { // a container that does not allow it, or no descriptor left
+        reply.kind = Reply::failed;
+        reply.error = errno;
+        ::kill(pid, SIGKILL);
+        send_struct(socket, reply);
+        return;
+    }
+    reply.kind = Reply::spawned;
+    spawned.insert(pid);
     send_struct(socket, reply, {pidfd.get()});
 }
 
-void reap(int socket) {
+void reap(int socket, std::set<pid_t> &spawned) {
     for (;;) {
         Reply reply{};
         rusage usage{};
@@ -96,6 +109,9 @@ void reap(int socket) {
         reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
         if (reply.exit.pid <= 0)
             return;
+        if (spawned.erase(reply.exit.pid) == 0)
+            continue; // the orphan of a worker
+        ::kill(-reply.exit.pid, SIGKILL); // what it has forked and left behind
         const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
         reply.exit.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
         send_struct(socket, reply);
@@ -104,9 +120,12 @@ void reap(int socket) {
 
 [[noreturn]] void launcher_main(int socket) {
     ::prctl(PR_SET_NAME, "arhost-launcher");
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1);
+    std::set<pid_t> spawned;
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
+    ::signal(SIGHUP, SIG_IGN);
     sigset_t child;
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);
@@ -120,14 +139,14 @@ void reap(int socket) {
             signalfd_siginfo info;
             while (::read(signals.get(), &info, sizeof info) > 0) {
             }
-            reap(socket);
+            reap(socket, spawned);
         }
         if (ready[0].revents) {
             Request request;
             std::vector<UniqueFd> fds;
             if (!receive_struct(socket, request, fds) || fds.size() != 3)
                 ::_exit(0); // the host is gone; the workers follow
-            spawn_for(socket, request, fds);
+            spawn_for(socket, request, fds, spawned);
         }
     }
 }

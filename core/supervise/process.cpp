@@ -52,9 +52,9 @@ Process::Process(Context &context, std::string name, Events events, const Json &
       results_(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results) {
     host_memory_.seal_future_writes(); // the worker can map it for reading only
     Reactor &reactor = context_.reactor;
-    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { on_channel(); });
+    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { take_messages(16); });
     doorbell_watch_ = reactor.watch(spawned_.doorbell.get(), [this] { on_doorbell(); });
-    output_watch_ = reactor.watch(spawned_.output.get(), [this] { on_output(); });
+    output_watch_ = reactor.watch(spawned_.output.get(), [this] { take_output(4096); });
     death_watch_ = reactor.watch(spawned_.pidfd.get(), [this] { on_death(); });
     send(first, {host_memory_.fd(), worker_memory_.fd()});
 }
@@ -106,9 +106,9 @@ double Process::cpu_seconds() const {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-void Process::on_channel() {
-    // A few at a time, so that a flood of messages can't keep the host from its frames.
-    for (int i = 0; i < 16; ++i) {
+// A few at a time, so that a flood of messages can't keep the host from its frames.
+void Process::take_messages(int most) {
+    for (int i = 0; i < most; ++i) {
         Message message;
         switch (spawned_.channel.receive(message, 0)) {
         case ReceiveState::none:
@@ -116,7 +116,8 @@ void Process::on_channel() {
         case ReceiveState::closed:
             channel_watch_.cancel();
             // Its death follows most times; a worker that only closed its end is useless.
-            kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
+            if (!ending())
+                kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
                                                  [this] { end("closed its control channel"); });
             return;
         case ReceiveState::breach:
@@ -127,17 +128,15 @@ void Process::on_channel() {
         try {
             if (message.body["type"] == "log") {
                 const auto severity = message.body.at("severity").get<arhost_severity>();
-                const std::string text = message.body.at("text").get<std::string>();
+                const std::string text = message.body.at("text").get<std::string>().substr(0, 4000);
                 remember(text);
                 context_.log(severity, name_, text);
             } else {
                 events_.message(message);
             }
-        } catch (const nlohmann::json::exception &error) {
-            return end(std::string("broke the contract: ") + error.what());
+        } catch (const std::exception &error) {
+            return end(std::string("can't be served: ") + error.what());
         }
-        if (!channel_watch_.active()) // an event has ended this process
-            return;
     }
 }
 
@@ -154,7 +153,7 @@ void Process::on_doorbell() {
 }
 
 void Process::take_results() {
-    for (;;) {
+    for (std::uint32_t i = 0; i < ring_capacity; ++i) {
         Result result;
         switch (results_.pop(result)) {
         case RingResult::wait:
@@ -168,19 +167,24 @@ void Process::take_results() {
     }
 }
 
-void Process::on_output() {
+void Process::take_output(std::size_t most_bytes) {
     char bytes[4096];
-    const ssize_t count = ::read(spawned_.output.get(), bytes, sizeof bytes);
-    if (count == 0)
-        output_watch_.cancel();
-    for (ssize_t i = 0; i < count; ++i) {
-        if (bytes[i] != '\n' && partial_line_.size() < 1000) {
-            partial_line_ += bytes[i];
-            continue;
+    for (std::size_t taken = 0; taken < most_bytes; taken += sizeof bytes) {
+        const ssize_t count = ::read(spawned_.output.get(), bytes, sizeof bytes);
+        if (count <= 0) {
+            if (count == 0)
+                output_watch_.cancel();
+            return;
         }
-        remember(partial_line_);
-        context_.log(ARHOST_DEBUG, name_, partial_line_);
-        partial_line_.clear();
+        for (ssize_t i = 0; i < count; ++i) {
+            if (bytes[i] != '\n' && partial_line_.size() < 1000) {
+                partial_line_ += bytes[i];
+                continue;
+            }
+            remember(partial_line_);
+            context_.log(ARHOST_SEVERITY_DEBUG, name_, partial_line_);
+            partial_line_.clear();
+        }
     }
 }
 
@@ -191,15 +195,20 @@ void Process::remember(const std::string &line) {
 }
 
 void Process::on_death() {
-    // What it managed to finish counts: messages and results first.
+    // What it managed to finish counts: messages and results first. The writer is dead, and the sockets'
+    // and the pipe's buffers bound what is left.
     if (channel_watch_.active())
-        on_channel();
+        take_messages(100'000);
     take_results();
     if (output_watch_.active())
-        on_output();
+        take_output(1 << 20);
+    if (!partial_line_.empty())
+        remember(partial_line_);
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;
     death.cpu_seconds = exit.cpu_seconds;
+    death.by_host = ending();
+    death.signal = WIFSIGNALED(exit.wait_status) ? WTERMSIG(exit.wait_status) : 0;
     death.clean = WIFEXITED(exit.wait_status) && WEXITSTATUS(exit.wait_status) == 0;
     // SYNC: relaxed suffices, the writer is dead and its exit has been waited for.
     const auto call = static_cast<Call>(worker_page_.as<WorkerPage>().call.load(std::memory_order_relaxed));

@@ -30,13 +30,16 @@ struct Context {
 struct Death {
     std::string how;      // "killed by signal 11 (Segmentation fault) in per-frame"
     bool clean = false;   // exit status 0
+    bool by_host = false; // the host ended it, for the reason in `how`
+    int signal = 0;       // that killed it; 0: it exited
     double cpu_seconds = 0;
     std::string log_tail; // the last lines that it logged or printed
 };
 
 class Process {
 public:
-    // Each is called from the reactor. `died` comes last and once; the Process may be destroyed in it.
+    // Each is called from the reactor. `died` comes last and once; the Process may be destroyed in it,
+    // and in none of the others. An exception out of `message` ends the process.
     struct Events {
         std::function<void(ring::Message &)> message; // but for log messages
         std::function<void(const ring::Result &)> result;
@@ -56,17 +59,18 @@ public:
     void submit(const ring::Command &command);
 
     void ask_to_cancel(); // the running call sees host->cancelled
-    // Ends it for a reason that is logged and stands in Death::how: SIGABRT, and SIGKILL soon after.
+    // Ends it for a reason that stands in Death::how: SIGABRT, and SIGKILL soon after.
     void end(const std::string &reason);
+    bool ending() const { return !end_reason_.empty(); }
     void kill_now();
 
     pid_t pid() const { return spawned_.pid; }
     double cpu_seconds() const; // so far
 
 private:
-    void on_channel();
+    void take_messages(int most);
     void on_doorbell();
-    void on_output();
+    void take_output(std::size_t most_bytes);
     void on_death();
     void take_results();
     void remember(const std::string &line);

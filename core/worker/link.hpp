@@ -36,6 +36,8 @@ public:
     std::optional<ring::Command> next(std::chrono::milliseconds timeout);
     void answer(const ring::Result &result);
 
+    bool serving = false; // past `ready`: what fails now is no fault of the configuration
+
     // Marks which of the plugin's functions runs, for crash reports, while it is alive.
     class InCall {
     public:

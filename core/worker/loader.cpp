@@ -12,7 +12,7 @@ namespace arhost::worker {
 int load_scene_for(Link &link, const ring::Message &load) {
     scene::LoadCallbacks callbacks;
     callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
-    callbacks.info = [&](const std::string &text) { link.log(ARHOST_INFO, text); };
+    callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
     scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);
     const ring::SharedMemory memory = ring::SharedMemory::create("arhost-scene", builder.byte_size());
     {

@@ -36,7 +36,7 @@ private:
     static HostSide &self(const arhost_host *host) { return *static_cast<HostSide *>(host->context); }
     static void on_log(const arhost_host *host, arhost_severity severity, const char *text) {
         const std::string copy = text ? text : "";
-        if (severity == ARHOST_ERROR) {
+        if (severity == ARHOST_SEVERITY_ERROR) {
             std::lock_guard lock(self(host).mutex_);
             self(host).last_error_ = copy;
         }
@@ -110,6 +110,7 @@ private:
             return false;
         }
         link_.send(ready);
+        link_.serving = true;
         return true;
     }
 
@@ -206,7 +207,8 @@ int main() {
         return EXIT_FAILURE; // nobody is left to tell
     } catch (const std::exception &error) {
         try {
-            link.send({{"type", "failed"}, {"status", ARHOST_ERROR_CONFIGURATION}, {"text", error.what()}});
+            const arhost_status status = link.serving ? ARHOST_ERROR_INTERNAL : ARHOST_ERROR_CONFIGURATION;
+            link.send({{"type", "failed"}, {"status", status}, {"text", error.what()}});
         } catch (const worker::HostGone &) {
         }
         return EXIT_FAILURE;

@@ -68,22 +68,31 @@ Node Node::load(const std::filesystem::path &file) {
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))
         throw Error(file.string() + ": is a folder, not a YAML file");
+    if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
+        throw Error(file.string() + ": is no regular file");
+    errno = 0;
     std::ifstream stream(file, std::ios::binary);
-    std::ostringstream text;
-    if (!stream || !(text << stream.rdbuf()))
+    const std::string content{std::istreambuf_iterator<char>(stream), {}};
+    if (!stream)
         throw Error(file.string() + ": can't be read: " + std::strerror(errno ? errno : EIO));
-    return parse(text.str(), file.string());
+    return parse(content, file.string());
 }
 
 Node Node::parse(const std::string &text, const std::string &name) {
     auto document = std::make_shared<Document>(Document{name, {}});
     try {
-        YAML::Node root = YAML::Load(text);
-        return Node(root, "", document);
+        const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+        if (documents.size() > 1)
+            throw Error(name + ": has " + std::to_string(documents.size()) + " YAML documents; keep one (remove the '---')");
+        return Node(documents.empty() ? YAML::Node() : documents[0], "", document);
     } catch (const YAML::Exception &error) {
         throw Error(name + ":" + std::to_string(error.mark.line + 1) + ":" + std::to_string(error.mark.column + 1) +
                     ": YAML syntax: " + error.msg);
     }
+}
+
+Node Node::scalar(const std::string &text, const std::string &name) {
+    return Node(YAML::Node(text), "", std::make_shared<Document>(Document{name, {}}));
 }
 
 void Node::override_value(const std::string &path, const std::string &value) {
@@ -94,6 +103,7 @@ void Node::override_value(const std::string &path, const std::string &value) {
         throw Error("--set " + path + "=" + value + ": YAML syntax: " + error.msg);
     }
     YAML::Node at = node_;
+    std::string canonical; // as Node::path() would have it
     const std::vector<std::string> parts = split_path(path);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool last = i + 1 == parts.size();
@@ -102,6 +112,7 @@ void Node::override_value(const std::string &path, const std::string &value) {
         };
         if (parts[i].empty())
             refuse("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
+        canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
         YAML::Node next;
         if (at.IsSequence()) {
             std::size_t index = 0;
@@ -123,7 +134,7 @@ void Node::override_value(const std::string &path, const std::string &value) {
         if (!last)
             at.reset(next);
     }
-    document_->overrides[path] = value;
+    document_->overrides[canonical] = value;
 }
 
 bool Node::is_overridden() const {

@@ -47,6 +47,9 @@ public:
     // `name` stands for the file in messages.
     static Node parse(const std::string &text, const std::string &name);
 
+    // A plain value that stands in no file.
+    static Node scalar(const std::string &text, const std::string &name);
+
     // Replaces or adds the value at a path of keys ("tracker.options.dictionary", "outputs[0].path"):
     // for `--set`. Errors about it then name `--set` instead of a line. Call it on the root.
     void override_value(const std::string &path, const std::string &value);

@@ -54,7 +54,7 @@ void LibavLog::on_message(void *context, int level, const char *format, va_list 
         text.pop_back();
     if (text.empty())
         return;
-    log.host_.log(ARHOST_DEBUG, "libav: " + text);
+    log.host_.log(ARHOST_SEVERITY_DEBUG, "libav: " + text);
     if (level <= AV_LOG_ERROR) {
         // "[mov,mp4 @ 0x55…] moov atom not found": the user needs no address.
         const std::size_t end_of_prefix = text.starts_with('[') ? text.find("] ") : std::string::npos;

@@ -50,6 +50,7 @@ const std::vector<Case> cases = {
     {"CrashOnLoad", replaced(good, "rt_counter", "broken_constructor"), small_scene, {"broken_constructor.so", "signal 11", "while its library was loaded"}},
     {"PluginThatIsNoLibrary", replaced(good, "rt_counter", "./run.yaml.so"), small_scene, {"run.yaml:5:", "there is no plugin"}},
     {"NoSceneFile", replaced(good, "scene.yaml", "none.yaml"), small_scene, {"run.yaml:5:", "there is no scene file"}},
+    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"run.yaml: has 2 YAML documents"}},
     {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
     {"SceneWithMissingMesh", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: none.obj"), {"scene.yaml:4:", "none.obj"}},
     {"SceneWithNanVertex", good, replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: nan.obj"), {"scene.yaml:4:", "nan.obj", ":2"}},
@@ -97,6 +98,8 @@ TEST(BadCommandLine, IsRefused) {
         {{"--config", "run.yaml", "--set", "mode=fast"}, "--set: mode: 'fast' is not one of lockstep, live"},
         {{"--config", "run.yaml", "--set", "nonsense=1"}, "nonsense: unknown key"},
         {{"--config", "run.yaml", "--ar", "1", "--rt", "2", "--g1", "90"}, "axis"},
+        {{"--config", "run.yaml", "--x1", "1"}, "need --g1"},
+        {{"--config", "run.yaml", "--set", "outputs.0.plugin=x"}, "--set: outputs[0].plugin: there is no plugin"},
         {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 needs --g1"},
         {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
     };

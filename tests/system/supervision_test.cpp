@@ -159,3 +159,45 @@ TEST(Supervision, ASinkThatCanNotWriteIsGivenUpAndTheOthersGoOn) {
     EXPECT_EQ(counted(run).size(), 50u);
     EXPECT_THAT(run.output(), HasSubstr("can't write frame 5"));
 }
+
+TEST(Supervision, AFrameThatTheSourceFailsToGiveIsAskedForAgainAndNeverLeftOut) {
+    ArhostRun run(counting("lockstep", "frames: 60, error_at: 30", "", "", "restart: {first_delay_ms: 1}\n"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1) << "the source can never give frame 30\n" << run.output();
+    expect_all_frames_in_order(run, 30);
+}
+
+TEST(Supervision, ASourceThatDiesAtTheLastFramesThatAreAskedForGivesThemAll) {
+    ArhostRun run(counting("lockstep", "frames: 100, delay_ms: 20", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml", "--frames", "14"});
+    wait_for_frames(run, 12);
+    ::kill(run.worker("source_counter"), SIGKILL);
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_all_frames_in_order(run, 14);
+}
+
+TEST(Supervision, AClosedWindowEndsTheRunAndTheOtherOutputsAreFinished) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100000}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: window.txt, options: {end_at: 20}}\n"
+                  "- {plugin: sink_counter, path: counted.txt, options: {delay_ms: 2}}\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    EXPECT_TRUE(run.exists("window.txt.done"));
+    expect_all_frames_in_order(run, counted(run).size());
+}
+
+TEST(Supervision, AWorkerThatDiesAfterItHasFinishedIsLeftAtThat) {
+    ArhostRun run(counting("lockstep", "frames: 30", "crash_in_destroy: true", ""));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+    EXPECT_THAT(run.output(), HasSubstr("after it had finished"));
+}
+
+TEST(Supervision, TheRunEndsWhenNoOutputIsLeft) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000}}\n"
+                  "outputs: [{plugin: sink_counter, path: counted.txt, options: {error_at: 5}}]\n");
+    EXPECT_EQ(run.run(), 1) << run.output();
+}

@@ -91,7 +91,7 @@ void expect_refusal(const std::map<std::string, std::string> &options, arhost_st
                     const std::vector<std::string> &words, arhost_source_setup setup = {}) {
     SourceUnderTest source("source_file");
     EXPECT_EQ(source.start(options, setup), status) << source.log();
-    const std::string errors = source.log(ARHOST_ERROR);
+    const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
     for (const std::string &word : words)
         EXPECT_THAT(errors, HasSubstr(word));
     EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "one message, not:\n" << errors;
@@ -170,8 +170,8 @@ TEST(ImageSequence, EndsBeforeAMissingFileAndSaysSo) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
     EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end
-    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("image_0003.png' is missing"));
-    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("up to number 5"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("image_0003.png' is missing"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to number 5"));
 }
 
 TEST(ImageSequence, TakesTheRateAskedFor) {
@@ -193,8 +193,8 @@ TEST(ImageSequence, RefusesASizeThatChangesAndNamesTheFile) {
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
     EXPECT_EQ(source.read(1).status, ARHOST_OK);
     EXPECT_EQ(source.read(2).status, ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0002.png' is 50×32"));
-    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0000.png' is 48×32"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' is 50×32"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0000.png' is 48×32"));
 }
 
 TEST(ImageSequence, KeepsTheFirstImagesChoiceOfGreyOrColour) {
@@ -220,9 +220,9 @@ TEST(ImageSequence, NamesAnImageThatIsDamaged) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
     EXPECT_EQ(source.read(1).status, ARHOST_ERROR_IO);
-    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0001.png' can't be read: it is damaged"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' can't be read: it is damaged"));
     EXPECT_EQ(source.read(2).status, ARHOST_ERROR_IO);
-    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr("image_0002.png' can't be read: it is empty"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' can't be read: it is empty"));
 }
 
 TEST(ImageSequence, GivesAnyFrameAfterARestart) {
@@ -452,8 +452,8 @@ TEST(Video, GivesPlanarYuvAsTheDecoderMadeIt) {
         }
         EXPECT_EQ(frames[40].status, ARHOST_END);
         EXPECT_EQ(source.read(40).status, ARHOST_END);
-        EXPECT_EQ(source.log(ARHOST_WARNING), "");
-        EXPECT_EQ(source.log(ARHOST_ERROR), "");
+        EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
+        EXPECT_EQ(source.log(ARHOST_SEVERITY_ERROR), "");
     }
 }
 
@@ -625,7 +625,7 @@ TEST(Video, OfOneFrameHasOneFrame) {
     EXPECT_EQ(source.properties().frame_count, 1u);
     EXPECT_EQ(source.read(0).status, ARHOST_OK);
     EXPECT_EQ(source.read(1).status, ARHOST_END);
-    EXPECT_EQ(source.log(ARHOST_WARNING), "");
+    EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
 TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
@@ -656,7 +656,7 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
             EXPECT_EQ(frames[n].bytes, whole[same].bytes) << "frame " << n;
         }
         EXPECT_THAT(
-            source.log(ARHOST_WARNING),
+            source.log(ARHOST_SEVERITY_WARNING),
             HasSubstr(std::string(c.name) + "' is cut short: it ends after frame " + std::to_string(good - 1)));
         EXPECT_EQ(source.read(good).status, ARHOST_END);
     }
@@ -682,7 +682,7 @@ TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
     ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
     const auto whole = source.read_all();
     EXPECT_GT(whole.size(), 30u);
-    EXPECT_THAT(source.log(ARHOST_WARNING), HasSubstr("is damaged near frame"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("is damaged near frame"));
     ASSERT_EQ(source.start(video.options(), from(25)), ARHOST_OK);
     EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
 }
@@ -697,7 +697,7 @@ TEST(Video, RefusesASizeThatChanges) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(small.options()), ARHOST_OK) << source.log();
     EXPECT_EQ(source.read_all().back().status, ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source.log(ARHOST_ERROR), HasSubstr(" is 128×96, those before it 96×64"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, those before it 96×64"));
 }
 
 TEST(Video, NoisyDecodersReachTheLogAsDebugAndNotStderr) {
@@ -712,7 +712,7 @@ TEST(Video, NoisyDecodersReachTheLogAsDebugAndNotStderr) {
     ASSERT_EQ(source.start(video.options()), ARHOST_OK);
     source.read_all();
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-    EXPECT_THAT(source.log(ARHOST_DEBUG), HasSubstr("libav: "));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_DEBUG), HasSubstr("libav: "));
 }
 
 TEST(Video, StopsDecodingWhenCancelled) {
@@ -722,7 +722,7 @@ TEST(Video, StopsDecodingWhenCancelled) {
     ASSERT_EQ(source.start(video.options()), ARHOST_OK);
     source.plugin().cancel();
     EXPECT_EQ(source.read(39).status, ARHOST_ERROR_CANCELLED);
-    EXPECT_EQ(source.log(ARHOST_ERROR), "");
+    EXPECT_EQ(source.log(ARHOST_SEVERITY_ERROR), "");
     EXPECT_EQ(source.start(video.options(), from(39)), ARHOST_ERROR_CANCELLED);
 }
 

@@ -29,7 +29,7 @@ namespace {
 std::string refusal(const std::map<std::string, std::string> &options, arhost_status expected) {
     SourceUnderTest source("source_v4l2");
     EXPECT_EQ(source.start(options), expected) << source.log();
-    const std::string errors = source.log(ARHOST_ERROR);
+    const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
     EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "one message, not:\n" << errors;
     return errors;
 }

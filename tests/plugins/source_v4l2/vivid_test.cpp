@@ -135,7 +135,7 @@ TEST_F(Vivid, GivesYuyvAtTheSizeAndRateAskedFor) {
     EXPECT_EQ(source_.format().fps, 30.0);
     EXPECT_EQ(source_.properties().frame_count, 0u);
     EXPECT_EQ(source_.read(0).status, ARHOST_OK);
-    EXPECT_EQ(source_.log(ARHOST_WARNING), "");
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
 }
 
 TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
@@ -290,40 +290,40 @@ TEST_F(Vivid, TakesTheCalibrationsSize) {
     EXPECT_EQ(source_.format().height, 480u);
     EXPECT_EQ(source_.start({{"device", device}, {"width", "320"}, {"height", "180"}}, setup),
               ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_ERROR),
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
                 HasSubstr("320×180 is asked for, but the camera's calibration is for 640×480"));
 }
 
 TEST_F(Vivid, RefusesASizeThatItDoesNotOfferAndNamesTheNearest) {
     EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has no size 650×470 in YUYV"));
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("the nearest are 640×480"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has no size 650×470 in YUYV"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("the nearest are 640×480"));
 }
 
 TEST_F(Vivid, RefusesAFormatThatItDoesNotOfferAndListsThoseThatItDoes) {
     EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("offers no mjpeg"));
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("offers no mjpeg"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
 }
 
 TEST_F(Vivid, WarnsOfARateThatItCantReach) {
     ASSERT_EQ(start(120), ARHOST_OK) << source_.log();
     EXPECT_EQ(source_.format().fps, 60.0);
-    EXPECT_THAT(source_.log(ARHOST_WARNING), HasSubstr("asked for"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("asked for"));
 }
 
 TEST_F(Vivid, TellsThatAnotherProgramHasTheCamera) {
     SourceUnderTest first("source_v4l2");
     ASSERT_EQ(first.start({{"device", device}}), ARHOST_OK) << first.log();
     EXPECT_EQ(start(), ARHOST_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("in use by another program"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("in use by another program"));
     first.stop();
     EXPECT_EQ(start(), ARHOST_OK) << source_.log();
 }
 
 TEST_F(Vivid, ListsTheCamerasThereAreWhereTheNamedOneIsMissing) {
     EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
@@ -337,7 +337,7 @@ TEST_F(Vivid, StopsWaitingWhenCancelled) {
     EXPECT_EQ(source_.read(1).status, ARHOST_ERROR_CANCELLED);
     EXPECT_LT(monotonic_ns() - before, 700'000'000);
     canceller.join();
-    EXPECT_EQ(source_.log(ARHOST_ERROR), "");
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_ERROR), "");
 }
 
 TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
@@ -350,7 +350,7 @@ TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
         frame = source_.read(n);
     while (frame.status == ARHOST_OK && ++n < 10);
     EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has gone away: was it unplugged?"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has gone away: was it unplugged?"));
     source_.stop();
     EXPECT_EQ(device_mappings(), 0u);
     // vivid plugs itself in again once everyone has let go of it.
@@ -370,19 +370,19 @@ TEST_F(Vivid, TellsThatItsDriverGaveUp) {
         frame = source_.read(n);
     while (frame.status == ARHOST_OK && ++n < 10);
     EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("has stopped streaming"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has stopped streaming"));
 }
 
 TEST_F(Vivid, ReportsFaultsOfTheDriverAtTheStart) {
     set(inject_reqbufs_error, 1);
     EXPECT_EQ(start(), ARHOST_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at reserving 4 buffers"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at reserving 4 buffers"));
     set(inject_qbuf_error, 1);
     EXPECT_EQ(start(), ARHOST_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at handing a buffer"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at handing a buffer"));
     set(inject_streamon_error, 1);
     EXPECT_EQ(start(), ARHOST_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_ERROR), HasSubstr("failed at starting to stream"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at starting to stream"));
     EXPECT_EQ(device_mappings(), 0u);
     ASSERT_EQ(start(), ARHOST_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_OK);

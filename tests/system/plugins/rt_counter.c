@@ -34,7 +34,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         else if (!strcmp(options[i].key, "delay_ms"))
             self->delay_ms = options[i].real;
         else if (!strcmp(options[i].key, "refuse") && options[i].integer) {
-            host->log(host, ARHOST_ERROR, "refused, as the option 'refuse' asks");
+            host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
             free(self);
             return ARHOST_ERROR_CONFIGURATION;
         } else if (!strcmp(options[i].key, "crash_in_create") && options[i].integer) {

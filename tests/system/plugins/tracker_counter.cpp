@@ -14,9 +14,24 @@ using namespace arhost;
 
 class Counter {
 public:
-    Counter(const Host &, const Options &options)
-        : faults_(options), lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
+    Counter(const Host &host, const Options &options)
+        : host_(host), faults_(options), crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
           nan_at_(options.integer("nan_at")) {}
+
+    ~Counter() {
+        if (crash_in_destroy_) {
+            std::signal(SIGSEGV, SIG_DFL);
+            std::raise(SIGSEGV);
+        }
+    }
+    Counter(const Counter &) = delete;
+    Counter &operator=(const Counter &) = delete;
+
+    // More last words than the host takes at a time.
+    void stop() {
+        for (int i = 0; i < 100; ++i)
+            host_.log(ARHOST_SEVERITY_DEBUG, "last words");
+    }
 
     void start(const arhost_tracker_setup &setup) { id_ = setup.markers[0].id; }
 
@@ -42,7 +57,9 @@ public:
     }
 
 private:
+    Host host_;
     test::Faults faults_;
+    bool crash_in_destroy_;
     std::int64_t lost_from_, lost_to_, nan_at_;
     std::int32_t id_ = 0;
 };
@@ -50,6 +67,7 @@ private:
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
+    option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_TRACKER, "tracker_counter", "Counter", "0.1.0",
                                           "arhost", "Apache-2.0", "Tracks numbered frames, for tests.", 0,

@@ -41,9 +41,9 @@ class Host {
 public:
     explicit Host(const arhost_host *host) : host_(host) {}
     void log(arhost_severity severity, const std::string &text) const { host_->log(host_, severity, text.c_str()); }
-    void info(const std::string &text) const { log(ARHOST_INFO, text); }
-    void warn(const std::string &text) const { log(ARHOST_WARNING, text); }
-    void error(const std::string &text) const { log(ARHOST_ERROR, text); }
+    void info(const std::string &text) const { log(ARHOST_SEVERITY_INFO, text); }
+    void warn(const std::string &text) const { log(ARHOST_SEVERITY_WARNING, text); }
+    void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
     bool cancelled() const { return host_->cancelled(host_) != 0; }
 
@@ -98,13 +98,13 @@ template <class Call> arhost_status guarded(const Host &host, Call &&call) noexc
         host.error(failure.what());
         return failure.status();
     } catch (const std::bad_alloc &) {
-        host.log(ARHOST_ERROR, "out of memory");
+        host.log(ARHOST_SEVERITY_ERROR, "out of memory");
         return ARHOST_ERROR_OUT_OF_MEMORY;
     } catch (const std::exception &error) {
         host.error(error.what());
         return ARHOST_ERROR_INTERNAL;
     } catch (...) {
-        host.log(ARHOST_ERROR, "an exception of unknown type");
+        host.log(ARHOST_SEVERITY_ERROR, "an exception of unknown type");
         return ARHOST_ERROR_INTERNAL;
     }
 }

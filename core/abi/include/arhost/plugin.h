@@ -64,12 +64,12 @@ enum {
 
 typedef int32_t arhost_severity;
 enum {
-    ARHOST_DEBUG = 1,
-    ARHOST_INFO = 2,
-    ARHOST_WARNING = 3,
-    ARHOST_ERROR = 4,
-    ARHOST_HOST_MISBEHAVING = 5,  /* the plugin saw the host break this contract */
-    ARHOST_PLUGIN_MISBEHAVING = 6 /* the worker saw the plugin break it */
+    ARHOST_SEVERITY_DEBUG = 1,
+    ARHOST_SEVERITY_INFO = 2,
+    ARHOST_SEVERITY_WARNING = 3,
+    ARHOST_SEVERITY_ERROR = 4,
+    ARHOST_SEVERITY_HOST_MISBEHAVING = 5,  /* the plugin saw the host break this contract */
+    ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 6 /* the worker saw the plugin break it */
 };
 
 /* What the plugin may ask of its host. Lives as long as the process. All functions are [any]. */
@@ -166,7 +166,7 @@ typedef struct arhost_plugin {
     const void *functions;
 
     /* [worker] Makes an instance. On success *instance is not NULL. On failure the reason has been
-     * logged with ARHOST_ERROR, in words that name the option to mend, and *instance stays NULL.
+     * logged with ARHOST_SEVERITY_ERROR, in words that name the option to mend, and *instance stays NULL.
      * `host` outlives the instance; `options` do not outlive the call. */
     arhost_status (*create)(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance);

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How long the Embree ray tracer takes for an image, and how much of what Embree could do at best is
+// left: `rt-embree-bench [threads [instruction_set]]`.
+#include "renderer.hpp"
+#include "scene/mesh.hpp"
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <glm/trigonometric.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace arhost::scene;
+
+constexpr std::uint32_t width = 800, height = 600;
+constexpr int rounds = 101;
+
+arhost_host quiet_host() {
+    return {sizeof(arhost_host),
+            ARHOST_ABI_VERSION,
+            "rt-embree-bench",
+            "0",
+            nullptr,
+            [](const arhost_host *, arhost_severity, const char *text) { std::printf("%s\n", text); },
+            [](const arhost_host *, double, const char *) {},
+            [](const arhost_host *) { return 0; },
+            [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+}
+
+// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
+TriangleMesh dented_ball() {
+    TriangleMesh mesh;
+    constexpr unsigned rings = 186, sides = 187;
+    for (unsigned ring = 0; ring <= rings; ++ring)
+        for (unsigned side = 0; side <= sides; ++side) {
+            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
+            const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
+            mesh.positions.push_back(glm::vec3(0, 50, 0) + r * glm::vec3(std::sin(theta) * std::cos(phi),
+                                                                         std::cos(theta),
+                                                                         std::sin(theta) * std::sin(phi)));
+            if (ring < rings && side < sides) {
+                const unsigned a = ring * (sides + 1) + side, b = a + sides + 1;
+                mesh.triangles.push_back({a, a + 1, b});
+                mesh.triangles.push_back({a + 1, b + 1, b});
+            }
+        }
+    mesh.normals = smooth_normals(mesh);
+    return mesh;
+}
+
+// Brought to 100 mm of height on the plane y = 0.
+TriangleMesh bunny() {
+    const std::filesystem::path file = std::filesystem::path(ARHOST_SHARED_DATA) / "meshes/bunny_69451.ply.gz";
+    if (!std::filesystem::exists(file)) {
+        std::printf("%s is not here: a dented ball of 69564 triangles stands in for the bunny\n", file.c_str());
+        return dented_ball();
+    }
+    TriangleMesh mesh = load_mesh(file, {.smooth = true});
+    glm::vec3 low = mesh.positions[0], high = low;
+    for (const glm::vec3 &p : mesh.positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    for (glm::vec3 &p : mesh.positions)
+        p = (p - glm::vec3((low.x + high.x) / 2, low.y, (low.z + high.z) / 2)) * (100 / (high.y - low.y));
+    return mesh;
+}
+
+Arena scene_of(const TriangleMesh &mesh, const arhost_material &material, bool lit) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0.2f);
+    builder.settings.max_depth = 10;
+    builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
+    if (lit)
+        builder.add_light({ARHOST_POINT_LIGHT, ARHOST_FALLOFF_NONE, {80, 200, 150}, {0.8f, 0.8f, 0.8f}});
+    return std::move(builder).build();
+}
+
+// Medians over the frames. `cpu_ms` is of all threads together: other programs' load disturbs it less.
+struct Timing {
+    double ms, cpu_ms;
+};
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+}
+
+Timing time_frames(const std::function<void()> &frame) {
+    std::vector<double> wall, cpu;
+    for (int i = 0; i < rounds; ++i) {
+        const auto start = std::chrono::steady_clock::now();
+        const std::clock_t cpu_start = std::clock();
+        frame();
+        cpu.push_back(1e3 * static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC);
+        wall.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    }
+    return {median(wall), median(cpu)};
+}
+
+void report(const char *what, const Timing &timing) {
+    std::printf("%-28s %7.2f ms   %7.2f ms of CPU\n", what, timing.ms, timing.cpu_ms);
+}
+
+arhost_intrinsics intrinsics() {
+    const double f = height / 2 / std::tan(glm::radians(22.5));
+    return {sizeof(arhost_intrinsics),
+            width,
+            height,
+            ARHOST_DISTORTION_NONE,
+            f,
+            f,
+            (width - 1) / 2.0,
+            (height - 1) / 2.0,
+            0,
+            0,
+            {}};
+}
+
+// The bunny fills the image's height.
+arhost_camera camera() {
+    return {sizeof(arhost_camera), 0, {0, 50, 170}, {0, 50, 169}, {0, 1, 0}, intrinsics()};
+}
+
+class Trial {
+public:
+    Trial(const Arena &arena, const rt_embree::Settings &settings)
+        : pixels_(width * height * 4),
+          renderer_({sizeof(arhost_raytracer_setup), width, height, 0, &arena.scene(), &camera_.intrinsics}, settings,
+                    arhost::Host(&host_)) {}
+
+    Timing time() {
+        const arhost_image image{sizeof image, width * 4, width, height, pixels_.data()};
+        return time_frames([&] { renderer_.render(camera_, image); });
+    }
+    double covered() const {
+        std::size_t count = 0;
+        for (std::size_t i = 3; i < pixels_.size(); i += 4)
+            count += pixels_[i] == 255;
+        return static_cast<double>(count) / (width * height);
+    }
+    const rt_embree::Renderer &renderer() const { return renderer_; }
+
+private:
+    arhost_host host_ = quiet_host();
+    arhost_camera camera_ = camera();
+    std::vector<std::uint8_t> pixels_;
+    rt_embree::Renderer renderer_;
+};
+
+// Nothing but rtcIntersect16 over rays that lie ready in memory, in the same blocks, tiles and threads.
+Timing time_bare_intersect16(const Arena &arena, const rt_embree::Settings &settings) {
+    const arhost_host host = quiet_host();
+    rt_embree::ThreadPool threads(settings.threads);
+    const rt_embree::RayTable table(intrinsics(), false, threads);
+    const rt_embree::EmbreeScene scene(arena.scene(), threads.thread_count(), settings.robust, arhost::Host(&host));
+    struct alignas(64) Directions {
+        float x[16], y[16], z[16];
+    };
+    std::vector<std::vector<Directions>> tiles;
+    for (const rt_embree::Tile &tile : table.tiles()) {
+        auto &directions = tiles.emplace_back();
+        for (int y = tile.pixels.y0; y < tile.pixels.y1; y += 4)
+            for (int x = tile.pixels.x0; x < tile.pixels.x1; x += 4) {
+                Directions d;
+                for (int i = 0; i < 16; ++i) {
+                    const auto seen =
+                        table.direction(std::min<int>(x + i % 4, width - 1), std::min<int>(y + i / 4, height - 1));
+                    d.x[i] = seen.x, d.y[i] = -seen.y, d.z[i] = -1;
+                }
+                directions.push_back(d);
+            }
+    }
+    const arhost_camera from = camera();
+    return time_frames([&] {
+        threads.for_each(tiles.size(), [&](std::size_t i) {
+            rt_embree::Query query = rt_embree::make_query(rt_embree::Coherence::coherent);
+            alignas(64) int valid[16];
+            std::fill_n(valid, 16, -1);
+            RTCRayHit16 rays;
+            for (int lane = 0; lane < 16; ++lane) {
+                rays.ray.org_x[lane] = static_cast<float>(from.eye[0]);
+                rays.ray.org_y[lane] = static_cast<float>(from.eye[1]);
+                rays.ray.org_z[lane] = static_cast<float>(from.eye[2]);
+                rays.ray.tnear[lane] = rays.ray.time[lane] = 0;
+                rays.ray.mask[lane] = rt_embree::all_masks;
+                rays.ray.flags[lane] = 0;
+                rays.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+            }
+            for (const Directions &d : tiles[i]) {
+                std::copy_n(d.x, 16, rays.ray.dir_x);
+                std::copy_n(d.y, 16, rays.ray.dir_y);
+                std::copy_n(d.z, 16, rays.ray.dir_z);
+                std::fill_n(rays.ray.tfar, 16, INFINITY);
+                std::fill_n(rays.hit.geomID, 16, RTC_INVALID_GEOMETRY_ID);
+                rt_embree::intersect16(valid, scene.view().root, query, rays);
+            }
+        });
+    });
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    rt_embree::Settings settings;
+    if (argc > 1)
+        settings.threads = static_cast<unsigned>(std::atoi(argv[1]));
+    if (argc > 2)
+        settings.instruction_set = argv[2];
+
+    const TriangleMesh mesh = bunny();
+    const arhost_material diffuse{ARHOST_DIFFUSE, 0, {0.7f, 0.6f, 0.5f}, {0.7f, 0.6f, 0.5f}, {}, 1, {}, 0};
+    const arhost_material mirror{ARHOST_MIRROR, 0, {}, {}, {}, 1, {0.9f, 0.9f, 0.9f}, 0};
+    TriangleMesh flat = mesh;
+    flat.normals.clear();
+    const Arena unlit = scene_of(flat, diffuse, false), lit = scene_of(mesh, diffuse, true),
+                mirrored = scene_of(mesh, mirror, true);
+
+    Trial visibility(unlit, settings);
+    const Timing visible = visibility.time();
+    std::printf(
+        "%zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; p50 of %d frames\n",
+        mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
+        visibility.renderer().kernel_name(), 100 * visibility.covered(), rounds);
+    const Timing bare = time_bare_intersect16(unlit, settings);
+    report("bare rtcIntersect16 loop", bare);
+    report("primary visibility", visible);
+    std::printf("%-28s %7.1f %%    %7.1f %%\n", "its speed to the bare loop's", 100 * bare.ms / visible.ms,
+                100 * bare.cpu_ms / visible.cpu_ms);
+    report("diffuse and shadows", Trial(lit, settings).time());
+    report("mirror, up to 10 bounces", Trial(mirrored, settings).time());
+}

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "embree_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <string>
+
+namespace rt_embree {
+namespace {
+
+using arhost::Failure;
+
+const std::byte *bytes(const arhost_scene &arena) {
+    return reinterpret_cast<const std::byte *>(&arena);
+}
+
+template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
+}
+
+bool is_identity(const float *m) {
+    constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    return std::equal(m, m + 12, identity);
+}
+
+unsigned mask_of(arhost_role role) {
+    return role == ARHOST_CATCHER ? catcher_mask : role == ARHOST_OCCLUDER ? occluder_mask : virtual_mask;
+}
+
+// The inverse of a column-major 3×3 matrix, transposed: the cofactors. Normals get their length later, so
+// that only the determinant's sign counts: it keeps a mirrored object's outside outside.
+void make_normal_transform(const float *m, float *to) {
+    double cofactor[9];
+    for (int column = 0; column < 3; ++column) {
+        const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
+        for (int row = 0; row < 3; ++row) {
+            const int i = (row + 1) % 3, j = (row + 2) % 3;
+            cofactor[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
+        }
+    }
+    double largest = 0;
+    for (double value : cofactor)
+        largest = std::max(largest, std::abs(value));
+    const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
+    for (int i = 0; i < 9; ++i)
+        to[i] = static_cast<float>(cofactor[i] / (determinant < 0 ? -largest : largest));
+}
+
+Object make_object(const arhost_scene &arena, const arhost_object &from) {
+    Object object{};
+    object.material = elements<arhost_material>(arena, arena.materials)[from.material];
+    object.role = from.role;
+    object.has_transform = !is_identity(from.world_from_object);
+    make_normal_transform(from.world_from_object, object.normal_transform);
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
+    if (geometry.type == ARHOST_TRIANGLES && geometry.normals.count > 0) {
+        object.normals = reinterpret_cast<const float *>(bytes(arena) + geometry.normals.offset);
+        object.normal_stride = geometry.normals.stride;
+        object.indices = reinterpret_cast<const int *>(bytes(arena) + geometry.indices.offset);
+        object.index_stride = geometry.indices.stride;
+    }
+    return object;
+}
+
+Box box_of(const arhost_scene &arena, const arhost_object &object) {
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[object.geometry];
+    const double infinity = std::numeric_limits<double>::infinity();
+    Box local{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+    const std::byte *position = bytes(arena) + geometry.positions.offset;
+    for (std::uint32_t i = 0; i < geometry.positions.count; ++i, position += geometry.positions.stride) {
+        float p[4] = {};
+        std::memcpy(p, position, geometry.type == ARHOST_SPHERES ? 16 : 12);
+        for (int axis = 0; axis < 3; ++axis) {
+            local.min[axis] = std::min(local.min[axis], double{p[axis]} - p[3]);
+            local.max[axis] = std::max(local.max[axis], double{p[axis]} + p[3]);
+        }
+    }
+    if (geometry.positions.count == 0)
+        return local;
+    // The box round the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
+    const float *m = object.world_from_object;
+    Box world;
+    for (int row = 0; row < 3; ++row) {
+        world.min[row] = world.max[row] = m[9 + row];
+        for (int axis = 0; axis < 3; ++axis) {
+            const double a = m[3 * axis + row] * local.min[axis], b = m[3 * axis + row] * local.max[axis];
+            world.min[row] += std::min(a, b);
+            world.max[row] += std::max(a, b);
+        }
+    }
+    return world;
+}
+
+// Primary rays pass through a catcher from behind: a room that is looked into from outside.
+void cull_facing_away(const RTCFilterFunctionNArguments *arguments) {
+    if (!query_of(*arguments).cull_catchers_facing_away)
+        return;
+    const unsigned count = arguments->N;
+    for (unsigned i = 0; i < count; ++i) {
+        const float along = RTCHitN_Ng_x(arguments->hit, count, i) * RTCRayN_dir_x(arguments->ray, count, i) +
+                            RTCHitN_Ng_y(arguments->hit, count, i) * RTCRayN_dir_y(arguments->ray, count, i) +
+                            RTCHitN_Ng_z(arguments->hit, count, i) * RTCRayN_dir_z(arguments->ray, count, i);
+        if (along >= 0)
+            arguments->valid[i] = 0;
+    }
+}
+
+bool report_build(void *host, double fraction) {
+    const auto &h = *static_cast<const arhost::Host *>(host);
+    h.progress(fraction, "building the acceleration structure");
+    return !h.cancelled();
+}
+
+void copy3(const float *from, float *to) {
+    std::copy_n(from, 3, to);
+}
+
+} // namespace
+
+EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host)
+    : arena_(arena), host_(host), robust_(robust),
+      device_(rtcNewDevice(("threads=" + std::to_string(threads) + ",set_affinity=0").c_str())),
+      srgb8_(std::make_unique<arhost::shading::Srgb8Table>(arhost::shading::make_srgb8_table())) {
+    check();
+    for (const RTCDeviceProperty property :
+         {RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED,
+          RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, RTC_DEVICE_PROPERTY_POINT_GEOMETRY_SUPPORTED})
+        if (!rtcGetDeviceProperty(device_.get(), property))
+            throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                          "this build of Embree lacks ray masks, filter functions, triangles "
+                          "or points; install one with its default options");
+
+    root_ = new_scene();
+    const auto from = elements<arhost_object>(arena, arena.objects);
+    for (std::uint32_t number = 0; number < from.size(); ++number) {
+        const arhost_object &object = from[number];
+        objects_.push_back(make_object(arena, object));
+        if (object.role != ARHOST_OCCLUDER)
+            visible_boxes_.push_back(box_of(arena, object));
+        view_.has_catchers |= object.role == ARHOST_CATCHER;
+        view_.has_occluders |= object.role == ARHOST_OCCLUDER;
+
+        GeometryHandle geometry;
+        if (objects_.back().has_transform) {
+            view_.has_instances = true;
+            geometry.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+            rtcSetGeometryInstancedScene(geometry.get(), instanced_scene(object.geometry, object.role));
+            rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, object.world_from_object);
+        } else {
+            geometry = new_geometry(object.geometry, object.role);
+        }
+        rtcSetGeometryMask(geometry.get(), mask_of(object.role));
+        rtcCommitGeometry(geometry.get());
+        rtcAttachGeometryByID(root_.get(), geometry.get(), number);
+        check();
+    }
+    commit(root_.get());
+
+    view_.root = root_.get();
+    view_.objects = objects_.data();
+    const auto lights = elements<arhost_light>(arena, arena.lights);
+    view_.lights = lights.data();
+    view_.light_count = arena.lights.count;
+    view_.max_depth = arena.max_depth;
+    copy3(arena.ambient, view_.ambient);
+    copy3(arena.background, view_.background);
+    view_.shadow_alpha_opaque = arena.shadow_alpha_opaque;
+    view_.srgb8 = srgb8_.get();
+}
+
+SceneHandle EmbreeScene::new_scene() const {
+    SceneHandle scene(rtcNewScene(device_.get()));
+    check();
+    rtcSetSceneFlags(scene.get(), robust_ ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+    return scene;
+}
+
+GeometryHandle EmbreeScene::new_geometry(std::uint32_t number, arhost_role role) const {
+    const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[number];
+    const bool spheres = from.type == ARHOST_SPHERES;
+    GeometryHandle geometry(
+        rtcNewGeometry(device_.get(), spheres ? RTC_GEOMETRY_TYPE_SPHERE_POINT : RTC_GEOMETRY_TYPE_TRIANGLE));
+    const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
+        rtcSetSharedGeometryBuffer(geometry.get(), type, 0, format, &arena_, buffer.offset, buffer.stride,
+                                   buffer.count);
+    };
+    share(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
+    if (!spheres)
+        share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
+    if (role == ARHOST_CATCHER)
+        rtcSetGeometryIntersectFilterFunction(geometry.get(), cull_facing_away);
+    return geometry;
+}
+
+RTCScene EmbreeScene::instanced_scene(std::uint32_t number, arhost_role role) {
+    const bool of_catchers = role == ARHOST_CATCHER; // with the filter function
+    for (const Instanced &known : instanced_)
+        if (known.geometry == number && known.of_catchers == of_catchers)
+            return known.scene.get();
+    SceneHandle scene = new_scene();
+    const GeometryHandle geometry = new_geometry(number, role);
+    rtcSetGeometryMask(geometry.get(), all_masks);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometry(scene.get(), geometry.get());
+    commit(scene.get());
+    instanced_.push_back({number, of_catchers, std::move(scene)});
+    return instanced_.back().scene.get();
+}
+
+void EmbreeScene::commit(RTCScene scene) const {
+    const auto stop_if_cancelled = [&] { // small scenes are built without a report
+        if (host_.cancelled())
+            throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+    };
+    stop_if_cancelled();
+    rtcSetSceneProgressMonitorFunction(scene, report_build, const_cast<arhost::Host *>(&host_));
+    rtcCommitScene(scene);
+    rtcSetSceneProgressMonitorFunction(scene, nullptr, nullptr);
+    stop_if_cancelled();
+    check();
+}
+
+// Embree keeps the first error of a thread's calls until it is asked.
+void EmbreeScene::check() const {
+    switch (const RTCError error = rtcGetDeviceError(device_.get())) {
+    case RTC_ERROR_NONE:
+        return;
+    case RTC_ERROR_OUT_OF_MEMORY:
+        throw std::bad_alloc();
+    case RTC_ERROR_CANCELLED:
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+    case RTC_ERROR_UNSUPPORTED_CPU:
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, "Embree does not support this processor");
+    default:
+        throw Failure(ARHOST_ERROR_INTERNAL, "Embree reports error " + std::to_string(error));
+    }
+}
+
+} // namespace rt_embree

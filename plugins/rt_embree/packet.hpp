@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sixteen numbers at once: the Float, Bool and Int that the kernel shades a packet of rays with.
+//
+// They are made of the compiler's vector types, as wide as the machine's registers are; a packet always
+// has 16 lanes, as Embree's widest ones do. The kernel is compiled once for each instruction set, in a
+// namespace of its own (ARHOST_ISA), so that no function of one can be linked into another. It calls no
+// inline function of the standard library for the same reason.
+//
+// Not Highway: its vectors are as wide as the machine's, so that every formula would have to loop. Not
+// target_clones: GCC lowers vector types to the base instruction set before it clones.
+#pragma once
+
+#include <arhost/shading/vec3.hpp>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+namespace rt_embree::ARHOST_ISA {
+
+#define ARHOST_INLINE inline __attribute__((always_inline))
+
+inline constexpr int lanes = 16;
+#if defined(__AVX512F__)
+inline constexpr int width = 16; // of a register
+#elif defined(__AVX2__)
+inline constexpr int width = 8;
+#else
+inline constexpr int width = 4;
+#endif
+
+typedef float FloatPart __attribute__((vector_size(4 * width)));
+typedef int IntPart __attribute__((vector_size(4 * width)));
+
+// As many registers as hold `count` lanes. Halves of halves rather than an array: GCC keeps members in
+// registers, but arrays in memory.
+template <class Part, int count> struct Wide { Wide<Part, count / 2> low, high; };
+template <class Part> struct Wide<Part, width> { Part part; };
+
+// to = op(from…), register by register.
+template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To &to, const From &...from) {
+    if constexpr (requires { to.part; }) {
+        to.part = op(from.part...);
+    } else {
+        apply(op, to.low, from.low...);
+        apply(op, to.high, from.high...);
+    }
+}
+
+// A function of the packets a (and b), given as an expression of their registers a (and b).
+#define ARHOST_UNARY(Type, expression)                                                                               \
+    Type to;                                                                                                         \
+    apply(                                                                                                           \
+        [](auto a_) __attribute__((always_inline)) { return expression; }, to.lane, a.lane);                         \
+    return to
+#define ARHOST_BINARY(Type, expression)                                                                              \
+    Type to;                                                                                                         \
+    apply(                                                                                                           \
+        [](auto a_, auto b_) __attribute__((always_inline)) { return expression; }, to.lane, a.lane, b.lane);        \
+    return to
+
+// Lanes are 0 (false) or −1 (true).
+struct alignas(64) Bool {
+    Wide<IntPart, lanes> lane;
+    ARHOST_INLINE friend Bool operator&(Bool a, Bool b) { ARHOST_BINARY(Bool, a_ & b_); }
+    ARHOST_INLINE friend Bool operator|(Bool a, Bool b) { ARHOST_BINARY(Bool, a_ | b_); }
+    ARHOST_INLINE friend Bool operator~(Bool a) { ARHOST_UNARY(Bool, ~a_); }
+};
+
+struct alignas(64) Int {
+    Wide<IntPart, lanes> lane;
+    Int() = default;
+    ARHOST_INLINE Int(int s) {
+        apply(
+            [s]() __attribute__((always_inline)) { return IntPart{} + s; }, lane);
+    }
+    ARHOST_INLINE friend Int operator+(Int a, Int b) { ARHOST_BINARY(Int, a_ + b_); }
+    ARHOST_INLINE friend Int operator-(Int a, Int b) { ARHOST_BINARY(Int, a_ - b_); }
+    ARHOST_INLINE friend Int operator&(Int a, Int b) { ARHOST_BINARY(Int, a_ & b_); }
+    ARHOST_INLINE friend Int operator|(Int a, Int b) { ARHOST_BINARY(Int, a_ | b_); }
+    ARHOST_INLINE friend Int operator<<(Int a, Int b) { ARHOST_BINARY(Int, a_ << b_); }
+    ARHOST_INLINE friend Int operator>>(Int a, Int b) { ARHOST_BINARY(Int, a_ >> b_); }
+    ARHOST_INLINE friend Bool operator==(Int a, Int b) { ARHOST_BINARY(Bool, a_ == b_); }
+    ARHOST_INLINE friend Bool operator!=(Int a, Int b) { ARHOST_BINARY(Bool, a_ != b_); }
+    ARHOST_INLINE friend Int operator*(Int a, Int b) { ARHOST_BINARY(Int, a_ * b_); }
+    ARHOST_INLINE friend Bool operator<(Int a, Int b) { ARHOST_BINARY(Bool, a_ < b_); }
+    ARHOST_INLINE friend Bool operator>=(Int a, Int b) { ARHOST_BINARY(Bool, a_ >= b_); }
+};
+
+struct alignas(64) Float {
+    Wide<FloatPart, lanes> lane;
+    Float() = default;
+    ARHOST_INLINE Float(float s) {
+        apply(
+            [s]() __attribute__((always_inline)) { return FloatPart{} + s; }, lane);
+    }
+    ARHOST_INLINE explicit Float(double s) : Float(static_cast<float>(s)) {}
+    ARHOST_INLINE friend Float operator-(Float a) { ARHOST_UNARY(Float, -a_); }
+    ARHOST_INLINE friend Float operator+(Float a, Float b) { ARHOST_BINARY(Float, a_ + b_); }
+    ARHOST_INLINE friend Float operator-(Float a, Float b) { ARHOST_BINARY(Float, a_ - b_); }
+    ARHOST_INLINE friend Float operator*(Float a, Float b) { ARHOST_BINARY(Float, a_ * b_); }
+    ARHOST_INLINE friend Float operator/(Float a, Float b) { ARHOST_BINARY(Float, a_ / b_); }
+    ARHOST_INLINE friend Bool operator<(Float a, Float b) { ARHOST_BINARY(Bool, a_ < b_); }
+    ARHOST_INLINE friend Bool operator>(Float a, Float b) { ARHOST_BINARY(Bool, a_ > b_); }
+    ARHOST_INLINE friend Bool operator>=(Float a, Float b) { ARHOST_BINARY(Bool, a_ >= b_); }
+    ARHOST_INLINE friend Bool operator==(Float a, Float b) { ARHOST_BINARY(Bool, a_ == b_); }
+};
+
+using Vec3 = arhost::shading::Vec3T<Float>;
+
+ARHOST_INLINE Bool bool_of(bool b) {
+    Bool a;
+    apply(
+        [b]() __attribute__((always_inline)) { return IntPart{} - static_cast<int>(b); }, a.lane);
+    return a;
+}
+// NaN in `a` gives b.
+ARHOST_INLINE Float min(Float a, Float b) {
+    ARHOST_BINARY(Float, a_ < b_ ? a_ : b_);
+}
+ARHOST_INLINE Float max(Float a, Float b) {
+    ARHOST_BINARY(Float, a_ > b_ ? a_ : b_);
+}
+
+template <class T> ARHOST_INLINE T select_lanes(Bool b, T yes, T no) {
+    T to;
+    apply(
+        [](auto b_, auto yes_, auto no_) __attribute__((always_inline)) { return b_ ? yes_ : no_; }, to.lane, b.lane,
+        yes.lane, no.lane);
+    return to;
+}
+ARHOST_INLINE Float select(Bool b, Float yes, Float no) {
+    return select_lanes(b, yes, no);
+}
+ARHOST_INLINE Int select(Bool b, Int yes, Int no) {
+    return select_lanes(b, yes, no);
+}
+ARHOST_INLINE Vec3 select(Bool b, Vec3 yes, Vec3 no) {
+    return {select(b, yes.x, no.x), select(b, yes.y, no.y), select(b, yes.z, no.z)};
+}
+
+ARHOST_INLINE Float to_float(Int a) {
+    ARHOST_UNARY(Float, __builtin_convertvector(a_, FloatPart));
+}
+ARHOST_INLINE Int to_int(Float a) {
+    ARHOST_UNARY(Int, __builtin_convertvector(a_, IntPart));
+} // towards 0
+ARHOST_INLINE Int bits_of(Float a) {
+    ARHOST_UNARY(Int, reinterpret_cast<IntPart>(a_));
+}
+ARHOST_INLINE Float float_of(Int a) {
+    ARHOST_UNARY(Float, reinterpret_cast<FloatPart>(a_));
+}
+ARHOST_INLINE Float floor(Float a) {
+    const Float whole = to_float(to_int(a));
+    return whole - select(whole > a, Float(1.0f), Float(0.0f));
+}
+
+ARHOST_INLINE FloatPart sqrt_of(FloatPart a) {
+#if defined(__AVX512F__)
+    return _mm512_maskz_sqrt_ps(0xffff, a);
+#elif defined(__AVX2__)
+    return _mm256_sqrt_ps(a);
+#elif defined(__SSE2__)
+    return _mm_sqrt_ps(a);
+#else
+    for (int i = 0; i < width; ++i)
+        a[i] = __builtin_sqrtf(a[i]);
+    return a;
+#endif
+}
+ARHOST_INLINE Float sqrt(Float a) {
+    ARHOST_UNARY(Float, sqrt_of(a_));
+}
+
+// A bit a lane.
+ARHOST_INLINE unsigned mask_of(Wide<IntPart, width> b) {
+#if defined(__AVX512DQ__)
+    return _mm512_movepi32_mask(reinterpret_cast<__m512i>(b.part));
+#elif defined(__AVX2__)
+    return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(b.part)));
+#elif defined(__SSE2__)
+    return static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<__m128>(b.part)));
+#else
+    unsigned mask = 0;
+    for (int i = 0; i < width; ++i)
+        mask |= static_cast<unsigned>(b.part[i] & 1) << i;
+    return mask;
+#endif
+}
+template <int count> ARHOST_INLINE unsigned mask_of(Wide<IntPart, count> b) {
+    return mask_of(b.low) | mask_of(b.high) << (count / 2);
+}
+ARHOST_INLINE bool any(Bool b) {
+    return mask_of(b.lane) != 0;
+}
+
+// table[index], lane by lane.
+ARHOST_INLINE IntPart gather(const int *table, IntPart index) {
+#if defined(__AVX512F__)
+    return reinterpret_cast<IntPart>(
+        _mm512_mask_i32gather_epi32(__m512i{}, 0xffff, reinterpret_cast<__m512i>(index), table, 4));
+#elif defined(__AVX2__)
+    return reinterpret_cast<IntPart>(_mm256_i32gather_epi32(table, reinterpret_cast<__m256i>(index), 4));
+#else
+    for (int i = 0; i < width; ++i)
+        index[i] = table[index[i]];
+    return index;
+#endif
+}
+ARHOST_INLINE Int gather(const int *table, Int a) {
+    Int to;
+    apply(
+        [table](auto index) __attribute__((always_inline)) { return gather(table, index); }, to.lane, a.lane);
+    return to;
+}
+ARHOST_INLINE Float gather(const float *table, Int index) {
+    return float_of(gather(reinterpret_cast<const int *>(table), index));
+}
+
+// Embree's arrays of 16.
+ARHOST_INLINE Float load(const float *from) {
+    Float a;
+    __builtin_memcpy(&a, from, sizeof a);
+    return a;
+}
+ARHOST_INLINE Int load(const unsigned *from) {
+    Int a;
+    __builtin_memcpy(&a, from, sizeof a);
+    return a;
+}
+ARHOST_INLINE void store(float *to, Float a) {
+    __builtin_memcpy(to, &a, sizeof a);
+}
+ARHOST_INLINE Int load(const int *from) {
+    Int a;
+    __builtin_memcpy(&a, from, sizeof a);
+    return a;
+}
+ARHOST_INLINE void store(int *to, Int a) {
+    __builtin_memcpy(to, &a, sizeof a);
+}
+ARHOST_INLINE void store(unsigned *to, Int a) {
+    __builtin_memcpy(to, &a, sizeof a);
+}
+ARHOST_INLINE void store(int *to, Bool a) {
+    __builtin_memcpy(to, &a, sizeof a);
+}
+
+// log2 of a positive, normal number, to 2e-7: the mantissa brought to [√½, √2), then the odd series
+// 2 atanh(s) / ln 2 in s = (m − 1)/(m + 1).
+ARHOST_INLINE Float log2(Float a) {
+    const Int bits = bits_of(a) - Int(0x3f3504f3); // √½
+    const Int exponent = bits >> Int(23);
+    const Float m = float_of(bits_of(a) - (exponent << Int(23)));
+    const Float s = (m - Float(1.0f)) / (m + Float(1.0f)), s2 = s * s;
+    const Float series = Float(2.88539008f) +
+                         s2 * (Float(0.961796694f) +
+                               s2 * (Float(0.577078016f) + s2 * (Float(0.412198583f) + s2 * Float(0.320598898f))));
+    return to_float(exponent) + s * series;
+}
+
+// 2^a, to 2e-7 relative: the whole part into the exponent, the Taylor series of e^(x ln 2) on [−½, ½].
+ARHOST_INLINE Float exp2(Float a) {
+    const Float x = min(max(a, Float(-126.0f)), Float(127.0f));
+    const Float whole = floor(x + Float(0.5f)), f = x - whole;
+    const Float series =
+        Float(1.0f) +
+        f * (Float(0.693147182f) +
+             f * (Float(0.240226507f) +
+                  f * (Float(0.0555041087f) +
+                       f * (Float(0.00961812911f) + f * (Float(0.00133335581f) + f * Float(0.000154035304f))))));
+    return series * float_of((to_int(whole) + Int(127)) << Int(23));
+}
+
+ARHOST_INLINE Float pow(Float a, Float b) { // a > 0
+    return exp2(b * log2(a));
+}
+
+#define ARHOST_LEAF ARHOST_INLINE
+#include <arhost/shading/leaf/alpha.h>
+#include <arhost/shading/leaf/bsdf.h>
+#include <arhost/shading/leaf/colour.h>
+#include <arhost/shading/leaf/light.h>
+#undef ARHOST_LEAF
+#undef ARHOST_UNARY
+#undef ARHOST_BINARY
+
+} // namespace rt_embree::ARHOST_ISA

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plugin: options in, images out.
+#include "renderer.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <optional>
+
+namespace rt_embree {
+namespace {
+
+class Plugin {
+public:
+    Plugin(const arhost::Host &host, const arhost::Options &options) : host_(host) {
+        settings_.samples = static_cast<std::int32_t>(options.integer("samples"));
+        settings_.threads = static_cast<unsigned>(options.integer("threads"));
+        settings_.robust = options.boolean("robust");
+        settings_.instruction_set = options.text("instruction_set");
+        choose_kernel(settings_.instruction_set); // refuses now what can't run
+    }
+
+    void start(const arhost_raytracer_setup &setup) {
+        renderer_.emplace(setup, settings_, host_);
+        host_.info("Embree " + std::to_string(RTC_VERSION_MAJOR) + "." + std::to_string(RTC_VERSION_MINOR) + ", " +
+                   std::to_string(setup.scene->objects.count) + " objects, " +
+                   std::to_string(renderer_->thread_count()) + " threads, instruction set " +
+                   renderer_->kernel_name());
+    }
+
+    void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
+        const Rectangle drawn = renderer_->render(request.camera, image);
+        info.has_region = 1;
+        if (drawn.x0 < drawn.x1) {
+            info.region_x = static_cast<std::uint32_t>(drawn.x0);
+            info.region_y = static_cast<std::uint32_t>(drawn.y0);
+            info.region_width = static_cast<std::uint32_t>(drawn.x1 - drawn.x0);
+            info.region_height = static_cast<std::uint32_t>(drawn.y1 - drawn.y0);
+        }
+    }
+
+    void stop() { renderer_.reset(); }
+
+private:
+    arhost::Host host_;
+    Settings settings_;
+    std::optional<Renderer> renderer_;
+};
+
+constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 64),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Threads that trace; 0: one a processor.", 0, 256),
+    arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
+                   "Watertight at the edges that triangles share, about a tenth slower."),
+    arhost::option(ARHOST_OPTION_TEXT, "instruction_set", "auto",
+                   "The processor's vector instructions to shade with; auto: the widest that it has.", 0, 0,
+                   instruction_sets)};
+
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_RAYTRACER,
+                                          "rt_embree",
+                                          "Embree ray tracer",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Ray tracer on the processor: packets of 16 rays through Intel Embree.",
+                                          ARHOST_TRACES_LENS,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
+
+} // namespace
+} // namespace rt_embree
+
+ARHOST_RAYTRACER(rt_embree::Plugin, rt_embree::descriptor)

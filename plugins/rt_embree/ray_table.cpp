@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ray_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace rt_embree {
+namespace {
+
+using Direction = arhost::shading::Vec3T<double>;
+
+constexpr std::int32_t block = 4, lanes = block * block;
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+constexpr std::int32_t blocks_in(std::int32_t side) {
+    return (side + block - 1) / block;
+}
+
+double radical_inverse_2(unsigned i) {
+    double inverse = 0;
+    for (double digit = 0.5; i; i /= 2, digit /= 2)
+        inverse += digit * (i % 2);
+    return inverse;
+}
+
+} // namespace
+
+RayTable::RayTable(const arhost_intrinsics &intrinsics, bool has_slopes, ThreadPool &threads)
+    : dimensions_(intrinsics.distortion == ARHOST_DISTORTION_FISHEYE ? 3 : 2), has_slopes_(has_slopes) {
+    const auto width = static_cast<std::int32_t>(intrinsics.width);
+    const auto height = static_cast<std::int32_t>(intrinsics.height);
+    tiles_across_ = (width + tile_side - 1) / tile_side;
+    std::size_t block_count = 0;
+    for (std::int32_t y = 0; y < height; y += tile_side)
+        for (std::int32_t x = 0; x < width; x += tile_side) {
+            const Rectangle pixels{x, y, std::min(x + tile_side, width), std::min(y + tile_side, height)};
+            tiles_.push_back({pixels, block_count});
+            block_count += static_cast<std::size_t>(blocks_in(pixels.x1 - x)) * blocks_in(pixels.y1 - y);
+        }
+    blocks_.resize(block_count * rays().block_size());
+    windows_.resize(tiles_.size());
+
+    const arhost::shading::Lens lens(intrinsics);
+    threads.for_each(tiles_.size(), [&](std::size_t tile) { fill(tile, lens); });
+}
+
+void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {
+    const auto look = [&](double x, double y) {
+        return lens.ray({x, y}).value_or(Direction{nothing, nothing, nothing});
+    };
+    const double infinity = std::numeric_limits<double>::infinity();
+    Window window{infinity, infinity, -infinity, -infinity, false};
+    const auto widen = [&](Direction d) {
+        if (std::isnan(d.x))
+            return;
+        if (d.z < 1e-3)
+            window.everything = true;
+        window.x0 = std::min(window.x0, d.x / d.z);
+        window.y0 = std::min(window.y0, d.y / d.z);
+        window.x1 = std::max(window.x1, d.x / d.z);
+        window.y1 = std::max(window.y1, d.y / d.z);
+    };
+    const auto store = [&](Direction d, float *to) {
+        to[0] = static_cast<float>(d.x);
+        to[lanes] = static_cast<float>(d.y);
+        if (dimensions_ == 3)
+            to[2 * lanes] = static_cast<float>(d.z);
+    };
+
+    const Rectangle &pixels = tiles_[tile].pixels;
+    float *to = blocks_.data() + tiles_[tile].first_block * rays().block_size();
+    for (std::int32_t y = pixels.y0; y < pixels.y1; y += block)
+        for (std::int32_t x = pixels.x0; x < pixels.x1; x += block, to += rays().block_size())
+            for (std::int32_t lane = 0; lane < lanes; ++lane) {
+                const double u = x + lane % block, v = y + lane / block;
+                const Direction centre = look(u, v);
+                widen(centre);
+                store(centre, to + lane);
+                if (!has_slopes_)
+                    continue;
+                const Direction right = look(u + 0.5, v), left = look(u - 0.5, v);
+                const Direction below = look(u, v + 0.5), above = look(u, v - 0.5);
+                const Direction along_row = right - left, along_column = below - above;
+                store(along_row, to + lane + lanes * dimensions_);
+                store(along_column, to + lane + 2 * lanes * dimensions_);
+                for (const double i : {-0.5, 0.5})
+                    for (const double j : {-0.5, 0.5})
+                        widen(centre + along_row * i + along_column * j);
+            }
+    windows_[tile] = window;
+}
+
+arhost::shading::Vec3T<float> RayTable::direction(std::int32_t x, std::int32_t y) const {
+    const Tile &tile = tiles_[static_cast<std::size_t>(y / tile_side) * tiles_across_ + x / tile_side];
+    const std::int32_t dx = x - tile.pixels.x0, dy = y - tile.pixels.y0;
+    const std::size_t number =
+        tile.first_block + dy / block * blocks_in(tile.pixels.x1 - tile.pixels.x0) + dx / block;
+    const float *at = blocks_.data() + number * rays().block_size() + dy % block * block + dx % block;
+    return {at[0], at[lanes], dimensions_ == 3 ? at[2 * lanes] : 1};
+}
+
+std::vector<Sample> sample_positions(std::int32_t count) {
+    std::vector<unsigned> columns(count);
+    std::iota(columns.begin(), columns.end(), 0u);
+    std::sort(columns.begin(), columns.end(),
+              [](unsigned a, unsigned b) { return radical_inverse_2(a) < radical_inverse_2(b); });
+    std::vector<Sample> samples;
+    for (std::int32_t row = 0; row < count; ++row)
+        samples.push_back({(columns[row] + 0.5f) / count - 0.5f, (row + 0.5f) / count - 0.5f});
+    return samples;
+}
+
+} // namespace rt_embree

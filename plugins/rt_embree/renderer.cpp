@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <mutex>
+#include <span>
+
+namespace rt_embree {
+namespace {
+
+using arhost::Failure;
+using Vec3d = arhost::shading::Vec3T<double>;
+
+[[noreturn]] void refuse(const std::string &message) {
+    throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, message);
+}
+
+bool all_finite(std::span<const double> values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+const arhost_intrinsics &checked(const arhost_raytracer_setup &setup) {
+    const arhost_intrinsics &in = *setup.intrinsics;
+    if (setup.width < 1 || setup.height < 1 || setup.width > ARHOST_MAX_IMAGE_SIDE ||
+        setup.height > ARHOST_MAX_IMAGE_SIDE)
+        refuse("the image's size is not 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
+    if (in.width != setup.width || in.height != setup.height)
+        refuse("the intrinsics belong to an image of another size than the one to make");
+    if (!all_finite({&in.fx, 4}) || !(in.fx > 0) || !(in.fy > 0))
+        refuse("the intrinsics' focal lengths are not above 0, or not finite");
+    const std::uint32_t count = in.coefficient_count;
+    const bool fits = in.distortion == ARHOST_DISTORTION_NONE ? count == 0
+                      : in.distortion == ARHOST_DISTORTION_BROWN
+                          ? count == 4 || count == 5 || count == 8 || count == 12
+                      : in.distortion == ARHOST_DISTORTION_FISHEYE ? count == 4
+                                                                   : false;
+    if (!fits || !all_finite({in.coefficients, count}))
+        refuse("the distortion's model, or the count or values of its coefficients, are not valid");
+    if (setup.scene->magic != ARHOST_SCENE_MAGIC || setup.scene->version != ARHOST_SCENE_VERSION)
+        refuse("the scene is not an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
+    return in;
+}
+
+bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
+    return a.width == b.width && a.height == b.height && a.distortion == b.distortion && a.fx == b.fx &&
+           a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.coefficient_count == b.coefficient_count &&
+           std::equal(a.coefficients,
+                      a.coefficients + std::min<std::uint32_t>(a.coefficient_count, ARHOST_MAX_DISTORTION),
+                      b.coefficients);
+}
+
+double length(Vec3d a) {
+    return std::sqrt(dot(a, a));
+}
+
+// The camera's axes in the world.
+struct Pose {
+    Vec3d eye, right, down, forward;
+
+    explicit Pose(const arhost_camera &camera) {
+        if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
+            refuse("the camera's eye, look_at or up is not finite");
+        eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
+        const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
+        const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};
+        const Vec3d u = cross(up, w);
+        if (!(length(w) > 0))
+            refuse("the camera's look_at is its eye");
+        if (!(length(u) > 1e-9 * length(up) * length(w)))
+            refuse("the camera's up is parallel to its view direction");
+        forward = w * (-1 / length(w));
+        right = u * (1 / length(u));
+        down = cross(forward, right);
+    }
+
+    // What of the plane z = 1 a box covers: nothing where it lies behind the camera.
+    Window window_of(const Box &box) const {
+        const double infinity = std::numeric_limits<double>::infinity();
+        Window window{infinity, infinity, -infinity, -infinity, false};
+        int behind = 0;
+        for (int corner = 0; corner < 8; ++corner) {
+            const Vec3d p = Vec3d{corner & 1 ? box.max[0] : box.min[0], corner & 2 ? box.max[1] : box.min[1],
+                                  corner & 4 ? box.max[2] : box.min[2]} -
+                            eye;
+            const double z = dot(p, forward);
+            if (!(z > 1e-6 * (std::abs(dot(p, right)) + std::abs(dot(p, down))))) {
+                ++behind;
+                continue;
+            }
+            const double x = dot(p, right) / z, y = dot(p, down) / z;
+            // More than single precision loses in a ray's direction and origin.
+            const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(eye) / z;
+            window.x0 = std::min(window.x0, x - margin);
+            window.y0 = std::min(window.y0, y - margin);
+            window.x1 = std::max(window.x1, x + margin);
+            window.y1 = std::max(window.y1, y + margin);
+        }
+        window.everything = behind > 0 && behind < 8;
+        return window;
+    }
+};
+
+Camera camera_of(const Pose &pose) {
+    Camera camera;
+    const auto put = [](Vec3d from, float *to) {
+        to[0] = static_cast<float>(from.x);
+        to[1] = static_cast<float>(from.y);
+        to[2] = static_cast<float>(from.z);
+    };
+    put(pose.eye, camera.eye);
+    put(pose.right, camera.world_from_camera);
+    put(pose.down, camera.world_from_camera + 3);
+    put(pose.forward, camera.world_from_camera + 6);
+    return camera;
+}
+
+void clear(const arhost_image &image, const Rectangle &pixels) {
+    for (std::int32_t y = pixels.y0; y < pixels.y1; ++y)
+        std::memset(image.rgba + std::size_t{image.stride} * y + std::size_t{4} * pixels.x0, 0,
+                    std::size_t{4} * (pixels.x1 - pixels.x0));
+}
+
+Rectangle united(const Rectangle &a, const Rectangle &b) {
+    return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
+}
+
+} // namespace
+
+Kernel choose_kernel(const std::string &instruction_set) {
+    const auto wanted = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
+#if defined(__x86_64__)
+    if (wanted("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+        return {avx512::render_tile, "avx512"};
+    if (wanted("avx2") && __builtin_cpu_supports("avx2"))
+        return {avx2::render_tile, "avx2"};
+#endif
+    if (wanted("base"))
+        return {base::render_tile, "base"};
+    throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                  "option 'instruction_set': this processor has no " + instruction_set + "; set it to 'auto'");
+}
+
+Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
+    : host_(host), intrinsics_(checked(setup)), kernel_(choose_kernel(settings.instruction_set)),
+      threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1, threads_),
+      samples_(sample_positions(settings.samples)),
+      scene_(*setup.scene, threads_.thread_count(), settings.robust, host) {}
+
+Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image) {
+    if (!same(camera.intrinsics, intrinsics_))
+        refuse("the camera's intrinsics are not those of start");
+    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
+        image.stride < 4 * image.width)
+        refuse("the image to write is not of the size of start");
+    const Pose pose(camera);
+
+    std::vector<Window> windows;
+    for (const Box &box : scene_.visible_boxes())
+        windows.push_back(pose.window_of(box));
+
+    const Frame frame{scene_.view(),
+                      ray_table_.rays(),
+                      camera_of(pose),
+                      samples_.data(),
+                      static_cast<std::int32_t>(samples_.size()),
+                      image.rgba,
+                      image.stride};
+    const std::vector<Tile> &tiles = ray_table_.tiles();
+    Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
+    std::mutex drawn_mutex;
+    threads_.for_each(tiles.size(), [&](std::size_t i) {
+        const Tile &tile = tiles[i];
+        const bool worthwhile = std::any_of(windows.begin(), windows.end(),
+                                            [&](const Window &window) { return ray_table_.window(i).meets(window); });
+        if (!worthwhile || host_.cancelled())
+            return clear(image, tile.pixels);
+        const Rectangle part = kernel_.render_tile(frame, tile);
+        if (part.x0 < part.x1) {
+            std::lock_guard lock(drawn_mutex);
+            drawn = united(drawn, part);
+        }
+    });
+    if (host_.cancelled())
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
+    return drawn;
+}
+
+} // namespace rt_embree

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// From a camera to an image: which tiles are worth tracing, and who traces them.
+#pragma once
+
+#include "embree_scene.hpp"
+#include "ray_table.hpp"
+#include "thread_pool.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <string>
+#include <vector>
+
+namespace rt_embree {
+
+struct Settings {
+    std::int32_t samples = 1; // a pixel
+    unsigned threads = 0;     // 0: one a processor
+    bool robust = false;
+    std::string instruction_set = "auto";
+};
+
+class Renderer {
+public:
+    Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host);
+
+    // Returns the part of the image that holds all alpha above 0; empty: x1 <= x0.
+    Rectangle render(const arhost_camera &camera, const arhost_image &image);
+
+    const char *kernel_name() const { return kernel_.name; }
+    unsigned thread_count() const { return threads_.thread_count(); }
+
+private:
+    arhost::Host host_;
+    arhost_intrinsics intrinsics_;
+    Kernel kernel_;
+    ThreadPool threads_;
+    RayTable ray_table_;
+    std::vector<Sample> samples_;
+    EmbreeScene scene_;
+};
+
+// The kernel of that name, or with "auto" the widest that this processor can run.
+Kernel choose_kernel(const std::string &instruction_set);
+
+} // namespace rt_embree

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "thread_pool.hpp"
+
+#include <algorithm>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+namespace rt_embree {
+
+#if defined(__SSE2__)
+// Flush-to-zero and denormals-are-zero (Intel SDM vol. 1, 10.2.3).
+FlushDenormals::FlushDenormals() : before_(_mm_getcsr()) {
+    _mm_setcsr(before_ | 0x8040);
+}
+FlushDenormals::~FlushDenormals() {
+    _mm_setcsr(before_);
+}
+#else
+FlushDenormals::FlushDenormals() : before_(0) {}
+FlushDenormals::~FlushDenormals() = default;
+#endif
+
+ThreadPool::ThreadPool(unsigned threads) {
+    if (threads == 0)
+        threads = std::max(1u, std::thread::hardware_concurrency());
+    for (unsigned i = 1; i < threads; ++i)
+        helpers_.emplace_back([this](std::stop_token stop) { help(stop); });
+}
+
+void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_t)> &work) {
+    {
+        std::lock_guard lock(mutex_);
+        work_ = &work;
+        count_ = count;
+        // Relaxed: the mutex publishes it to the helpers with the rest.
+        next_.store(0, std::memory_order_relaxed);
+        busy_ = helpers_.size();
+        ++round_;
+    }
+    called_.notify_all();
+    take_turns();
+    // Each helper's results are published by its unlocking of the mutex in help().
+    std::unique_lock lock(mutex_);
+    done_.wait(lock, [this] { return busy_ == 0; });
+}
+
+void ThreadPool::help(std::stop_token stop) {
+    std::size_t seen = 0;
+    std::unique_lock lock(mutex_);
+    while (called_.wait(lock, stop, [&] { return round_ != seen; })) {
+        seen = round_;
+        lock.unlock();
+        take_turns();
+        lock.lock();
+        if (--busy_ == 0)
+            done_.notify_one();
+    }
+}
+
+void ThreadPool::take_turns() {
+    const FlushDenormals flush;
+    // Relaxed: only the number itself matters, and each is given out once.
+    for (std::size_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
+        (*work_)(i);
+}
+
+} // namespace rt_embree

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A few threads that share out the tiles of one image at a time.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <vector>
+
+namespace rt_embree {
+
+// While it lives, this thread's denormal floats count as 0: they would cost a hundred cycles each.
+class FlushDenormals {
+public:
+    FlushDenormals();
+    ~FlushDenormals();
+    FlushDenormals(const FlushDenormals &) = delete;
+    FlushDenormals &operator=(const FlushDenormals &) = delete;
+
+private:
+    unsigned before_;
+};
+
+class ThreadPool {
+public:
+    // So many threads work, the caller's own included; 0: one a processor.
+    explicit ThreadPool(unsigned threads);
+    unsigned thread_count() const { return static_cast<unsigned>(helpers_.size()) + 1; }
+
+    // Calls work(0) to work(count − 1), each once, on whichever thread is free, and returns when all are
+    // done. `work` throws nothing. Not to be called by two threads at once.
+    void for_each(std::size_t count, const std::function<void(std::size_t)> &work);
+
+private:
+    void help(std::stop_token stop);
+    void take_turns();
+
+    std::mutex mutex_; // guards what follows, but for next_
+    std::condition_variable_any called_;
+    std::condition_variable done_;
+    const std::function<void(std::size_t)> *work_ = nullptr;
+    std::size_t count_ = 0, round_ = 0, busy_ = 0;
+    std::atomic<std::size_t> next_{0};
+    std::vector<std::jthread> helpers_; // last: joined before the rest goes
+};
+
+} // namespace rt_embree

@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer.hpp"
+
+#include "noise.hpp"
+#include "parallel.hpp"
+#include "simd.hpp"
+
+#include <arhost/shading/lens.hpp>
+#include <arhost/shading/scalar.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace arhost::synthetic {
+namespace {
+
+constexpr int cell_px = span_px; // of the coarse grid
+constexpr int code_count = 4096; // of srgb_
+constexpr int grain_side = 256;
+constexpr float grain_unit = 4096;   // of one sigma
+constexpr float least_slope = 0.02f; // sight lines flatter than this see the room, not the desk
+constexpr float sharpness = 0.8f;    // of the texels that a pixel takes: the pyramid is smooth already
+constexpr float aperture = 3.2f;     // diameter of the blur circle in px = aperture·focal_px·|1/depth − 1/focus|
+
+// Normally distributed (Irwin–Hall of 4), then smeared as by demosaicing: some of it common to the
+// channels, some shared with the neighbours.
+std::vector<std::array<int16_t, 4>> make_grain(std::uint64_t seed) {
+    constexpr int n = grain_side;
+    const auto normal = [&](int x, int y, int channel) {
+        float sum = 0;
+        for (int i = 0; i < 4; ++i)
+            sum += random_share(seed, (y & (n - 1)) * n + (x & (n - 1)), channel * 4 + i);
+        return (sum - 2) * 1.732f;
+    };
+    std::vector<float> white(static_cast<std::size_t>(n) * n * 4);
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x)
+            for (int c = 0; c < 4; ++c)
+                white[(static_cast<std::size_t>(y) * n + x) * 4 + c] = normal(x, y, c);
+    const auto at = [&](int x, int y, int c) {
+        return white[(static_cast<std::size_t>(y & (n - 1)) * n + (x & (n - 1))) * 4 + c];
+    };
+    std::vector<std::array<int16_t, 4>> grain(static_cast<std::size_t>(n) * n);
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x)
+            for (int c = 0; c < 3; ++c) {
+                const float own = 0.5f * at(x, y, c) + 0.25f * (at(x + 1, y, c) + at(x, y + 1, c)) +
+                                  0.15f * at(x + 1, y + 1, c) + 0.2f * (at(x - 1, y, c) + at(x, y - 1, c));
+                const float value = 0.8f * at(x, y, 3) + 0.75f * own;
+                grain[static_cast<std::size_t>(y) * n + x][c] =
+                    static_cast<int16_t>(std::clamp(value * grain_unit, -32767.0f, 32767.0f));
+            }
+    return grain;
+}
+
+// sRGB's curve back to linear light, to 0.002 (Ian Taylor, "sRGB approximations for HLSL", 2012).
+inline float decoded(float code) {
+    return code * (code * (code * 0.305306011f + 0.682171111f) + 0.012522878f);
+}
+
+} // namespace
+
+// What warp_row needs of a frame.
+struct Renderer::Sweep {
+    const Pyramid *desk, *card;
+    std::optional<Card> card_at;
+    std::vector<Plane> planes;
+    std::vector<std::vector<Node>> nodes; // a grid a plane
+    std::uint64_t sequence;
+};
+
+Renderer::Renderer(const arhost_intrinsics &camera, const Sensor &sensor, int threads)
+    : width_(static_cast<int>(camera.width)), height_(static_cast<int>(camera.height)), threads_(threads),
+      padded_((width_ + span_px) / span_px * span_px), grid_width_(padded_ / cell_px + 1),
+      grid_height_(height_ / cell_px + 2), focal_px_(std::sqrt(camera.fx * camera.fy)), seed_(sensor.seed) {
+    const shading::Lens lens(camera);
+    lens_columns_ = (grid_width_ - 1) * cell_px / lens_px + 2;
+    const int lens_rows = (grid_height_ - 1) * cell_px / lens_px + 2;
+    for (auto &axis : ray_)
+        axis.resize(static_cast<std::size_t>(lens_columns_) * lens_rows);
+    in_parallel(lens_rows, threads_, [&](int first, int last) {
+        for (int j = first; j < last; ++j)
+            for (int i = 0; i < lens_columns_; ++i)
+                if (const auto ray = lens.ray({static_cast<double>(i * lens_px), static_cast<double>(j * lens_px)})) {
+                    const std::size_t at = static_cast<std::size_t>(j) * lens_columns_ + i;
+                    ray_[0][at] = static_cast<float>(ray->x);
+                    ray_[1][at] = static_cast<float>(ray->y);
+                    ray_[2][at] = static_cast<float>(ray->z);
+                }
+    });
+
+    // Red and blue are a little softer than green, as most lenses have them.
+    const double softness[4] = {1.15, 1.0, 1.22, 1.0};
+    const int radius = sensor.blur_px > 0 ? static_cast<int>(std::ceil(2.6 * sensor.blur_px)) : 0;
+    kernel_.resize(radius + 1);
+    for (int c = 0; c < 4; ++c) {
+        std::vector<double> weight(radius + 1, 1.0);
+        double sum = 1;
+        for (int i = 1; i <= radius; ++i) {
+            weight[i] = std::exp(-0.5 * std::pow(i / (softness[c] * sensor.blur_px), 2));
+            sum += 2 * weight[i];
+        }
+        int left = 65535;
+        for (int i = radius; i > 0; --i) {
+            kernel_[i][c] = kernel_[i][c + 4] = static_cast<uint16_t>(std::lround(2 * 65535 * weight[i] / sum));
+            left -= kernel_[i][c];
+        }
+        kernel_[0][c] = kernel_[0][c + 4] = static_cast<uint16_t>(left);
+    }
+
+    // Noise of the photons and of the read-out, in linear light at the sensor, for 1 = white.
+    const double photons = 1.3e-4, read_out = 0.0014, gain = std::exp2(sensor.exposure_ev);
+    const double unit = full_scale * gain, strength = sensor.noise * sensor.noise;
+    shot_ = static_cast<float>(strength * photons / unit);
+    read2_ = static_cast<float>(strength * read_out * read_out / (unit * unit));
+    srgb_.resize(code_count);
+    for (int i = 0; i < code_count; ++i) {
+        const double root = (i + 0.5) / code_count;
+        srgb_[i] = static_cast<uint8_t>(std::lround(255 * shading::srgb_encode(root * root * unit)));
+    }
+    grain_ = make_grain(hashed(sensor.seed + 11));
+}
+
+Renderer::Plane Renderer::plane_of(const Mt &m) {
+    // Camera axes in the desk's: the rows of the rotation, y and z turned from GL's to OpenCV's.
+    const auto axis = [&](int row, double sign) {
+        return shading::Vec3T<double>{sign * m[row], sign * m[4 + row], sign * m[8 + row]};
+    };
+    const std::array axes{axis(0, 1), axis(1, -1), axis(2, -1)};
+    const auto eye = -(axes[0] * m[12] + axes[1] * -m[13] + axes[2] * -m[14]);
+    // A ray d goes in the direction D = Σ d_i axis_i and meets z = 0 at eye − D·eye.z/D.z.
+    Plane plane;
+    for (int i = 0; i < 3; ++i) {
+        plane.row[0][i] = static_cast<float>(eye.z * axes[i].x - eye.x * axes[i].z);
+        plane.row[1][i] = static_cast<float>(eye.z * axes[i].y - eye.y * axes[i].z);
+        plane.row[2][i] = static_cast<float>(-axes[i].z);
+        plane.axes[i] = {static_cast<float>(axes[i].x), static_cast<float>(axes[i].y), static_cast<float>(axes[i].z)};
+    }
+    plane.eye = {static_cast<float>(eye.x), static_cast<float>(eye.y), static_cast<float>(eye.z)};
+    return plane;
+}
+
+std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane, const Pyramid &desk) const {
+    struct Hit {
+        float u, v, depth;
+    };
+    const auto ray_at = [&](int column, int row) {
+        const std::size_t at = static_cast<std::size_t>(row) * lens_columns_ + column;
+        return Vec3{ray_[0][at], ray_[1][at], ray_[2][at]};
+    };
+    const auto hit = [&](Vec3 d) {
+        const auto along = [&](const std::array<float, 3> &row) {
+            return row[0] * d.x + row[1] * d.y + row[2] * d.z;
+        };
+        const float w = std::max(along(plane.row[2]), least_slope);
+        return Hit{along(plane.row[0]) / w, along(plane.row[1]) / w, plane.eye.z * d.z / w};
+    };
+    const float focus = std::sqrt(dot(plane.eye, plane.eye));
+    std::vector<Node> nodes(static_cast<std::size_t>(grid_width_) * grid_height_);
+    for (int j = 0; j < grid_height_; ++j)
+        for (int i = 0; i < grid_width_; ++i) {
+            const int column = i * cell_px / lens_px, row = j * cell_px / lens_px;
+            const Vec3 ray = ray_at(column, row);
+            const Hit at = hit(ray), right = hit(ray_at(column + 1, row)), below = hit(ray_at(column, row + 1));
+            const float du = (below.u - at.u) / lens_px, dv = (below.v - at.v) / lens_px;
+            const float wide = std::hypot(right.u - at.u, right.v - at.v) / lens_px, tall = std::hypot(du, dv);
+            const float defocus =
+                aperture * static_cast<float>(focal_px_) * std::abs(1 / std::max(at.depth, 1.0f) - 1 / focus);
+            const float circle = std::max(1.0f, defocus);
+            const float footprint = sharpness * circle * std::max(wide, 0.5f * tall);
+            Node &node = nodes[static_cast<std::size_t>(j) * grid_width_ + i];
+            node.step_u = 0.25f * circle * du;
+            node.step_v = 0.25f * circle * dv;
+            const float reach = std::max(std::abs(at.u), std::abs(at.v)) + 24 * wide;
+            node.lod = std::max({0.0f, std::log2(std::max(footprint, 1e-6f) / desk.texel()), desk.finest_at(reach)});
+            // Falls by the fourth power of the cosine; half of it the camera makes good.
+            const float length2 = dot(ray, ray), cos2 = ray.z > 0 ? ray.z * ray.z / length2 : 0;
+            node.gain = length2 > 0 ? 0.45f + 0.55f * cos2 * cos2 : 0;
+            Vec3 direction = plane.axes[0] * ray.x + plane.axes[1] * ray.y + plane.axes[2] * ray.z;
+            const float length = std::sqrt(dot(direction, direction));
+            if (length > 0)
+                node.mirror = mirrored_light({at.u, at.v}, direction * (1 / length)) / full_scale;
+        }
+    return nodes;
+}
+
+ARHOST_WIDE void Renderer::warp_span(int x, int y, const Sweep &sweep, Paint16 *out) const {
+    const int upper = y / cell_px;
+    const float down = static_cast<float>(y % cell_px) / cell_px;
+    const auto share = static_cast<std::uint32_t>(65536 / sweep.planes.size());
+    Paint16 sum[span_px] = {};
+    float ray[3][span_px];
+    const std::size_t node = static_cast<std::size_t>(y / lens_px) * lens_columns_ + x / lens_px;
+    const float below_node = static_cast<float>(y % lens_px) / lens_px;
+    for (int axis = 0; axis < 3; ++axis) {
+        float exact[span_px / lens_px + 1];
+        for (int i = 0; i <= span_px / lens_px; ++i)
+            exact[i] = mix(ray_[axis][node + i], ray_[axis][node + i + lens_columns_], below_node);
+        for (int i = 0; i < span_px; ++i)
+            ray[axis][i] = mix(exact[i / lens_px], exact[i / lens_px + 1], static_cast<float>(i % lens_px) / lens_px);
+    }
+    for (std::size_t k = 0; k < sweep.planes.size(); ++k) {
+        const Plane &plane = sweep.planes[k];
+        Footprints at;
+        const auto &[dx, dy, dz] = ray;
+        const auto [a, b, c] = plane.row;
+        for (int i = 0; i < span_px; ++i) {
+            float w = c[0] * dx[i] + c[1] * dy[i] + c[2] * dz[i];
+            w = w > least_slope ? w : least_slope;
+            const float scale = 1 / w;
+            at.u[i] = (a[0] * dx[i] + a[1] * dy[i] + a[2] * dz[i]) * scale;
+            at.v[i] = (b[0] * dx[i] + b[1] * dy[i] + b[2] * dz[i]) * scale;
+        }
+        const Node *above = &sweep.nodes[k][static_cast<std::size_t>(upper) * grid_width_ + x / cell_px];
+        const Node *below = above + grid_width_;
+        const auto pair = [&](float Node::*field) {
+            return std::array{mix(above[0].*field, below[0].*field, down),
+                              mix(above[1].*field, below[1].*field, down)};
+        };
+        at.step_u = pair(&Node::step_u);
+        at.step_v = pair(&Node::step_v);
+        at.lod = pair(&Node::lod);
+        Paint16 desk[span_px];
+        sweep.desk->sample(at, desk);
+
+        if (sweep.card_at) {
+            const Placement place(sweep.card_at->at, sweep.card_at->degrees);
+            Footprints on_card = at;
+            bool near = false;
+            for (int i = 0; i < span_px; ++i) {
+                const Point p = place.local({at.u[i], at.v[i]});
+                on_card.u[i] = p.x;
+                on_card.v[i] = p.y;
+                near |= std::abs(p.x) < card_half.x + 30 && std::abs(p.y) < card_half.y + 30;
+            }
+            if (near) {
+                const float finer = std::log2(sweep.card->texel() / sweep.desk->texel());
+                for (int end = 0; end < 2; ++end) {
+                    const Point step = place.turned({at.step_u[end], at.step_v[end]});
+                    on_card.step_u[end] = step.x;
+                    on_card.step_v[end] = step.y;
+                    on_card.lod[end] = std::max(0.0f, at.lod[end] - finer);
+                }
+                Paint16 card[span_px];
+                sweep.card->sample(on_card, card);
+                for (int i = 0; i < span_px; ++i) {
+                    const std::uint32_t rest = 65536 - card[i][3] * 65536u / static_cast<std::uint32_t>(paint_unit);
+                    for (int c = 0; c < 4; ++c) {
+                        const std::uint32_t own = c < 3 ? card[i][c] : 0; // a card has no gloss
+                        desk[i][c] = static_cast<uint16_t>(std::min(((desk[i][c] * rest) >> 16) + own, 65535u));
+                    }
+                }
+            }
+        }
+        if (sweep.planes.size() == 1) {
+            std::copy_n(desk, span_px, sum);
+        } else {
+            for (int i = 0; i < span_px; ++i)
+                for (int c = 0; c < 4; ++c)
+                    sum[i][c] = static_cast<uint16_t>(sum[i][c] + ((desk[i][c] * share) >> 16));
+        }
+    }
+    std::copy_n(sum, span_px, out);
+}
+
+// What a thread needs to develop rows.
+struct Renderer::Scratch {
+    std::vector<const Paint16 *> window; // the rows from `radius` above to `radius` below
+    std::vector<Paint16> down, across;   // blurred; `down` has `radius` texels more on both sides
+};
+
+ARHOST_WIDE void Renderer::develop_row(int y, const Sweep &sweep, Scratch &scratch, uint8_t *bgr) const {
+    const int radius = static_cast<int>(kernel_.size()) - 1;
+    const Paint16 *row = scratch.window[radius];
+    if (radius) {
+        const auto weight = [&](int i) { return U16x8::load(&kernel_[i]); };
+        Paint16 *down = scratch.down.data() + radius;
+        for (int x = 0; x < padded_; x += 2) {
+            U16x8 sum = times(U16x8::load(row + x), weight(0));
+            for (int i = 1; i <= radius; ++i)
+                sum = sum + times(mean(U16x8::load(scratch.window[radius - i] + x),
+                                       U16x8::load(scratch.window[radius + i] + x)),
+                                  weight(i));
+            sum.store(down + x);
+        }
+        for (int i = 1; i <= radius; ++i) {
+            down[-i] = down[0];
+            down[width_ - 1 + i] = down[width_ - 1];
+        }
+        for (int x = 0; x < width_; x += 2) {
+            U16x8 sum = times(U16x8::load(down + x), weight(0));
+            for (int i = 1; i <= radius; ++i)
+                sum = sum + times(mean(U16x8::load(down + x - i), U16x8::load(down + x + i)), weight(i));
+            sum.store(&scratch.across[x]);
+        }
+        row = scratch.across.data();
+    }
+    // The grain is laid anew for each frame, and for each band of rows, so that it does not repeat.
+    const std::uint64_t place = hashed(seed_ * 0x9e3779b97f4a7c15ULL + sweep.sequence * 512 + y / 64);
+    const auto *grain = &grain_[static_cast<std::size_t>((place >> 8) + y) % grain_side * grain_side];
+    const float down = static_cast<float>(y % cell_px) / cell_px;
+    const Node *above = &sweep.nodes[sweep.nodes.size() / 2][static_cast<std::size_t>(y / cell_px) * grid_width_];
+    const Node *below = above + grid_width_;
+    for (int left = 0; left < width_; left += cell_px, ++above, ++below) {
+        // What the lens takes away, and what the varnish adds.
+        const float gain = mix(above[0].gain, below[0].gain, down);
+        const float gain_step = (mix(above[1].gain, below[1].gain, down) - gain) / cell_px;
+        const float mirror = mix(above[0].mirror, below[0].mirror, down);
+        const float mirror_step = (mix(above[1].mirror, below[1].mirror, down) - mirror) / cell_px;
+        float gains[4 * cell_px], mirrored[4 * cell_px];
+        for (int x = 0; x < cell_px; ++x) {
+            const float along = static_cast<float>(x), gloss = row[left + x][3] * (1 / paint_unit);
+            for (int c = 0; c < 4; ++c) {
+                gains[4 * x + c] = gain + gain_step * along;
+                mirrored[4 * x + c] = (mirror + mirror_step * along) * gloss;
+            }
+        }
+        const uint16_t *paint = row[left].data();
+        const int16_t *speck = grain[(left + place % grain_side * cell_px) % grain_side].data();
+        std::int32_t index[4 * cell_px];
+        for (int i = 0; i < 4 * cell_px; ++i) {
+            const float light = (decoded(paint[i] * (1 / paint_unit)) + mirrored[i]) * gains[i];
+            float seen = light + std::sqrt(light * shot_ + read2_) * (speck[i] * (1 / grain_unit));
+            seen = seen > 0 ? std::sqrt(seen) : 0;
+            seen = seen < 1 ? seen : 1;
+            index[i] = static_cast<std::int32_t>(seen * (code_count - 1));
+        }
+        for (int x = 0; x < std::min(cell_px, width_ - left); ++x)
+            for (int c = 0; c < 3; ++c)
+                bgr[3 * (left + x) + 2 - c] = srgb_[index[4 * x + c]];
+    }
+}
+
+void Renderer::render(const Pyramid &desk, const Pyramid *card, const Shot &shot, uint8_t *bgr,
+                      std::size_t stride) const {
+    Sweep sweep{&desk, card, card ? shot.card : std::nullopt, {}, {}, shot.sequence};
+    for (const Mt &pose : shot.poses) {
+        sweep.planes.push_back(plane_of(pose));
+        sweep.nodes.push_back(nodes_of(sweep.planes.back(), desk));
+    }
+    // Spans are warped in blocks of rows, since neighbours below one another look the same texels up. The
+    // rows that the blur of a block needs are kept in a ring.
+    constexpr int block_rows = 16, block_columns = 8 * span_px;
+    const int radius = static_cast<int>(kernel_.size()) - 1, rows_kept = block_rows + 2 * radius;
+    in_parallel(height_, threads_, [&](int first, int last) {
+        std::vector<Paint16> ring(static_cast<std::size_t>(rows_kept) * padded_);
+        Scratch scratch{std::vector<const Paint16 *>(2 * radius + 1), std::vector<Paint16>(padded_ + 2 * radius),
+                        std::vector<Paint16>(padded_)};
+        const auto kept = [&](int y) { return &ring[static_cast<std::size_t>(y % rows_kept) * padded_]; };
+        int warped = std::max(0, first - radius);
+        for (int block = first; block < last; block += block_rows) {
+            const int block_end = std::min(block + block_rows, last), end = std::min(block_end + radius, height_);
+            for (int left = 0; left < padded_; left += block_columns)
+                for (int y = warped; y < end; ++y)
+                    for (int x = left; x < std::min(left + block_columns, padded_); x += span_px)
+                        warp_span(x, y, sweep, kept(y) + x);
+            warped = end;
+            for (int y = block; y < block_end; ++y) {
+                for (int i = -radius; i <= radius; ++i)
+                    scratch.window[i + radius] = kept(std::clamp(y + i, 0, height_ - 1));
+                develop_row(y, sweep, scratch, bgr + stride * static_cast<std::size_t>(y));
+            }
+        }
+    });
+}
+
+} // namespace arhost::synthetic

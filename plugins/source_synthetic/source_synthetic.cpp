@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// source_synthetic: a printed marker on a desk, seen by a moving camera whose poses are exactly known.
+#include "marker_print.hpp"
+#include "renderer.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <thread>
+
+namespace {
+
+using namespace arhost::synthetic;
+using arhost::Failure;
+
+constexpr const char *paths[] = {"orbit", "still", "approach", nullptr};
+
+std::int64_t now_ns() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+// A small camera with a mild lens, its axis a little beside the middle.
+arhost_intrinsics default_camera(std::int64_t width, std::int64_t height) {
+    arhost_intrinsics camera{};
+    camera.struct_size = sizeof camera;
+    camera.width = static_cast<std::uint32_t>(width);
+    camera.height = static_cast<std::uint32_t>(height);
+    camera.distortion = ARHOST_DISTORTION_BROWN;
+    const double across = static_cast<double>(width) / 1280, down = static_cast<double>(height) / 720;
+    camera.fx = camera.fy = 1020 * across;
+    camera.cx = 645.5 * across - 0.5;
+    camera.cy = 355.5 * down - 0.5;
+    camera.coefficient_count = 5;
+    const double coefficients[] = {-0.094, 0.061, 0.0006, -0.0004, -0.011};
+    std::copy(std::begin(coefficients), std::end(coefficients), camera.coefficients);
+    return camera;
+}
+
+// How many times as far as the default lens a camera must be to see the marker as large in its image.
+double reach_of(const arhost_intrinsics &camera) {
+    const auto half_view = [](double centre, double size, double focal) {
+        const double px = std::max(0.5, std::min(centre + 0.5, size - 0.5 - centre));
+        return std::tan(std::min(px / focal, 1.0));
+    };
+    const double half =
+        std::min(half_view(camera.cx, camera.width, camera.fx), half_view(camera.cy, camera.height, camera.fy));
+    return std::clamp(std::tan(std::atan(355.5 / 1020)) / half, 0.6, 4.0);
+}
+
+class SyntheticSource {
+public:
+    SyntheticSource(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), width_(options.integer("width")), height_(options.integer("height")),
+          period_s_(options.real("period")), frames_(static_cast<std::uint64_t>(options.integer("frames"))),
+          fps_(options.real("fps")), motion_blur_(options.real("motion_blur")),
+          occlude_from_(options.integer("occlude_from")), occlude_to_(options.integer("occlude_to")),
+          threads_(static_cast<int>(options.integer("threads"))) {
+        const std::string path = options.text("path");
+        path_ = path == "still" ? PathKind::still : path == "approach" ? PathKind::approach : PathKind::orbit;
+        sheet_.family = options.text("family");
+        sheet_.id = static_cast<int>(options.integer("id"));
+        sheet_.cells = marker_cells(sheet_.family, options.integer("id"));
+        sheet_.side_mm = options.real("side_mm");
+        sensor_ = {options.real("blur_px"), options.real("noise"), options.real("exposure_ev"),
+                   static_cast<std::uint64_t>(options.integer("seed"))};
+        if (!(sheet_.side_mm > 0))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "side_mm: must be more than 0");
+        if (!(period_s_ > 0))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "period: must be more than 0 s");
+        if (!(fps_ > 0))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "fps: must be more than 0");
+        if (occlude_from_ >= 0 && occlude_to_ <= occlude_from_)
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "occlude_to: must be more than occlude_from; it is the first "
+                                                      "frame in which the marker is not covered any more");
+        if (threads_ < 1)
+            threads_ = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    }
+
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        camera_ = setup.intrinsics ? *setup.intrinsics : default_camera(width_, height_);
+        if (setup.fps > 0)
+            fps_ = setup.fps;
+        paced_ = setup.paced != 0;
+        reach_ = reach_of(camera_);
+
+        properties.has_intrinsics = 1;
+        properties.intrinsics = camera_;
+        properties.intrinsics.struct_size = sizeof(arhost_intrinsics);
+        arhost_frame_format &format = properties.format;
+        format.pixel_format = ARHOST_BGR8;
+        format.width = camera_.width;
+        format.height = camera_.height;
+        format.fps = fps_;
+        if (!arhost_frame_layout(&format))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "the camera's image of " + std::to_string(camera_.width) + "×" +
+                                                          std::to_string(camera_.height) + " px is not 1 to " +
+                                                          std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
+        properties.frame_count = frames_;
+
+        host_.progress(0, "lens");
+        renderer_.emplace(camera_, sensor_, threads_);
+        // A pixel of the nearest camera sees about this much of the sheet.
+        const double pixel = 350 * reach_ / std::sqrt(camera_.fx * camera_.fy);
+        const double texel = std::clamp(std::exp2(std::floor(std::log2(pixel))), 0.125, 1.0);
+        const auto report = [&](double done) {
+            host_.progress(0.1 + 0.85 * done, "painting the desk");
+            if (host_.cancelled())
+                throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while painting the desk");
+        };
+        const int side = std::min(1024, static_cast<int>(256 / texel)); // the finest level covers the sheet
+        desk_.emplace(PyramidSize{side, static_cast<float>(texel), 1024}, threads_, paint_desk(sheet_, sensor_.seed),
+                      report);
+        if (occlude_from_ >= 0)
+            card_.emplace(PyramidSize{512, 0.5f, 128}, threads_, paint_card(sensor_.seed), [](double) {});
+        host_.progress(1, "ready");
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        std::uint64_t frame = buffer.sequence + skipped_;
+        if (paced_)
+            if (const arhost_status status = wait_for(frame, info); status != ARHOST_OK)
+                return status;
+        if (frames_ && frame >= frames_)
+            return ARHOST_END;
+        const double unit_mm = sheet_.side_mm / drawn_side;
+        std::vector<Mt> poses;
+        const int count = motion_blur_ > 0 ? 5 : 1;
+        for (int i = 0; i < count; ++i)
+            poses.push_back(pose_at(static_cast<double>(frame) + motion_blur_ * (i - (count - 1) / 2.0) / count, 1));
+        const Shot shot{poses, card_at(frame), frame};
+        renderer_->render(*desk_, card_ ? &*card_ : nullptr, shot, buffer.plane[0], buffer.format->stride[0]);
+
+        info.clock = ARHOST_CLOCK_MEDIA;
+        info.capture_ns = time_ns(frame);
+        info.has_truth = 1;
+        info.truth_id = sheet_.id;
+        std::ranges::copy(pose_at(static_cast<double>(frame), unit_mm), info.true_mt);
+        return ARHOST_OK;
+    }
+
+    void stop() {
+        renderer_.reset();
+        desk_.reset();
+        card_.reset();
+    }
+
+private:
+    Mt pose_at(double frame, double unit_mm) const {
+        const double turns = frame / (fps_ * period_s_);
+        return pose_on_path(path_, turns - std::floor(turns), reach_, unit_mm);
+    }
+
+    // Over the marker from occlude_from to occlude_to; a few frames before and after it slides in and out.
+    std::optional<Card> card_at(std::uint64_t sequence) const {
+        if (occlude_from_ < 0)
+            return {};
+        constexpr double sliding = 10;
+        const auto frame = static_cast<double>(sequence);
+        const double away =
+            std::max(static_cast<double>(occlude_from_) - frame, frame - static_cast<double>(occlude_to_ - 1)) /
+            sliding;
+        if (away >= 1)
+            return {};
+        const double gone = away > 0 ? away * away * (3 - 2 * away) : 0;
+        return Card{{static_cast<float>(1 + 210 * gone), static_cast<float>(-1 - 330 * gone)}, 7 - 25 * gone};
+    }
+
+    std::int64_t time_ns(std::uint64_t frame) const { return std::llround(static_cast<double>(frame) * 1e9 / fps_); }
+
+    // Waits until `frame` is due. Where that is past already by a frame or more, goes on to the one due now.
+    arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
+        if (!epoch_set_) {
+            epoch_ns_ = now_ns() - time_ns(frame);
+            epoch_set_ = true;
+        }
+        const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame);
+        if (const auto late = static_cast<std::uint32_t>(std::max(0.0, static_cast<double>(late_ns) * fps_ / 1e9))) {
+            info.skipped = late;
+            skipped_ += late;
+            frame += late;
+        }
+        for (;;) {
+            const std::int64_t left_ns = epoch_ns_ + time_ns(frame) - now_ns();
+            if (left_ns <= 0)
+                return ARHOST_OK;
+            if (host_.cancelled())
+                return ARHOST_ERROR_CANCELLED;
+            std::this_thread::sleep_for(std::chrono::nanoseconds(std::min<std::int64_t>(left_ns, 20'000'000)));
+        }
+    }
+
+    arhost::Host host_;
+    std::int64_t width_, height_;
+    double period_s_;
+    std::uint64_t frames_; // 0: endless
+    double fps_, motion_blur_;
+    std::int64_t occlude_from_, occlude_to_;
+    int threads_;
+    PathKind path_;
+    MarkerSheet sheet_;
+    Sensor sensor_;
+
+    arhost_intrinsics camera_{};
+    double reach_ = 1;
+    std::optional<Renderer> renderer_;
+    std::optional<Pyramid> desk_, card_;
+
+    bool paced_ = false, epoch_set_ = false;
+    std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
+    std::uint64_t skipped_ = 0; // frames that were not given since they would have been late
+};
+
+using arhost::option;
+const arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_TEXT, "family", "tag36h11",
+           "The marker's family: an AprilTag family or a dictionary of OpenCV.", 0, 0, marker_families().data()),
+    option(ARHOST_OPTION_INTEGER, "id", "0", "The marker's id.", 0, 100'000),
+    option(ARHOST_OPTION_REAL, "side_mm", "80",
+           "Outer side of the black square in mm; the whole scene scales with it.", 0.001, 100'000),
+    option(ARHOST_OPTION_TEXT, "path", "orbit",
+           "How the camera moves: orbit (once around the sheet), still, or approach (towards it and back).", 0, 0,
+           paths),
+    option(ARHOST_OPTION_REAL, "period", "10", "Seconds until the path closes.", 0.01, 100'000),
+    option(ARHOST_OPTION_INTEGER, "frames", "150", "End after so many frames; 0: endless.", 0, 2'147'483'647),
+    option(ARHOST_OPTION_REAL, "fps", "30", "Frames a second, where the configuration asks for no rate.", 0.001,
+           1000),
+    option(ARHOST_OPTION_INTEGER, "width", "1280",
+           "Width in px of the default camera, which is used where the configuration names none.", 1,
+           ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_INTEGER, "height", "720", "Height in px of the default camera.", 1, ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_REAL, "noise", "1", "Sensor noise; 1: as of a small camera indoors, 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "blur_px", "0.5", "Softness of the lens, sigma in px; 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "motion_blur", "0",
+           "How long the shutter is open, as a share of the frame's time; any but 0 takes five times as long.", 0, 1),
+    option(ARHOST_OPTION_REAL, "exposure_ev", "0", "Exposure in stops: 1 is twice as bright.", -10, 10),
+    option(ARHOST_OPTION_INTEGER, "occlude_from", "-1",
+           "The first frame in which a postcard covers the marker; -1: never.", -1, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "occlude_to", "-1", "The first frame in which it covers it no more.", -1,
+           2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "seed", "1", "Chooses the wood's grain and the noise.", 0, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads that paint; the frames don't depend on it. 0: all cores.",
+           0, 256),
+};
+
+const arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SOURCE,
+    "source_synthetic",
+    "Synthetic marker scene",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "A printed marker on a desk, seen by a moving camera whose poses are exactly known.",
+    ARHOST_CAN_SEEK,
+    std::size(options),
+    options,
+    nullptr};
+
+} // namespace
+
+ARHOST_SOURCE(SyntheticSource, descriptor)

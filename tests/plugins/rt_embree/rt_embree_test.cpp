@@ -1,0 +1,803 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ray_table.hpp"
+#include "tracer.hpp"
+
+#include <arhost/shading/lens.hpp>
+#include <arhost/shading/srgb8.hpp>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
+
+#include <cmath>
+#include <limits>
+
+namespace arhost::test {
+namespace {
+
+using scene::ArenaBuilder;
+using shading::srgb8_exact;
+
+constexpr Pixel nothing_alpha{0, 0, 0, 0};
+
+ArenaBuilder one_sphere(glm::vec4 sphere, const arhost_material &material = flat(0.2f, 0.4f, 0.8f)) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    builder.add_object("sphere", builder.add_spheres({sphere}), builder.add_material(material));
+    return builder;
+}
+
+// At the origin, looking along world z, with world −y up: the world's axes are the camera's OpenCV axes.
+arhost_camera opencv_axes(const arhost_intrinsics &in) {
+    return camera({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, in);
+}
+
+// From above at an angle, looking at the origin.
+arhost_camera from_the_side(const arhost_intrinsics &in = pinhole()) {
+    return camera({0, -150, 110}, {0, 0, 0}, {0, 0, 1}, in);
+}
+
+// ---- Silhouettes -----------------------------------------------------------------------------------
+
+struct Silhouette {
+    double area, x, y;
+};
+
+Silhouette measured(const Picture &picture) {
+    Silhouette s{0, 0, 0};
+    for (std::uint32_t y = 0; y < picture.height; ++y)
+        for (std::uint32_t x = 0; x < picture.width; ++x) {
+            const double share = picture.alpha(x, y) / 255.0;
+            s.area += share;
+            s.x += share * x;
+            s.y += share * y;
+        }
+    s.x /= s.area;
+    s.y /= s.area;
+    return s;
+}
+
+// The cone that touches the sphere, projected by OpenCV, as a polygon (its area and centroid: Bourke 1988).
+Silhouette expected(const arhost_intrinsics &in, glm::dvec3 centre, double radius) {
+    const glm::dvec3 axis = glm::normalize(centre);
+    const glm::dvec3 a = glm::normalize(glm::cross(axis, glm::dvec3(0, 1, 0))), b = glm::cross(axis, a);
+    const double angle = std::asin(radius / glm::length(centre));
+    std::vector<cv::Point3d> cone;
+    for (int i = 0; i < 4000; ++i) {
+        const double phi = 2 * CV_PI * i / 4000;
+        const glm::dvec3 d = axis * std::cos(angle) + (a * std::cos(phi) + b * std::sin(phi)) * std::sin(angle);
+        cone.emplace_back(d.x, d.y, d.z);
+    }
+    const cv::Mat matrix = (cv::Mat_<double>(3, 3) << in.fx, 0, in.cx, 0, in.fy, in.cy, 0, 0, 1);
+    const std::vector<double> k(in.coefficients, in.coefficients + in.coefficient_count);
+    std::vector<cv::Point2d> p;
+    if (in.distortion == ARHOST_DISTORTION_FISHEYE)
+        cv::fisheye::projectPoints(cone, p, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), matrix, k);
+    else
+        cv::projectPoints(cone, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), matrix, k, p);
+    Silhouette s{0, 0, 0};
+    for (std::size_t i = 0; i < p.size(); ++i) {
+        const cv::Point2d &q = p[i], &r = p[(i + 1) % p.size()];
+        const double twice = q.x * r.y - r.x * q.y;
+        s.area += twice / 2;
+        s.x += (q.x + r.x) * twice / 6;
+        s.y += (q.y + r.y) * twice / 6;
+    }
+    return {std::abs(s.area), s.x / s.area, s.y / s.area};
+}
+
+arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> k) {
+    arhost_intrinsics in{sizeof in, 320, 240, distortion, 260, 250, 172.3, 97.6, static_cast<std::uint32_t>(k.size()),
+                         0,         {}};
+    std::copy(k.begin(), k.end(), in.coefficients);
+    return in;
+}
+
+TEST(Silhouette, OfASphereIsWhereTheLensPutsIt) {
+    const arhost_intrinsics lenses[] = {with_lens(ARHOST_DISTORTION_NONE, {}),
+                                        with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
+                                        with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.01}),
+                                        with_lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})};
+    const glm::vec4 spheres[] = {{0, 0, 300, 60}, {-130, 60, 400, 45}, {70, 90, 350, 30}};
+    for (const arhost_intrinsics &in : lenses)
+        for (const glm::vec4 &sphere : spheres) {
+            Tracer tracer(one_sphere(sphere), {{"samples", "64"}});
+            const Silhouette is = measured(tracer.render(opencv_axes(in)));
+            const Silhouette should = expected(in, glm::dvec3(sphere), sphere.w);
+            EXPECT_NEAR(is.area / should.area, 1, 2e-3);
+            EXPECT_NEAR(is.x, should.x, 0.02);
+            EXPECT_NEAR(is.y, should.y, 0.02);
+        }
+}
+
+TEST(Silhouette, OfASphereOnTheAxisIsCentredOnThePrincipalPixel) {
+    arhost_intrinsics in = pinhole(101, 81);
+    in.cx = 30; // pixel centres are integers, so the picture is symmetric about this column and row
+    in.cy = 50;
+    const Picture picture = Tracer(one_sphere({0, 0, 200, 20})).render(opencv_axes(in));
+    for (int dy = -30; dy <= 30; ++dy)
+        for (int dx = 0; dx <= 30; ++dx) {
+            ASSERT_EQ(picture.alpha(30 + dx, 50 + dy), picture.alpha(30 - dx, 50 + dy));
+            ASSERT_EQ(picture.alpha(30 + dx, 50 + dy), picture.alpha(30 + dx, 50 - dy));
+        }
+    EXPECT_EQ(picture.alpha(30, 50), 255);
+}
+
+TEST(Silhouette, ASphereBehindAFisheyeCameraIsSeen) {
+    arhost_intrinsics in = pinhole(300, 300, 60);
+    in.distortion = ARHOST_DISTORTION_FISHEYE;
+    in.coefficient_count = 4;
+    const Picture picture = Tracer(one_sphere({100, 0, -40, 20})).render(opencv_axes(in));
+    const double theta = std::atan2(100, -40);
+    EXPECT_EQ(picture.alpha(static_cast<int>(in.cx + 60 * theta), 150), 255);
+}
+
+// ---- Alpha classes ---------------------------------------------------------------------------------
+
+ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_CATCHER) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0.3f);
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                       floor_role);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 25, 12}}),
+                       builder.add_material(diffuse(0.9f, 0.1f, 0.1f)));
+    builder.add_light(light(60, -20, 200, 0.7f));
+    return builder;
+}
+
+TEST(Alpha, IsZeroInTheLight153InTheShadowAnd255OnObjects) {
+    const auto counts = Tracer(sphere_over_catcher()).render(from_the_side()).alphas();
+    EXPECT_EQ(counts.size(), 3u);
+    EXPECT_GT(counts.at(0), 10000);
+    EXPECT_GT(counts.at(153), 100);
+    EXPECT_GT(counts.at(255), 300);
+}
+
+TEST(Alpha, TheShadowLiesWhereTheLightsRaysAreStopped) {
+    const arhost_camera view = from_the_side();
+    const Picture picture = Tracer(sphere_over_catcher()).render(view);
+    // The ball's centre, seen from the light, falls on the floor at t = 200 / 175 of the way.
+    const glm::dvec3 from(60, -20, 200), hit = from + (glm::dvec3(0, 0, 25) - from) * (200.0 / 175);
+    const glm::dvec3 w = glm::normalize(glm::dvec3(0, -150, 110)), u(1, 0, 0), v = glm::cross(w, u);
+    const glm::dvec3 d = hit - glm::dvec3(0, -150, 110);
+    const double x = 99.5 + 200 * glm::dot(d, u) / -glm::dot(d, w), y = 74.5 - 200 * glm::dot(d, v) / -glm::dot(d, w);
+    const Pixel shadow = picture.at(static_cast<int>(std::lround(x)), static_cast<int>(std::lround(y)));
+    EXPECT_EQ(shadow, (Pixel{0, 0, 0, 153})) << "black, at " << x << " " << y;
+}
+
+TEST(Alpha, ACatcherFacingAwayIsNotThere) {
+    ArenaBuilder builder = sphere_over_catcher();
+    const Picture from_below = Tracer(std::move(builder)).render(camera({0, -150, -110}, {0, 0, 0}, {0, 0, 1}));
+    const auto counts = from_below.alphas();
+    EXPECT_EQ(counts.count(153), 0u);
+    EXPECT_GT(counts.at(255), 300) << "the ball is seen through the floor";
+}
+
+TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
+    // A table top between the ball and the floor: the shadow falls on the top, and through it on the floor,
+    // where the top hides it.
+    ArenaBuilder builder = sphere_over_catcher();
+    const double with_top_only = Tracer(std::move(builder)).render(from_the_side()).alphas().at(153);
+    builder = sphere_over_catcher();
+    builder.add_object("lower floor", builder.add_triangles(square(300, -60)), builder.add_material(diffuse(1, 1, 1)),
+                       ARHOST_CATCHER);
+    EXPECT_EQ(Tracer(std::move(builder)).render(from_the_side()).alphas().at(153), with_top_only);
+}
+
+TEST(Alpha, AVirtualObjectBehindACatcherIsSeen) {
+    ArenaBuilder builder = sphere_over_catcher();
+    builder.add_object("sunken", builder.add_spheres({{40, 0, -20, 10}}), builder.add_material(flat(1, 0, 0)));
+    const Picture with = Tracer(std::move(builder)).render(from_the_side());
+    const Picture without = Tracer(sphere_over_catcher()).render(from_the_side());
+    EXPECT_GT(with.alphas().at(255), without.alphas().at(255) + 100);
+}
+
+TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
+    ArenaBuilder builder = sphere_over_catcher();
+    builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong, no falloff
+    const Picture picture = Tracer(std::move(builder)).render(from_the_side());
+    const auto counts = picture.alphas();
+    // Where only one is hidden, 2/3 or 1/3 of 153, a little more or less as the cosines differ.
+    int strong = 0, weak = 0, both = 0;
+    for (const auto &[alpha, count] : counts) {
+        strong += alpha > 96 && alpha < 110 ? count : 0;
+        weak += alpha > 43 && alpha < 57 ? count : 0;
+        both += alpha == 153 ? count : 0;
+        EXPECT_TRUE(alpha == 0 || alpha == 255 || alpha == 153 || (alpha > 96 && alpha < 110) ||
+                    (alpha > 43 && alpha < 57))
+            << alpha;
+    }
+    EXPECT_GT(strong, 50);
+    EXPECT_GT(weak, 50);
+    EXPECT_GT(both, 20);
+}
+
+TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
+    ArenaBuilder builder;
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
+                       ARHOST_CATCHER);
+    builder.add_object("ball", builder.add_spheres({{0, 0, -40, 20}}), builder.add_material(diffuse(1, 0, 0)));
+    builder.add_light(light(0, 0, -200, 1));
+    const auto counts = Tracer(std::move(builder)).render(from_the_side()).alphas();
+    EXPECT_EQ(counts.count(153), 0u);
+}
+
+TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
+    ArenaBuilder builder = sphere_over_catcher();
+    const arhost_camera view = from_the_side();
+    // A screen right in front of the camera, over the picture's left half.
+    builder.add_object(
+        "screen",
+        builder.add_triangles(
+            {{{-50, -140, 0}, {0, -140, 0}, {0, -140, 200}, {-50, -140, 200}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}}),
+        builder.add_material(diffuse(1, 1, 1)), ARHOST_OCCLUDER);
+    const Picture with = Tracer(std::move(builder)).render(view);
+    const Picture without = Tracer(sphere_over_catcher()).render(view);
+    int hidden = 0;
+    for (std::uint32_t y = 0; y < with.height; ++y)
+        for (std::uint32_t x = 0; x < with.width; ++x) {
+            if (x < 99) {
+                ASSERT_EQ(with.alpha(x, y), 0);
+                hidden += without.alpha(x, y) != 0;
+            } else if (x > 101) {
+                ASSERT_EQ(with.alpha(x, y), without.alpha(x, y)) << "it casts no shadow on the catcher";
+            }
+        }
+    EXPECT_GT(hidden, 300);
+}
+
+TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
+    ArenaBuilder builder = one_sphere({0, 0, 200, 40});
+    builder.add_object("wall", builder.add_triangles(square(500, 300)), builder.add_material(flat(1, 1, 1)),
+                       ARHOST_OCCLUDER);
+    EXPECT_EQ(Tracer(std::move(builder)).render(opencv_axes(pinhole())).pixels(),
+              Tracer(one_sphere({0, 0, 200, 40})).render(opencv_axes(pinhole())).pixels());
+}
+
+TEST(Alpha, AnEmptySceneIsTransparentEverywhere) {
+    const Picture picture = Tracer(ArenaBuilder()).render(from_the_side());
+    EXPECT_EQ(picture.alphas(), (std::map<int, int>{{0, 200 * 150}}));
+    EXPECT_EQ(picture.info.has_region, 1);
+    EXPECT_EQ(picture.info.region_width, 0u);
+}
+
+// ---- Light -----------------------------------------------------------------------------------------
+
+// The code of a value that single precision has blurred.
+::testing::AssertionResult is_code_of(int code, double linear) {
+    const int low = srgb8_exact(linear * (1 - 2e-5)), high = srgb8_exact(linear * (1 + 2e-5));
+    if (code >= low && code <= high)
+        return ::testing::AssertionSuccess();
+    return ::testing::AssertionFailure() << code << " is not the code of " << linear << ", " << low;
+}
+
+// Looks straight down on the plane z = 0 from 200 mm: where a pixel's ray arrives.
+glm::dvec3 on_the_floor(int x, int y) {
+    return {x - 99.5, -(y - 74.5), 0};
+}
+const arhost_camera from_above = camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0});
+
+TEST(Light, APlaneIsAsBrightAsLambertSays) {
+    for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
+        ArenaBuilder builder;
+        builder.settings.ambient = {0.1f, 0.2f, 0.3f};
+        const double intensity = falloff == ARHOST_FALLOFF_NONE ? 0.75 : 5000;
+        arhost_material material = diffuse(0.8f, 0.5f, 0.3f);
+        material.ambient[0] = 0.4f;
+        builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(material));
+        builder.add_light(light(30, -20, 90, static_cast<float>(intensity), falloff));
+        const Picture picture = Tracer(std::move(builder)).render(from_above);
+        for (int y = 0; y < 150; y += 3)
+            for (int x = 0; x < 200; x += 3) {
+                const glm::dvec3 to_light = glm::dvec3(30, -20, 90) - on_the_floor(x, y);
+                const double d = glm::length(to_light), cosine = to_light.z / d;
+                const double e = intensity * cosine / (falloff == ARHOST_FALLOFF_NONE ? 1 : d * d);
+                const Pixel pixel = picture.at(x, y);
+                ASSERT_TRUE(is_code_of(pixel[0], double{0.4f} * double{0.1f} + double{0.8f} * e));
+                ASSERT_TRUE(is_code_of(pixel[1], double{0.5f} * double{0.2f} + double{0.5f} * e));
+                ASSERT_TRUE(is_code_of(pixel[2], double{0.3f} * double{0.3f} + double{0.3f} * e));
+                ASSERT_EQ(pixel[3], 255);
+            }
+    }
+}
+
+TEST(Light, ASpecularPlaneAddsPhongsLobe) {
+    ArenaBuilder builder;
+    const arhost_material material{ARHOST_SPECULAR, 0, {}, {0.2f, 0.2f, 0.2f}, {0.5f, 0.5f, 0.5f}, 20, {}, 0};
+    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(material));
+    builder.add_light(light(30, -20, 90, 0.9f));
+    const Picture picture = Tracer(std::move(builder)).render(from_above);
+    for (int y = 0; y < 150; y += 3)
+        for (int x = 0; x < 200; x += 3) {
+            const glm::dvec3 p = on_the_floor(x, y), l = glm::normalize(glm::dvec3(30, -20, 90) - p);
+            const glm::dvec3 reflected(-l.x, -l.y, l.z), to_eye = glm::normalize(glm::dvec3(0, 0, 200) - p);
+            const double value = 0.9 * (0.2 * l.z + 0.5 * std::pow(std::max(glm::dot(reflected, to_eye), 0.0), 20));
+            ASSERT_TRUE(is_code_of(picture.at(x, y)[0], value)) << x << " " << y;
+        }
+}
+
+TEST(Light, CatchersAndOccludersDarkenObjectsBehindThem) {
+    for (const arhost_role role : {ARHOST_CATCHER, ARHOST_OCCLUDER}) {
+        ArenaBuilder builder = one_sphere({0, 0, 20, 20}, diffuse(0.5f, 0.5f, 0.5f));
+        builder.settings.ambient = glm::vec3(0.2f);
+        builder.add_light(light(0, 0, 300, 0.8f));
+        builder.add_object("lid", builder.add_triangles(square(90, 120)), builder.add_material(diffuse(1, 1, 1)),
+                           role);
+        const Picture picture = Tracer(std::move(builder)).render(from_the_side());
+        for (const Pixel &pixel : picture.pixels())
+            if (pixel[3] == 255) {
+                ASSERT_EQ(pixel[0], srgb8_exact(0.1)) << "ambient light only";
+            }
+        EXPECT_GT(picture.alphas().at(255), 300);
+    }
+}
+
+TEST(Light, SurfacesDoNotShadowThemselves) {
+    // Far from the origin, where floats are coarse, and light that grazes.
+    ArenaBuilder builder;
+    builder.add_object("plane", builder.add_triangles(square(2000)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                       ARHOST_VIRTUAL, glm::mat4x3(glm::translate(glm::mat4(1), glm::vec3(30000, -20000, 10000))));
+    builder.add_light(light(31000, -20000, 10100, 1));
+    const Picture picture =
+        Tracer(std::move(builder)).render(camera({30000, -20000, 10200}, {30000, -20000, 10000}, {0, 1, 0}));
+    for (const Pixel &pixel : picture.pixels())
+        ASSERT_GT(pixel[0], 40);
+}
+
+// ---- Mirrors ---------------------------------------------------------------------------------------
+
+ArenaBuilder mirror_and_ball(std::uint32_t max_depth = 5) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    builder.settings.background = {0.1f, 0.2f, 0.9f};
+    builder.settings.max_depth = max_depth;
+    builder.add_object("mirror", builder.add_triangles(square(400)), builder.add_material(mirror(0.8f)));
+    builder.add_object("ball", builder.add_spheres({{0, 260, 120, 60}}),
+                       builder.add_material(flat(0.9f, 0.3f, 0.1f)));
+    return builder;
+}
+
+TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
+    const arhost_camera view = camera({0, -200, 200}, {0, 0, 0}, {0, 0, 1});
+    const Picture picture = Tracer(mirror_and_ball()).render(view);
+    const glm::dvec3 eye(0, -200, 200), w = glm::normalize(eye), u(1, 0, 0), v = glm::cross(w, u);
+    int balls = 0, backgrounds = 0;
+    for (int y = 0; y < 150; ++y)
+        for (int x = 0; x < 200; ++x) {
+            const glm::dvec3 d = glm::normalize(u * ((x - 99.5) / 200) - v * ((y - 74.5) / 200) - w);
+            const glm::dvec3 hit = eye - d * (eye.z / d.z), reflected(d.x, d.y, -d.z);
+            const auto distance_of_ball = [](glm::dvec3 from, glm::dvec3 along) {
+                const glm::dvec3 to = glm::dvec3(0, 260, 120) - from;
+                return glm::dot(to, along) > 0 ? glm::length(to - along * glm::dot(to, along)) : 1e9;
+            };
+            if (distance_of_ball(eye, d) < 62 || std::abs(hit.x) > 395 || std::abs(hit.y) > 395)
+                continue; // the ball itself, or beside the mirror
+            const double distance = distance_of_ball(hit, reflected);
+            const Pixel pixel = picture.at(x, y);
+            if (distance < 59.5) {
+                ++balls;
+                ASSERT_TRUE(is_code_of(pixel[0], 0.8 * 0.9) && is_code_of(pixel[2], 0.8 * 0.1)) << x << " " << y;
+            } else if (distance > 60.5) {
+                ++backgrounds;
+                ASSERT_TRUE(is_code_of(pixel[0], 0.8 * 0.1) && is_code_of(pixel[2], 0.8 * 0.9)) << x << " " << y;
+            }
+        }
+    EXPECT_GT(balls, 200);
+    EXPECT_GT(backgrounds, 2000);
+}
+
+TEST(Mirror, TakesTheBackgroundOfTheWindowOnlyByReflection) {
+    // Primary rays that miss are transparent, whatever the background.
+    const Picture picture = Tracer(one_sphere({0, 0, 300, 30}, mirror(1))).render(opencv_axes(pinhole()));
+    EXPECT_EQ(picture.at(0, 0), nothing_alpha);
+    EXPECT_EQ(picture.at(99, 74), (Pixel{255, 255, 255, 255})) << "the default background is white";
+}
+
+TEST(Mirror, FollowsAtMostMaxDepthBounces) {
+    // Between two parallel mirrors, each bounce leaves 0.5; the ray leaves after the third.
+    const auto brightness = [](std::uint32_t max_depth) {
+        ArenaBuilder builder;
+        builder.settings.max_depth = max_depth;
+        builder.settings.background = glm::vec3(1);
+        const std::uint32_t half = builder.add_material(mirror(0.5f));
+        builder.add_object("below", builder.add_triangles(square(1000)), half);
+        builder.add_object(
+            "above",
+            builder.add_triangles({{{-1000, -100, 100}, {1000, -100, 100}, {0, 250, 100}}, {}, {}, {{0, 2, 1}}}),
+            half);
+        // 45° down from (0, −150, 50): floor at y = −100, ceiling at 0, floor at 100, ceiling at 200, floor at 300.
+        arhost_intrinsics in = pinhole(1, 1);
+        return Tracer(std::move(builder)).render(camera({0, -150, 50}, {0, -149, 49}, {0, 0, 1}, in)).at(0, 0)[0];
+    };
+    EXPECT_EQ(brightness(5), srgb8_exact(0.03125));
+    EXPECT_EQ(brightness(4), 0);
+    EXPECT_EQ(brightness(0), 0);
+    EXPECT_EQ(brightness(100), srgb8_exact(0.03125));
+}
+
+TEST(Mirror, ShowsCatchersWithTheirMaterialAndTheShadowsOnThem) {
+    ArenaBuilder builder = sphere_over_catcher();
+    // Upright behind the ball, facing the camera.
+    builder.add_object(
+        "mirror",
+        builder.add_triangles(
+            {{{-80, 70, 0}, {80, 70, 0}, {80, 70, 120}, {-80, 70, 120}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}}),
+        builder.add_material(mirror(1)));
+    const Picture picture = Tracer(std::move(builder)).render(from_the_side());
+    const int lit_at_least = srgb8_exact(0.8 * 0.3 + 0.8 * 0.7 * 0.8), ambient_only = srgb8_exact(0.8 * 0.3);
+    int lit = 0, shadowed = 0;
+    for (const Pixel &p : picture.pixels()) {
+        const bool grey = p[3] == 255 && p[0] == p[1] && p[1] == p[2];
+        lit += grey && p[0] >= lit_at_least && p[0] < 250;
+        shadowed += grey && p[0] == ambient_only;
+    }
+    EXPECT_GT(lit, 300);
+    EXPECT_GT(shadowed, 30);
+}
+
+// ---- Samples ---------------------------------------------------------------------------------------
+
+TEST(Samples, EdgesKeepTheObjectsColour) {
+    const Picture picture = Tracer(one_sphere({10, 5, 200, 40}), {{"samples", "16"}}).render(opencv_axes(pinhole()));
+    int edges = 0;
+    for (const Pixel &pixel : picture.pixels()) {
+        if (pixel[3] == 0)
+            continue;
+        edges += pixel[3] < 255;
+        ASSERT_EQ(pixel[0], srgb8_exact(0.2f));
+        ASSERT_EQ(pixel[1], srgb8_exact(0.4f));
+        ASSERT_EQ(pixel[2], srgb8_exact(0.8f));
+    }
+    EXPECT_GT(edges, 100);
+}
+
+double over(const Pixel &pixel, int channel, double background) {
+    const double alpha = pixel[3] / 255.0;
+    return background * (1 - alpha) + pixel[channel] * alpha;
+}
+
+TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
+    constexpr int count = 8;
+    const arhost_intrinsics in = pinhole();
+    const Picture all = Tracer(sphere_over_catcher(), {{"samples", std::to_string(count)}}).render(from_the_side(in));
+    std::vector<Picture> singles;
+    for (const rt_embree::Sample &sample : rt_embree::sample_positions(count)) {
+        arhost_intrinsics shifted = in;
+        shifted.cx -= sample.x;
+        shifted.cy -= sample.y;
+        singles.push_back(Tracer(sphere_over_catcher()).render(from_the_side(shifted)));
+    }
+    for (const double background : {0.0, 255.0})
+        for (std::uint32_t y = 0; y < in.height; ++y)
+            for (std::uint32_t x = 0; x < in.width; ++x)
+                for (int channel = 0; channel < 3; ++channel) {
+                    double mean = 0;
+                    for (const Picture &single : singles)
+                        mean += over(single.at(x, y), channel, background) / count;
+                    // Half a code for the alpha, half for the colour, half for the singles' own.
+                    ASSERT_NEAR(over(all.at(x, y), channel, background), mean, 1.5) << x << " " << y;
+                }
+}
+
+// ---- Sameness --------------------------------------------------------------------------------------
+
+ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0.2f);
+    builder.settings.background = {0.5f, 0.6f, 0.7f};
+    const auto place = [&](glm::vec3 to, float degrees, glm::vec3 scale) {
+        glm::mat4 m = glm::translate(moved, to);
+        m = glm::rotate(m, glm::radians(degrees), glm::vec3(0.2f, 0.3f, 0.9f));
+        return glm::mat4x3(glm::scale(m, scale));
+    };
+    const std::uint32_t box = builder.add_triangles(cube(1)), ball = builder.add_spheres({{0, 0, 0, 1}});
+    const std::uint32_t grey = builder.add_material(diffuse(0.7f, 0.7f, 0.7f));
+    const std::uint32_t shiny = builder.add_material(
+        {ARHOST_SPECULAR, 0, {0.1f, 0.3f, 0.1f}, {0.1f, 0.5f, 0.1f}, {0.7f, 0.7f, 0.7f}, 40, {}, 0});
+    const std::uint32_t glass = builder.add_material(mirror(0.9f));
+    builder.add_object("floor", builder.add_triangles(square(100)), grey, ARHOST_CATCHER,
+                       place({0, 0, 0}, 0, {1, 1, 1}));
+    builder.add_object("box", box, shiny, ARHOST_VIRTUAL, place({-30, 10, 20}, 30, {12, 15, 20}));
+    builder.add_object("ball", ball, glass, ARHOST_VIRTUAL, place({20, 0, 22}, 0, {20, 20, 20}));
+    builder.add_object("egg", ball, grey, ARHOST_VIRTUAL, place({10, -45, 12}, 50, {6, 9, 12}));
+    builder.add_object("post", box, grey, ARHOST_OCCLUDER, place({60, -20, 30}, 10, {4, 4, 30}));
+    const glm::vec4 at = moved * glm::vec4(40, -80, 160, 1);
+    builder.add_light(light(at.x, at.y, at.z, 0.8f));
+    return builder;
+}
+
+TEST(Sameness, AnyNumberOfThreadsGivesTheSameBytes) {
+    for (const std::string samples : {"1", "4"}) {
+        const auto trace = [&](const std::string &threads) {
+            return Tracer(busy_scene(), {{"threads", threads}, {"samples", samples}})
+                .render(from_the_side())
+                .pixels();
+        };
+        const auto one = trace("1");
+        EXPECT_EQ(trace("2"), one);
+        EXPECT_EQ(trace("3"), one);
+    }
+}
+
+TEST(Sameness, AgainAndAgainTheSameBytes) {
+    Tracer tracer(busy_scene(), {{"threads", "2"}});
+    const auto first = tracer.render(from_the_side()).pixels();
+    Picture again(pinhole());
+    for (int i = 0; i < 20; ++i) {
+        ASSERT_EQ(tracer.try_render(from_the_side(), again), ARHOST_OK);
+        ASSERT_EQ(again.pixels(), first);
+    }
+}
+
+TEST(Sameness, EveryInstructionSetGivesTheSameBytes) {
+    const auto base =
+        Tracer(busy_scene(), {{"instruction_set", "base"}, {"samples", "3"}}).render(from_the_side()).pixels();
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        EXPECT_EQ(
+            Tracer(busy_scene(), {{"instruction_set", "avx2"}, {"samples", "3"}}).render(from_the_side()).pixels(),
+            base);
+    }
+    if (__builtin_cpu_supports("avx512dq")) {
+        EXPECT_EQ(
+            Tracer(busy_scene(), {{"instruction_set", "avx512"}, {"samples", "3"}}).render(from_the_side()).pixels(),
+            base);
+    }
+#endif
+    EXPECT_EQ(base.size(), 200u * 150u);
+}
+
+// How many pixels differ by more than single precision explains; silhouettes may step by a pixel.
+double share_that_differs(const Picture &a, const Picture &b) {
+    const auto p = a.pixels(), q = b.pixels();
+    int differ = 0;
+    for (std::size_t i = 0; i < p.size(); ++i)
+        for (int channel = 0; channel < 4; ++channel)
+            if (std::abs(p[i][channel] - q[i][channel]) > 1) {
+                ++differ;
+                break;
+            }
+    return static_cast<double>(differ) / static_cast<double>(p.size());
+}
+
+TEST(Sameness, MovingTheSceneWithItsCameraChangesNothing) {
+    glm::mat4 moved = glm::translate(glm::mat4(1), glm::vec3(300, -200, 150));
+    moved = glm::rotate(moved, 1.1f, glm::normalize(glm::vec3(1, -2, 0.5f)));
+    const auto apply = [&](glm::dvec4 p) {
+        const glm::dvec4 q = glm::dmat4(moved) * p;
+        return std::array<double, 3>{q.x, q.y, q.z};
+    };
+    const Picture here = Tracer(busy_scene()).render(from_the_side());
+    const Picture there =
+        Tracer(busy_scene(moved)).render(camera(apply({0, -150, 110, 1}), apply({0, 0, 0, 1}), apply({0, 0, 1, 0})));
+    EXPECT_LT(share_that_differs(here, there), 0.003);
+}
+
+TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
+    const glm::mat4 m = glm::scale(
+        glm::rotate(glm::translate(glm::mat4(1), glm::vec3(5, -10, 15)), 0.7f, glm::normalize(glm::vec3(1, 2, 3))),
+        glm::vec3(30, 20, 12));
+    const auto build = [&](bool baked) {
+        ArenaBuilder builder;
+        builder.settings.ambient = glm::vec3(0.1f);
+        scene::TriangleMesh mesh = cube(1);
+        for (const glm::vec3 &p : mesh.positions)
+            mesh.normals.push_back(glm::normalize(p)); // smooth
+        if (baked)
+            for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+                mesh.positions[i] = glm::vec3(m * glm::vec4(mesh.positions[i], 1));
+                mesh.normals[i] = glm::normalize(glm::transpose(glm::inverse(glm::mat3(m))) * mesh.normals[i]);
+            }
+        builder.add_object("box", builder.add_triangles(mesh), builder.add_material(diffuse(0.8f, 0.6f, 0.4f)),
+                           ARHOST_VIRTUAL, baked ? glm::mat4x3(1) : glm::mat4x3(m));
+        builder.add_light(light(100, -100, 200, 0.8f));
+        return Tracer(std::move(builder)).render(from_the_side());
+    };
+    // Normals are interpolated before or after they get their length in the world: a step of a code.
+    const Picture baked = build(true), instanced = build(false);
+    EXPECT_GT(baked.alphas().at(255), 500);
+    EXPECT_LT(std::abs(baked.alphas().at(255) - instanced.alphas().at(255)), 5);
+    const auto p = baked.pixels(), q = instanced.pixels();
+    int far = 0;
+    for (std::size_t i = 0; i < p.size(); ++i)
+        far += p[i][3] == q[i][3] && std::abs(p[i][0] - q[i][0]) > 40;
+    EXPECT_LT(far, 10);
+}
+
+TEST(Sameness, RobustTraversalGivesThePictureOfTheFastOne) {
+    EXPECT_LT(share_that_differs(Tracer(busy_scene(), {{"robust", "true"}}).render(from_the_side()),
+                                 Tracer(busy_scene()).render(from_the_side())),
+              0.001);
+}
+
+// ---- Regions and sizes -----------------------------------------------------------------------------
+
+TEST(Region, HoldsAllAlphaAndLittleElse) {
+    for (const glm::vec4 &sphere :
+         {glm::vec4(0, 0, 300, 20), glm::vec4(-150, 60, 300, 30), glm::vec4(60, 0, 200, 90)}) {
+        const Picture picture = Tracer(one_sphere(sphere), {{"samples", "4"}}).render(opencv_axes(pinhole()));
+        ASSERT_EQ(picture.info.has_region, 1);
+        std::uint32_t x0 = ~0u, y0 = ~0u, x1 = 0, y1 = 0;
+        for (std::uint32_t y = 0; y < picture.height; ++y)
+            for (std::uint32_t x = 0; x < picture.width; ++x)
+                if (picture.alpha(x, y)) {
+                    x0 = std::min(x0, x), x1 = std::max(x1, x + 1);
+                    y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+                }
+        const arhost_render_info &info = picture.info;
+        EXPECT_LE(info.region_x, x0);
+        EXPECT_LE(info.region_y, y0);
+        EXPECT_GE(info.region_x + info.region_width, x1);
+        EXPECT_GE(info.region_y + info.region_height, y1);
+        EXPECT_LE(info.region_x + info.region_width, picture.width);
+        EXPECT_LE(info.region_y + info.region_height, picture.height);
+        EXPECT_LT(info.region_width, x1 - x0 + 8);
+        EXPECT_LT(info.region_height, y1 - y0 + 8);
+    }
+}
+
+TEST(Region, SkippingTilesLosesNothing) {
+    // Objects all over, some behind the camera and some astride its plane, against rays of one pixel each.
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    const std::uint32_t material = builder.add_material(flat(1, 1, 1));
+    std::vector<glm::vec4> spheres = {
+        {200, 40, 3, 60}, {-90, -70, 100, 9}, {30, 66, 120, 15}, {0, 0, -100, 40}, {-4, 9, 700, 3}};
+    for (const glm::vec4 &sphere : spheres)
+        builder.add_object("ball", builder.add_spheres({sphere}), material);
+    const arhost_intrinsics in = with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001});
+    const Picture picture = Tracer(std::move(builder)).render(opencv_axes(in));
+    const shading::Lens lens(in);
+    for (std::uint32_t y = 0; y < in.height; ++y)
+        for (std::uint32_t x = 0; x < in.width; ++x) {
+            const auto ray = lens.ray({static_cast<double>(x), static_cast<double>(y)});
+            if (!ray) {
+                ASSERT_EQ(picture.alpha(x, y), 0);
+                continue;
+            }
+            const glm::dvec3 d = glm::normalize(glm::dvec3(ray->x, ray->y, ray->z));
+            double margin = 1e9; // how far inside (negative) or outside the nearest sphere's rim
+            for (const glm::vec4 &s : spheres) {
+                const glm::dvec3 c(s);
+                const double along = glm::dot(c, d);
+                if (along > 0)
+                    margin = std::min(margin, glm::length(c - d * along) - s.w);
+            }
+            if (std::abs(margin) > 1e-3) {
+                ASSERT_EQ(picture.alpha(x, y), margin < 0 ? 255 : 0) << x << " " << y;
+            }
+        }
+}
+
+TEST(Sizes, OddOnesAreWrittenWholeAndNotBeyond) {
+    for (const auto &[width, height] :
+         {std::pair{1u, 1u}, {3u, 5u}, {5u, 2u}, {33u, 65u}, {31u, 1u}, {1u, 100u}, {67u, 35u}})
+        for (const char *samples : {"1", "2"}) {
+            const Picture picture = Tracer(one_sphere({0, 0, 50, 45}), {{"samples", samples}})
+                                        .render(opencv_axes(pinhole(width, height, 20)));
+            EXPECT_EQ(picture.alpha(width / 2, height / 2), 255) << width << "x" << height;
+            for (const Pixel &pixel : picture.pixels())
+                ASSERT_NE(pixel[3], 0xa5) << "left as it was";
+        }
+}
+
+// ---- Odd scenes ------------------------------------------------------------------------------------
+
+TEST(OddScenes, DegenerateTrianglesAreHarmless) {
+    ArenaBuilder builder = one_sphere({0, 0, 200, 30});
+    const std::uint32_t material = builder.add_material(diffuse(1, 1, 1));
+    scene::TriangleMesh sliver{
+        {{0, 0, 100}, {50, 0, 100}, {100, 0, 100}, {7, 7, 90}}, {}, {}, {{0, 1, 2}, {3, 3, 3}, {0, 0, 1}}};
+    builder.add_object("slivers", builder.add_triangles(sliver), material);
+    sliver.normals.assign(4, {0, 0, 1});
+    builder.add_object("smooth slivers", builder.add_triangles(sliver), material);
+    builder.add_light(light(0, 0, 0, 1));
+    const auto counts = Tracer(std::move(builder)).render(opencv_axes(pinhole())).alphas();
+    EXPECT_GT(counts.at(255), 2000);
+    EXPECT_LT(counts.at(255), 3500);
+}
+
+TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
+    scene::TriangleMesh mesh = square(200);
+    mesh.normals = {{1, 0, 0}, {-1, 0, 0}, {1, 0, 0}, {-1, 0, 0}};
+    ArenaBuilder builder;
+    builder.add_object("plane", builder.add_triangles(mesh), builder.add_material(diffuse(1, 1, 1)));
+    builder.add_light(light(0, 0, 150, 0.5f));
+    for (const Pixel &pixel : Tracer(std::move(builder)).render(from_above).pixels())
+        ASSERT_EQ(pixel[3], 255);
+}
+
+TEST(OddScenes, ACameraInsideAnObjectSeesItsInside) {
+    const Picture picture = Tracer(one_sphere({0, 0, 0, 50}, diffuse(1, 1, 1))).render(opencv_axes(pinhole()));
+    EXPECT_EQ(picture.alphas(), (std::map<int, int>{{255, 200 * 150}}));
+    EXPECT_EQ(picture.info.region_width, 200u);
+    EXPECT_EQ(picture.info.region_height, 150u);
+}
+
+// ---- Refusals --------------------------------------------------------------------------------------
+
+class Refusal : public testing::Test {
+protected:
+    arhost_status render(const arhost_camera &camera) {
+        EXPECT_EQ(tracer.start(pinhole()), ARHOST_OK);
+        Picture picture(pinhole());
+        return tracer.try_render(camera, picture);
+    }
+    Tracer tracer{one_sphere({0, 0, 200, 30})};
+};
+
+TEST_F(Refusal, OfAnUpThatIsParallelToTheView) {
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("up is parallel"));
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, OfALookAtThatIsTheEye) {
+    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, OfNumbersThatAreNotFinite) {
+    const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, nan, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("not finite"));
+}
+
+TEST_F(Refusal, OfOtherIntrinsicsThanThoseOfTheStart) {
+    arhost_camera other = opencv_axes(pinhole());
+    other.intrinsics.cx += 1;
+    EXPECT_EQ(render(other), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, OfAnImageOfAnotherSize) {
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+    Picture small(pinhole(100, 150));
+    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
+    arhost_intrinsics in = pinhole();
+    in.fx = 0;
+    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    in = pinhole();
+    in.cy = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    in = pinhole();
+    in.distortion = ARHOST_DISTORTION_BROWN;
+    in.coefficient_count = 3;
+    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    in = pinhole(0, 10);
+    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, ToGoOnOnceCancelled) {
+    tracer.plugin().cancel();
+    EXPECT_EQ(tracer.start(pinhole()), ARHOST_ERROR_CANCELLED);
+}
+
+TEST_F(Refusal, ToFinishAnImageOnceCancelled) {
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+    tracer.plugin().cancel();
+    Picture picture(pinhole());
+    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), picture), ARHOST_ERROR_CANCELLED);
+}
+
+TEST(Plugin, DeclaresThatItTracesTheLens) {
+    const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
+    EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
+    EXPECT_STREQ(descriptor.id, "rt_embree");
+    EXPECT_TRUE(descriptor.capabilities & ARHOST_TRACES_LENS);
+}
+
+TEST(Plugin, CanBeStartedAgainAfterAStop) {
+    Tracer tracer(busy_scene());
+    const auto first = tracer.render(from_the_side()).pixels();
+    tracer.render(opencv_axes(pinhole(64, 48)));
+    EXPECT_EQ(tracer.render(from_the_side()).pixels(), first);
+}
+
+} // namespace
+} // namespace arhost::test

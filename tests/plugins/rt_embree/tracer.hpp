@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A scene, a camera and the plugin under test.
+#pragma once
+
+#include "plugin_under_test.hpp"
+#include "scene/arena.hpp"
+
+#include <sys/mman.h>
+
+#include <array>
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace arhost::test {
+
+using Options = std::map<std::string, std::string>;
+using Pixel = std::array<int, 4>;
+
+inline arhost_intrinsics pinhole(std::uint32_t width = 200, std::uint32_t height = 150, double focal = 200) {
+    return {sizeof(arhost_intrinsics),
+            width,
+            height,
+            ARHOST_DISTORTION_NONE,
+            focal,
+            focal,
+            (width - 1) / 2.0,
+            (height - 1) / 2.0,
+            0,
+            0,
+            {}};
+}
+
+inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> look_at, std::array<double, 3> up,
+                            const arhost_intrinsics &intrinsics = pinhole()) {
+    arhost_camera c{sizeof c, 0, {}, {}, {}, intrinsics};
+    std::copy(eye.begin(), eye.end(), c.eye);
+    std::copy(look_at.begin(), look_at.end(), c.look_at);
+    std::copy(up.begin(), up.end(), c.up);
+    return c;
+}
+
+// An image in memory whose every other byte must stay as it is.
+class Picture {
+public:
+    explicit Picture(const arhost_intrinsics &in)
+        : width(in.width), height(in.height), stride_((4 * width + 63) / 64 * 64 + 64),
+          buffer_(std::size_t{stride_} * height) {}
+
+    arhost_image image() { return {sizeof(arhost_image), stride_, width, height, buffer_.data()}; }
+    Pixel at(std::uint32_t x, std::uint32_t y) const {
+        const std::uint8_t *p = buffer_.data() + std::size_t{stride_} * y + 4 * x;
+        return {p[0], p[1], p[2], p[3]};
+    }
+    int alpha(std::uint32_t x, std::uint32_t y) const { return at(x, y)[3]; }
+    std::vector<Pixel> pixels() const {
+        std::vector<Pixel> all;
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                all.push_back(at(x, y));
+        return all;
+    }
+    // How many pixels have each alpha.
+    std::map<int, int> alphas() const {
+        std::map<int, int> counts;
+        for (const Pixel &pixel : pixels())
+            ++counts[pixel[3]];
+        return counts;
+    }
+    bool only_pixels_written() const {
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t i = 4 * width; i < stride_; ++i)
+                if (buffer_.data()[std::size_t{stride_} * y + i] != 0xa5)
+                    return false;
+        return buffer_.intact();
+    }
+
+    std::uint32_t width, height;
+    arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0};
+
+private:
+    std::uint32_t stride_;
+    GuardedBuffer buffer_;
+};
+
+// The arena lies in memory that cannot be written: whoever tries, crashes.
+class Tracer {
+public:
+    explicit Tracer(scene::ArenaBuilder builder, const Options &options = {})
+        : plugin_("rt_embree"), size_(builder.byte_size()) {
+        memory_ = mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        std::move(builder).write({static_cast<std::byte *>(memory_), size_});
+        EXPECT_EQ(scene::validate({static_cast<std::byte *>(memory_), size_}), "");
+        mprotect(memory_, size_, PROT_READ);
+        EXPECT_EQ(plugin_.create(options), ARHOST_OK) << plugin_.log();
+    }
+    ~Tracer() {
+        stop();
+        plugin_.destroy();
+        munmap(memory_, size_);
+    }
+    Tracer(const Tracer &) = delete;
+    Tracer &operator=(const Tracer &) = delete;
+
+    arhost_status start(const arhost_intrinsics &in) {
+        stop();
+        const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &scene(), &in};
+        const arhost_status status = functions().start(plugin_.instance(), &setup);
+        started_ = status == ARHOST_OK;
+        return status;
+    }
+    arhost_status try_render(const arhost_camera &camera, Picture &picture) {
+        const arhost_render_request request{sizeof request, 0, 0, 0, camera};
+        const arhost_image image = picture.image();
+        return functions().render(plugin_.instance(), &request, &image, &picture.info);
+    }
+    Picture render(const arhost_camera &camera) {
+        EXPECT_EQ(start(camera.intrinsics), ARHOST_OK) << plugin_.log();
+        Picture picture(camera.intrinsics);
+        EXPECT_EQ(try_render(camera, picture), ARHOST_OK) << plugin_.log();
+        EXPECT_TRUE(picture.only_pixels_written());
+        return picture;
+    }
+
+    PluginUnderTest &plugin() { return plugin_; }
+    const arhost_scene &scene() const { return *static_cast<const arhost_scene *>(memory_); }
+
+private:
+    void stop() {
+        if (started_)
+            functions().stop(plugin_.instance());
+        started_ = false;
+    }
+    const arhost_raytracer &functions() const { return plugin_.functions<arhost_raytracer>(); }
+
+    PluginUnderTest plugin_;
+    std::size_t size_;
+    void *memory_;
+    bool started_ = false;
+};
+
+// Materials and meshes.
+inline arhost_material flat(float r, float g, float b) { // its colour without any light; needs ambient 1
+    return {ARHOST_DIFFUSE, 0, {r, g, b}, {}, {}, 1, {}, 0};
+}
+inline arhost_material diffuse(float r, float g, float b) {
+    return {ARHOST_DIFFUSE, 0, {r, g, b}, {r, g, b}, {}, 1, {}, 0};
+}
+inline arhost_material mirror(float reflectivity) {
+    return {ARHOST_MIRROR, 0, {}, {}, {}, 1, {reflectivity, reflectivity, reflectivity}, 0};
+}
+inline arhost_light light(float x, float y, float z, float intensity, arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
+    return {ARHOST_POINT_LIGHT, falloff, {x, y, z}, {intensity, intensity, intensity}};
+}
+// A square in the plane z = `z`, its front up.
+inline scene::TriangleMesh square(float half_side, float z = 0) {
+    const float s = half_side;
+    return {{{-s, -s, z}, {s, -s, z}, {s, s, z}, {-s, s, z}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
+}
+inline scene::TriangleMesh cube(float half_side) {
+    scene::TriangleMesh mesh;
+    for (int corner = 0; corner < 8; ++corner)
+        mesh.positions.push_back({corner & 1 ? half_side : -half_side, corner & 2 ? half_side : -half_side,
+                                  corner & 4 ? half_side : -half_side});
+    mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    return mesh;
+}
+
+} // namespace arhost::test
