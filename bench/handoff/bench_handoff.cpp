@@ -19,14 +19,18 @@ using namespace std::chrono_literals;
 
 namespace {
 
-std::int64_t now_ns() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+std::int64_t now_ns() {
+    return std::chrono::steady_clock::now().time_since_epoch().count();
+}
 
 struct Latencies {
     std::vector<std::int64_t> there, back; // ns
     void print(const char *name) {
         const auto percentile = [](std::vector<std::int64_t> &samples, double share) {
             std::sort(samples.begin(), samples.end());
-            return static_cast<double>(samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1))]) * 1e-3;
+            return static_cast<double>(
+                       samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1))]) *
+                   1e-3;
         };
         std::printf("%-28s %8.1f %8.1f   %8.1f %8.1f\n", name, percentile(there, 0.5), percentile(there, 0.99),
                     percentile(back, 0.5), percentile(back, 0.99));

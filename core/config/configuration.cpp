@@ -19,7 +19,8 @@ std::int64_t default_of(std::string_view path) {
     return value;
 }
 
-std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum, std::int64_t maximum) {
+std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum,
+                                std::int64_t maximum) {
     const std::string_view name = path.substr(path.rfind('.') == std::string_view::npos ? 0 : path.rfind('.') + 1);
     const auto found = map.find(name);
     return found ? found->integer(minimum, maximum) : default_of(path);
@@ -36,16 +37,18 @@ supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
         static_cast<std::uint32_t>(integer_or_default(*node, "restart.proven_after_frames", 1, 1'000'000));
     limits.quarantine_after =
         static_cast<std::uint32_t>(integer_or_default(*node, "restart.quarantine_after", 1, 1'000'000));
-    limits.first_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, longest_ms));
-    limits.longest_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, longest_ms));
+    limits.first_delay =
+        std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, longest_ms));
+    limits.longest_delay =
+        std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, longest_ms));
     return limits;
 }
 
 ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path,
                                        const PluginPath &plugin_path, const supervise::RestartLimits &restart) {
     node.allow_keys(keys_of(schema_path));
-    ComponentConfiguration component{node, {plugin_path.resolve(node.require("plugin"))}, node.find("path"),
-                                     node.find("options"), {}};
+    ComponentConfiguration component{
+        node, {plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}};
     if (const auto fallback = node.find("fallback"))
         component.plugins.push_back(plugin_path.resolve(*fallback));
     // "options:" with nothing behind it is an empty map.
@@ -74,7 +77,8 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plu
                                    marker.require("side_mm").real(0.01, 1e6)});
     }
     if (tracker.markers.empty() || tracker.markers.size() > ARHOST_MAX_MARKERS)
-        markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) + " markers, as in [{id: 0, side_mm: 80}]");
+        markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) +
+                     " markers, as in [{id: 0, side_mm: 80}]");
     tracker.hold_frames = static_cast<std::uint32_t>(integer_or_default(node, "tracker.hold_frames", 0, 1'000'000));
     return tracker;
 }
@@ -112,8 +116,8 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         configuration.tracker = parse_tracker(*node, plugin_path, restart);
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
-        configuration.raytracer =
-            RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart), scene.input_path(), scene};
+        configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart),
+                                                         scene.input_path(), scene};
         if (!configuration.tracker)
             node->fail("a ray tracer needs a 'tracker' that tells where the camera is");
         if (!std::filesystem::is_regular_file(configuration.raytracer->scene))

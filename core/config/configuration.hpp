@@ -22,7 +22,7 @@ enum class Mode { lockstep, live };
 
 // What every component has.
 struct ComponentConfiguration {
-    yaml::Node node; // its map, for errors
+    yaml::Node node;                            // its map, for errors
     std::vector<std::filesystem::path> plugins; // the shared object, then its fallback
     std::optional<yaml::Node> path, options;
     supervise::Limits limits;

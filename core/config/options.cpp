@@ -17,7 +17,8 @@ ring::OptionValue value_of(const ring::OptionDeclaration &declared, const yaml::
         value.integer = node.boolean();
         break;
     case ARHOST_OPTION_INTEGER:
-        value.integer = bounded ? node.integer(as_integer(declared.minimum), as_integer(declared.maximum)) : node.integer();
+        value.integer =
+            bounded ? node.integer(as_integer(declared.minimum), as_integer(declared.maximum)) : node.integer();
         break;
     case ARHOST_OPTION_REAL:
         value.real = bounded ? node.real(declared.minimum, declared.maximum) : node.real();
@@ -43,7 +44,8 @@ ring::OptionValue value_of(const ring::OptionDeclaration &declared, const yaml::
 ring::OptionValue default_of(const ring::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, 0, 0.0, ""};
-    const yaml::Node node = yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
+    const yaml::Node node =
+        yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
     return value_of(declared, node);
 }
 

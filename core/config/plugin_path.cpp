@@ -34,7 +34,8 @@ fs::path PluginPath::resolve(const yaml::Node &node) const {
             return file;
     const std::vector<fs::path> files = all();
     std::vector<std::string> known(files.size());
-    std::transform(files.begin(), files.end(), known.begin(), [](const fs::path &file) { return file.stem().string(); });
+    std::transform(files.begin(), files.end(), known.begin(),
+                   [](const fs::path &file) { return file.stem().string(); });
     const std::vector<std::string_view> candidates(known.begin(), known.end());
     const std::string near = yaml::nearest(name, candidates);
     std::string folders;

@@ -13,7 +13,10 @@ using enum Type;
 const std::vector<Key> &table() {
     static const std::vector<Key> keys = {
         {"version", integer, true, "", "The version of this format: 1."},
-        {"mode", text, false, "lockstep",
+        {"mode",
+         text,
+         false,
+         "lockstep",
          "`lockstep`: every frame, in order, the same result each time. `live`: the newest frame wins.",
          {"lockstep", "live"}},
         {"frames", integer, false, "0", "Stop after so many frames; 0: at the source's end."},
@@ -21,7 +24,8 @@ const std::vector<Key> &table() {
 
         {"source", map, true, "", "Where frames come from."},
         {"source.plugin", text, true, "", "A plugin's name (`source_synthetic`), or a path to a `.so`."},
-        {"source.path", input_path, false, "", "The file, or files by a printf pattern, for plugins that read files."},
+        {"source.path", input_path, false, "",
+         "The file, or files by a printf pattern, for plugins that read files."},
         {"source.fps", real, false, "0", "Frames a second; 0: the source's own."},
         {"source.options", free_map, false, "", "The plugin's own options: `arhost plugins --options`."},
         {"source.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
@@ -36,9 +40,14 @@ const std::vector<Key> &table() {
         {"camera.cx", real, false, "(width − 1) / 2", "Principal point in px; pixel centres are at integers."},
         {"camera.cy", real, false, "(height − 1) / 2", "Principal point in px."},
         {"camera.distortion", map, false, "none", "The lens."},
-        {"camera.distortion.model", text, true, "", "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
+        {"camera.distortion.model",
+         text,
+         true,
+         "",
+         "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
          {"none", "brown", "fisheye"}},
-        {"camera.distortion.coefficients", reals, false, "", "As OpenCV orders them: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."},
+        {"camera.distortion.coefficients", reals, false, "",
+         "As OpenCV orders them: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."},
 
         {"tracker", map, false, "no tracking", "What finds the markers."},
         {"tracker.plugin", text, true, "", "A plugin's name (`tracker_aruco`), or a path to a `.so`."},
@@ -46,7 +55,8 @@ const std::vector<Key> &table() {
         {"tracker.markers", list, true, "", "The markers; the first of them that is in view anchors the scene."},
         {"tracker.markers[].id", integer, true, "", "The marker's number in its dictionary."},
         {"tracker.markers[].side_mm", real, true, "", "Side of its black square, in mm."},
-        {"tracker.hold_frames", integer, false, "0", "For so many frames after the markers are lost the last pose is held."},
+        {"tracker.hold_frames", integer, false, "0",
+         "For so many frames after the markers are lost the last pose is held."},
         {"tracker.fallback", text, false, "", "The plugin to go on with when this one is given up."},
         {"tracker.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"tracker.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
@@ -59,8 +69,10 @@ const std::vector<Key> &table() {
         {"raytracer.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"raytracer.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
 
-        {"coordinates", map, false, "from the scene's axes", "From the marker's axes to the scene's (docs/camera.md)."},
-        {"coordinates.ar", integer, false, "1", "Profile of the tracker's axes: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other."},
+        {"coordinates", map, false, "from the scene's axes",
+         "From the marker's axes to the scene's (docs/camera.md)."},
+        {"coordinates.ar", integer, false, "1",
+         "Profile of the tracker's axes: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other."},
         {"coordinates.rt", integer, false, "1", "Profile of the scene's axes."},
         {"coordinates.rotations", list, false, "", "One or two rotations, used where the profiles differ."},
         {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
@@ -78,9 +90,11 @@ const std::vector<Key> &table() {
          "When tracking and tracing take longer than this, in ms, the plain video goes on meanwhile."},
 
         {"restart", map, false, "", "How components that die are started again."},
-        {"restart.proven_after_frames", integer, false, "10", "A component that has made so many frames restarts at once, however often it dies."},
+        {"restart.proven_after_frames", integer, false, "10",
+         "A component that has made so many frames restarts at once, however often it dies."},
         {"restart.quarantine_after", integer, false, "5", "Before that, so many failures end it."},
-        {"restart.first_delay_ms", integer, false, "250", "Wait after the first failure, in ms; it doubles each time."},
+        {"restart.first_delay_ms", integer, false, "250",
+         "Wait after the first failure, in ms; it doubles each time."},
         {"restart.longest_delay_ms", integer, false, "10000", "Longest wait, in ms."},
 
         {"stats", output_path, false, "", "Where the statistics are written at the end (JSON)."},
@@ -182,7 +196,9 @@ Json json_schema_of_map(std::string_view path) {
 
 } // namespace
 
-std::span<const Key> schema() { return table(); }
+std::span<const Key> schema() {
+    return table();
+}
 
 std::vector<std::string_view> keys_of(std::string_view path) {
     std::vector<std::string_view> keys;
@@ -202,9 +218,9 @@ const Key &key_at(std::string_view path) {
 std::string schema_as_markdown() {
     std::string text = "| key | type | default | meaning |\n| --- | --- | --- | --- |\n";
     for (const Key &key : table()) {
-        const std::string standard = key.required                  ? "**required**"
+        const std::string standard = key.required                ? "**required**"
                                      : key.default_value.empty() ? "—"
-                                                                   : std::string(key.default_value);
+                                                                 : std::string(key.default_value);
         text += "| `" + std::string(key.path) + "` | " + type_name(key.type) + " | " + standard + " | " +
                 std::string(key.meaning) + " |\n";
     }

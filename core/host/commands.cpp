@@ -16,8 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path own_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
-fs::path built_in_plugins() { return (own_folder() / "../lib/arhost").lexically_normal(); }
+fs::path own_folder() {
+    return fs::read_symlink("/proc/self/exe").parent_path();
+}
+fs::path built_in_plugins() {
+    return (own_folder() / "../lib/arhost").lexically_normal();
+}
 
 supervise::Context make_context(ring::Reactor &reactor, supervise::Launcher &launcher, Console &console) {
     return {reactor, launcher, own_folder() / "arhost-worker",
@@ -28,14 +32,14 @@ supervise::Context make_context(ring::Reactor &reactor, supervise::Launcher &lau
 
 // The options of the dissertation's figure 7 stand above the file's `coordinates:`.
 std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
-    const auto given = [](const double (&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
+    const auto given = [](const double(&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
     if (!arguments.ar && !arguments.rt && !arguments.g1 && !arguments.g2 && !given(arguments.axis1) &&
         !given(arguments.axis2))
         return std::nullopt;
     camera::Coordinates coordinates;
     coordinates.ar = arguments.ar.value_or(coordinates.ar);
     coordinates.rt = arguments.rt.value_or(coordinates.rt);
-    const auto axis = [](const double (&a)[3]) { return glm::dvec3(a[0], a[1], a[2]); };
+    const auto axis = [](const double(&a)[3]) { return glm::dvec3(a[0], a[1], a[2]); };
     if (arguments.g1)
         coordinates.rotations.push_back({*arguments.g1, axis(arguments.axis1)});
     if (arguments.g2)
@@ -70,7 +74,9 @@ config::Configuration read_configuration(const Arguments &arguments) {
 double cpu_seconds_of_host() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+    const auto seconds = [](const timeval &t) {
+        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
     return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
@@ -123,7 +129,8 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
                 continue;
             if (!stopped_by_signal) {
                 first_signal = now;
-                console.log(ARHOST_SEVERITY_INFO, "arhost", "stopping: the frames under way and the files are finished first");
+                console.log(ARHOST_SEVERITY_INFO, "arhost",
+                            "stopping: the frames under way and the files are finished first");
             }
             stopped_by_signal = true;
             pipeline.interrupt();
@@ -135,7 +142,9 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     if (configuration.stats && pipeline.statistics().frames_in > 0 &&
         !write_statistics(*configuration.stats, console,
-                          report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host()).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"))
+                          report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host())
+                                  .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                              "\n"))
         return run_failed;
     if (!whole)
         return pipeline.failed_by_configuration() ? bad_configuration : run_failed;
@@ -156,8 +165,10 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
                 node.fail(*reason);
             const auto &plugin = std::get<ring::PluginDescription>(result);
             if (plugin.kind != kind)
-                node.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " + ring::to_text(kind));
-            config::resolve_options(plugin, i == 0 ? component.options : std::nullopt, component.path, component.node);
+                node.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " +
+                          ring::to_text(kind));
+            config::resolve_options(plugin, i == 0 ? component.options : std::nullopt, component.path,
+                                    component.node);
         }
     };
     check_component(configuration.source, ARHOST_KIND_SOURCE);
@@ -196,12 +207,14 @@ int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher)
             continue;
         }
         const auto &plugin = std::get<ring::PluginDescription>(result);
-        std::printf("%-18s %-10s %-8s %s\n", plugin.id.c_str(), ring::to_text(plugin.kind), plugin.version.c_str(), file.c_str());
+        std::printf("%-18s %-10s %-8s %s\n", plugin.id.c_str(), ring::to_text(plugin.kind), plugin.version.c_str(),
+                    file.c_str());
         std::printf("%-18s %s\n", "", plugin.description.c_str());
         if (!with_options)
             continue;
         for (const ring::OptionDeclaration &option : plugin.options) {
-            const std::string standard = option.default_value ? "default '" + *option.default_value + "'" : "required";
+            const std::string standard =
+                option.default_value ? "default '" + *option.default_value + "'" : "required";
             std::printf("    %-20s %s (%s)\n", option.key.c_str(), option.help.c_str(), standard.c_str());
             if (!option.choices.empty()) {
                 std::printf("    %-20s one of:", "");

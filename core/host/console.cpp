@@ -27,7 +27,9 @@ Console::Console(bool verbose)
     logger_->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
 }
 
-Console::~Console() { clear_line(); }
+Console::~Console() {
+    clear_line();
+}
 
 void Console::clear_line() {
     if (line_shown_)
@@ -36,16 +38,16 @@ void Console::clear_line() {
 }
 
 void Console::log(arhost_severity severity, const std::string &component, const std::string &text) {
-    const auto level = severity >= ARHOST_SEVERITY_ERROR       ? spdlog::level::err
+    const auto level = severity >= ARHOST_SEVERITY_ERROR     ? spdlog::level::err
                        : severity == ARHOST_SEVERITY_WARNING ? spdlog::level::warn
                        : severity == ARHOST_SEVERITY_INFO    ? spdlog::level::info
-                                                    : spdlog::level::debug;
+                                                             : spdlog::level::debug;
     if (!logger_->should_log(level))
         return;
     clear_line();
     const char *blame = severity == ARHOST_SEVERITY_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
                         : severity == ARHOST_SEVERITY_HOST_MISBEHAVING ? "the host misbehaves: "
-                                                              : "";
+                                                                       : "";
     logger_->log(level, "{}: {}{}", component, blame, one_line(text));
 }
 

@@ -22,7 +22,8 @@ const char *problem_with(const arhost_marker &marker) {
     for (const auto &corner : marker.corners_px)
         if (!all_finite(corner))
             return "a marker's corner is not finite";
-    if (!all_finite(marker.mt_alternative) || !std::isfinite(marker.reprojection_px) || !std::isfinite(marker.ambiguity))
+    if (!all_finite(marker.mt_alternative) || !std::isfinite(marker.reprojection_px) ||
+        !std::isfinite(marker.ambiguity))
         return "a marker's number is not finite";
     return camera::problem_with(marker.mt);
 }
@@ -36,7 +37,8 @@ const char *take_tracker_result(std::span<const std::byte> slot, const std::set<
     const std::uint32_t count = result.marker_count;
     if (count > ARHOST_MAX_MARKERS)
         return "it reports more markers than fit";
-    std::memcpy(record.markers, slot.data() + offsetof(arhost_tracker_result, markers), count * sizeof(arhost_marker));
+    std::memcpy(record.markers, slot.data() + offsetof(arhost_tracker_result, markers),
+                count * sizeof(arhost_marker));
     record.marker_count = 0;
     std::set<std::int32_t> seen;
     for (std::uint32_t i = 0; i < count; ++i) {

@@ -25,12 +25,12 @@ struct Frame {
     };
 
     Stage stage = Stage::to_track;
-    bool overtaken = false; // live: a newer frame has been shown; forget it once its worker lets go
-    bool held = false;      // its camera is that of an earlier frame
+    bool overtaken = false;  // live: a newer frame has been shown; forget it once its worker lets go
+    bool held = false;       // its camera is that of an earlier frame
     std::uint32_t tries = 0; // by the stage that has it, ended by the worker's death
-    Lease pixels;           // in the source's memory
-    Lease result;           // in the tracker's, while it has the frame
-    Lease overlay;          // in the ray tracer's
+    Lease pixels;            // in the source's memory
+    Lease result;            // in the tracker's, while it has the frame
+    Lease overlay;           // in the ray tracer's
     arhost_render_info render{};
     arhost_record record{};
     Clock::time_point received;

@@ -29,8 +29,9 @@ int main(int argc, char **argv) {
     using namespace arhost::host;
     prepare_process();
 
-    CLI::App app("arhost lays ray-traced objects over live video. Its trackers, ray tracers, sources and outputs are\n"
-                 "plugins, each in a process of its own; a YAML file says which run.");
+    CLI::App app(
+        "arhost lays ray-traced objects over live video. Its trackers, ray tracers, sources and outputs are\n"
+        "plugins, each in a process of its own; a YAML file says which run.");
     app.set_version_flag("--version", "arhost " ARHOST_VERSION);
     app.require_subcommand(0, 1);
     app.get_formatter()->column_width(34);
@@ -49,7 +50,8 @@ int main(int argc, char **argv) {
         ->check(CLI::Range(0.0, 1e15));
     CLI::Option_group &axes = *app.add_option_group(
         "Coordinates", "The dissertation's options (docs/camera.md); they stand above 'coordinates:' in the file");
-    axes.add_option("--ar", arguments.ar, "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");
+    axes.add_option("--ar", arguments.ar,
+                    "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");
     axes.add_option("--rt", arguments.rt, "Profile of the scene, likewise");
     axes.add_option("--g1,--g", arguments.g1, "First rotation, degrees");
     axes.add_option("--x1,--x", arguments.axis1[0], "Its axis");
@@ -60,7 +62,8 @@ int main(int argc, char **argv) {
     axes.add_option("--y2", arguments.axis2[1]);
     axes.add_option("--z2", arguments.axis2[2]);
 
-    CLI::App *check_command = app.add_subcommand("check", "Check a configuration, its plugins' options and its scene");
+    CLI::App *check_command =
+        app.add_subcommand("check", "Check a configuration, its plugins' options and its scene");
     check_command->add_option("FILE", arguments.file, "The configuration")->required();
     add_configuration_options(*check_command);
 

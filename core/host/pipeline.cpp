@@ -112,7 +112,8 @@ void Pipeline::make_source() {
         else if (ready.contains("intrinsics"))
             intrinsics_ = intrinsics_from_json(ready["intrinsics"]);
         else if (configuration_.tracker)
-            source.node.fail("this source does not know its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
+            source.node.fail(
+                "this source does not know its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
         if (configuration_.tracker) {
             try {
                 camera::check_size(intrinsics_, format.width, format.height);
@@ -169,10 +170,12 @@ void Pipeline::make_raytracer() {
         check_kind(plugin, ARHOST_KIND_RAYTRACER, raytracer.node);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS))
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
-                         plugin.id + " can't trace through a distorted lens; the overlay will be off towards the corners");
+                         plugin.id +
+                             " can't trace through a distorted lens; the overlay will be off towards the corners");
         return Component::Create{
             {{"options", options_for(plugin, raytracer, candidate)},
-             {"setup", {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(intrinsics_)}}}},
+             {"setup",
+              {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(intrinsics_)}}}},
             {arena_.fd()}};
     };
     hooks.ready = [this](const Json &) {
@@ -183,7 +186,8 @@ void Pipeline::make_raytracer() {
     hooks.lost = [this](const std::vector<Command> &unanswered) {
         on_stage_lost(unanswered, Frame::Stage::to_render, "raytracer");
     };
-    raytracer_ = std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits, std::move(hooks));
+    raytracer_ =
+        std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits, std::move(hooks));
 }
 
 void Pipeline::make_outputs() {
@@ -194,7 +198,8 @@ void Pipeline::make_outputs() {
     for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
         const config::ComponentConfiguration &output = configuration_.outputs[i];
         std::string name = output.plugins.front().stem().string();
-        if (std::any_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return sink->component->name() == name; }))
+        if (std::any_of(sinks_.begin(), sinks_.end(),
+                        [&](const auto &sink) { return sink->component->name() == name; }))
             name += "#" + std::to_string(i);
         sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
         SinkQueue *sink = sinks_.back().get();
@@ -233,7 +238,8 @@ void Pipeline::make_outputs() {
             give_up(name, output.node, reason, by_configuration);
             give_up_sink(*sink);
         };
-        sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, std::move(hooks));
+        sink->component =
+            std::make_unique<Component>(context_, name, output.plugins, output.limits, std::move(hooks));
         sink->component->start();
     }
 }
@@ -281,9 +287,10 @@ void Pipeline::pump() {
 }
 
 void Pipeline::enter_next_phase() {
-    const auto settled = [](const std::unique_ptr<Component> &component) { return !component || component->running(); };
-    if (phase_ == Phase::source && source_->running() && !scene_loading_ &&
-        (!configuration_.raytracer || arena_)) {
+    const auto settled = [](const std::unique_ptr<Component> &component) {
+        return !component || component->running();
+    };
+    if (phase_ == Phase::source && source_->running() && !scene_loading_ && (!configuration_.raytracer || arena_)) {
         if (configuration_.tracker) {
             make_tracker();
             tracker_->start();
@@ -300,9 +307,8 @@ void Pipeline::enter_next_phase() {
         make_outputs(); // last, so that no file is touched by a run that can't begin
         phase_ = Phase::outputs;
     }
-    if (phase_ == Phase::outputs && std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) {
-            return settled(sink->component);
-        }))
+    if (phase_ == Phase::outputs &&
+        std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return settled(sink->component); }))
         phase_ = Phase::running;
 }
 
@@ -403,7 +409,8 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     }
     frame.tries = 0;
     if (result.status < 0) {
-        context_.log(ARHOST_SEVERITY_WARNING, "tracker", "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
+                     "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
         return pass(frame, "tracker");
     }
     const char *problem = take_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
@@ -414,8 +421,8 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     }
     // The first in the order of the configuration; trackers report in that order.
     const std::span markers(frame.record.markers, frame.record.marker_count);
-    const auto anchor =
-        std::find_if(markers.begin(), markers.end(), [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
+    const auto anchor = std::find_if(markers.begin(), markers.end(),
+                                     [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
     if (anchor != markers.end()) {
         ++statistics_.tracked;
         last_camera_ = {command.sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
@@ -586,14 +593,16 @@ void Pipeline::compose(const Frame &frame, std::span<std::byte> slot) {
     ImageView overlay;
     Region region;
     if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
-        overlay = {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
+        overlay = {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
+                   overlay_stride(format_->width)};
         region = region_of(frame.render, format_->width, format_->height);
     }
     // The markers past marker_count are left as they are: they carry no meaning.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
     std::memcpy(slot.data(), &frame.record, used);
     composite(*format_, planes, overlay, region,
-              {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset, OutputSlot::stride(format_->width)});
+              {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
+               OutputSlot::stride(format_->width)});
     statistics_.stages["composite"].add(Clock::now() - begin);
 }
 
@@ -651,7 +660,8 @@ void Pipeline::fail(const std::string &reason, bool by_configuration) {
     abandoned_ = abandoned_ || phase_ < Phase::running;
 }
 
-void Pipeline::give_up(const std::string &name, const yaml::Node &node, const std::string &reason, bool by_configuration) {
+void Pipeline::give_up(const std::string &name, const yaml::Node &node, const std::string &reason,
+                       bool by_configuration) {
     // What the configuration's own check said begins with its place in the file.
     const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--set");
     fail(located ? reason : node.where() + ": " + name + ": " + reason, by_configuration);

@@ -103,7 +103,7 @@ private:
     std::deque<Lease> reads_; // the slots of the reads under way, oldest first
     std::uint64_t next_read_ = 0;
     std::int64_t last_capture_ns_ = INT64_MIN;
-    bool ended_ = false;       // the source has said so, or shall give no more
+    bool ended_ = false; // the source has said so, or shall give no more
     bool interrupted_ = false;
     bool abandoned_ = false; // everything is to end at once
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;

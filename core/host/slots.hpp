@@ -62,6 +62,8 @@ inline Lease::~Lease() {
     if (pool_)
         pool_->taken_[index_] = false;
 }
-inline const supervise::RegionPointer &Lease::region() const { return pool_->region_; }
+inline const supervise::RegionPointer &Lease::region() const {
+    return pool_->region_;
+}
 
 } // namespace arhost::host

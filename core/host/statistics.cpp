@@ -45,7 +45,7 @@ double Statistics::fps() const {
 }
 
 Json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
-             double host_cpu_seconds) {
+            double host_cpu_seconds) {
     Json json = {{"frames",
                   {{"in", statistics.frames_in},
                    {"tracked", statistics.tracked},
@@ -68,7 +68,8 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
     for (const supervise::Component *component : components) {
         json["restarts"][component->name()] = component->restarts();
         for (const supervise::Component::Crash &crash : component->crashes()) {
-            Json entry = {{"component", component->name()}, {"plugin", component->description().id}, {"how", crash.how}};
+            Json entry = {
+                {"component", component->name()}, {"plugin", component->description().id}, {"how", crash.how}};
             if (crash.frame != supervise::Component::Crash::no_frame)
                 entry["frame"] = crash.frame;
             entry["log_tail"] = crash.log_tail;

@@ -31,10 +31,10 @@ private:
 };
 
 struct Statistics {
-    std::uint64_t frames_in = 0;      // given by the source
-    std::uint64_t tracked = 0;        // with at least one marker
-    std::uint64_t augmented = 0;      // composited with an overlay
-    std::uint64_t composited = 0;     // sent to the outputs, augmented or not
+    std::uint64_t frames_in = 0;                  // given by the source
+    std::uint64_t tracked = 0;                    // with at least one marker
+    std::uint64_t augmented = 0;                  // composited with an overlay
+    std::uint64_t composited = 0;                 // sent to the outputs, augmented or not
     std::map<std::string, std::uint64_t> dropped; // by the stage where it happened
     std::map<std::string, std::uint64_t> passed;  // went on unaugmented since this stage failed
     std::map<std::string, Timing> stages;         // by name: source, tracker, raytracer, composite, latency, …
@@ -44,6 +44,6 @@ struct Statistics {
 };
 
 nlohmann::ordered_json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
-                               double host_cpu_seconds);
+                              double host_cpu_seconds);
 
 } // namespace arhost::host

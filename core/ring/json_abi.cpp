@@ -7,7 +7,9 @@
 namespace arhost::ring {
 namespace {
 
-std::string text_or_empty(const char *text) { return text ? text : ""; }
+std::string text_or_empty(const char *text) {
+    return text ? text : "";
+}
 
 // A string of a message, of a sane length.
 std::string text_of(const Json &json, const char *key) {
@@ -30,8 +32,11 @@ Json to_json(const arhost_descriptor &d) {
     Json options = Json::array();
     for (std::uint32_t i = 0; i < d.option_count; ++i) {
         const arhost_option_descriptor &o = d.options[i];
-        Json option = {{"key", text_or_empty(o.key)}, {"type", o.type},       {"minimum", o.minimum},
-                       {"maximum", o.maximum},        {"help", text_or_empty(o.help)}};
+        Json option = {{"key", text_or_empty(o.key)},
+                       {"type", o.type},
+                       {"minimum", o.minimum},
+                       {"maximum", o.maximum},
+                       {"help", text_or_empty(o.help)}};
         if (o.default_value)
             option["default"] = o.default_value;
         option["choices"] = Json::array();
@@ -89,7 +94,8 @@ PluginDescription description_from_json(const Json &json) {
 Json to_json(const std::vector<OptionValue> &options) {
     Json json = Json::array();
     for (const OptionValue &o : options)
-        json.push_back({{"key", o.key}, {"type", o.type}, {"integer", o.integer}, {"real", o.real}, {"text", o.text}});
+        json.push_back(
+            {{"key", o.key}, {"type", o.type}, {"integer", o.integer}, {"real", o.real}, {"text", o.text}});
     return json;
 }
 
@@ -133,8 +139,8 @@ arhost_intrinsics intrinsics_from_json(const Json &json) {
 }
 
 Json to_json(const arhost_frame_format &f) {
-    return {{"pixel_format", f.pixel_format}, {"width", f.width},   {"height", f.height}, {"yuv_matrix", f.yuv_matrix},
-            {"yuv_range", f.yuv_range},       {"fps", f.fps}};
+    return {{"pixel_format", f.pixel_format}, {"width", f.width},         {"height", f.height},
+            {"yuv_matrix", f.yuv_matrix},     {"yuv_range", f.yuv_range}, {"fps", f.fps}};
 }
 
 arhost_frame_format format_from_json(const Json &json) {
@@ -151,13 +157,15 @@ arhost_frame_format format_from_json(const Json &json) {
         (yuv && (f.yuv_matrix < ARHOST_BT601 || f.yuv_matrix > ARHOST_BT709 || f.yuv_range < ARHOST_LIMITED_RANGE ||
                  f.yuv_range > ARHOST_FULL_RANGE)) ||
         !arhost_frame_layout(&f))
-        throw std::runtime_error("the frame format is not valid: pixel format " + std::to_string(f.pixel_format) + ", " +
-                                 std::to_string(f.width) + "x" + std::to_string(f.height) + " px, " +
+        throw std::runtime_error("the frame format is not valid: pixel format " + std::to_string(f.pixel_format) +
+                                 ", " + std::to_string(f.width) + "x" + std::to_string(f.height) + " px, " +
                                  std::to_string(f.fps) + " fps");
     return f;
 }
 
-Json to_json(const SlotLayout &layout) { return {{"slot_size", layout.slot_size}, {"count", layout.count}}; }
+Json to_json(const SlotLayout &layout) {
+    return {{"slot_size", layout.slot_size}, {"count", layout.count}};
+}
 
 SlotLayout layout_from_json(const Json &json) {
     return {json.at("slot_size").get<std::uint64_t>(), json.at("count").get<std::uint32_t>()};

@@ -69,6 +69,8 @@ Mapping SharedMemory::map(Access access) const {
     return Mapping(static_cast<std::byte *>(address), size_);
 }
 
-void SharedMemory::seal_future_writes() const { add_seals(fd_, F_SEAL_FUTURE_WRITE | F_SEAL_SEAL); }
+void SharedMemory::seal_future_writes() const {
+    add_seals(fd_, F_SEAL_FUTURE_WRITE | F_SEAL_SEAL);
+}
 
 } // namespace arhost::ring

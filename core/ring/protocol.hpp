@@ -10,7 +10,8 @@
 //   {type: attach, role, generation, layout} + memory     {type: attached, role, generation}
 //   {type: detach, generation}                            {type: detached, generation}
 //   {type: stop}                                          {type: stopped, status}
-//   at any time                                           {type: log, severity, text}, {type: progress, what, fraction},
+//   at any time                                           {type: log, severity, text}, {type: progress, what,
+//   fraction},
 //                                                         {type: failed, status, text}, {type: end}
 //   the loader: {type: load, scene}                       {type: loaded, …} + arena
 //
@@ -53,7 +54,7 @@ struct Result {
     std::uint64_t ticket;
     arhost_status status;
     std::uint32_t reserved;
-    std::int64_t busy_ns; // spent inside the plugin
+    std::int64_t busy_ns;      // spent inside the plugin
     arhost_frame_info frame;   // of read
     arhost_render_info render; // of render
 };
@@ -92,6 +93,8 @@ struct OutputSlot {
     }
 };
 // A ray tracer's slot: RGBA8 rows of this many bytes.
-inline std::uint32_t overlay_stride(std::uint32_t width) { return (width * 4 + 63) / 64 * 64; }
+inline std::uint32_t overlay_stride(std::uint32_t width) {
+    return (width * 4 + 63) / 64 * 64;
+}
 
 } // namespace arhost::ring

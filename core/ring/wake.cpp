@@ -13,7 +13,8 @@ namespace {
 // std::atomic::wait uses private futexes, which do not reach another process: the system call itself.
 long futex(const std::atomic<std::uint32_t> &word, int operation, std::uint32_t value, const timespec *timeout) {
     static_assert(sizeof(word) == sizeof(std::uint32_t));
-    return ::syscall(SYS_futex, reinterpret_cast<const std::uint32_t *>(&word), operation, value, timeout, nullptr, 0);
+    return ::syscall(SYS_futex, reinterpret_cast<const std::uint32_t *>(&word), operation, value, timeout, nullptr,
+                     0);
 }
 
 void pause_cpu() {
@@ -32,7 +33,9 @@ void wake(WakeWord &word) {
 }
 
 // SYNC POINT with wake: pairs with its release increment.
-std::uint32_t wake_count(const WakeWord &word) { return word.count.load(std::memory_order_acquire); }
+std::uint32_t wake_count(const WakeWord &word) {
+    return word.count.load(std::memory_order_acquire);
+}
 
 bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanoseconds timeout,
                    std::chrono::nanoseconds spin) {
@@ -41,7 +44,8 @@ bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanose
     while (wake_count(word) == seen && Clock::now() - begin < spin)
         pause_cpu();
     while (wake_count(word) == seen) {
-        const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(begin + timeout - Clock::now()).count();
+        const auto left =
+            std::chrono::duration_cast<std::chrono::nanoseconds>(begin + timeout - Clock::now()).count();
         if (left <= 0)
             return false;
         const timespec relative{left / 1'000'000'000, left % 1'000'000'000};

@@ -23,7 +23,9 @@ Component::Component(Context &context, std::string name, std::vector<std::filesy
     : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
       hooks_(std::move(hooks)), policy_(limits.restart) {}
 
-void Component::start() { spawn(); }
+void Component::start() {
+    spawn();
+}
 
 void Component::spawn() {
     state_ = State::starting;
@@ -159,11 +161,9 @@ void Component::on_ready(const Json &body) {
     region.layout = layout;
     region.generation = next_generation_++;
     region.memory = SharedMemory::create(("arhost-" + name_).c_str(), layout.byte_size());
-    process_->send_in_turn({{"type", "attach"},
-                            {"role", "output"},
-                            {"generation", region.generation},
-                            {"layout", to_json(layout)}},
-                           {region.memory.fd()});
+    process_->send_in_turn(
+        {{"type", "attach"}, {"role", "output"}, {"generation", region.generation}, {"layout", to_json(layout)}},
+        {region.memory.fd()});
 }
 
 void Component::on_attached(const Json &body) {
@@ -269,7 +269,8 @@ void Component::try_again(const std::string &reason) {
 
 void Component::give_up(const std::string &reason, bool by_configuration) {
     if (candidate_ + 1 < plugins_.size()) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
+        context_.log(ARHOST_SEVERITY_WARNING, name_,
+                     reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
         policy_ = RestartPolicy(limits_.restart);
         ++restarts_;

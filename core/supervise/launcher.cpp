@@ -110,9 +110,11 @@ void reap(int socket, std::set<pid_t> &spawned) {
         if (reply.exit.pid <= 0)
             return;
         if (spawned.erase(reply.exit.pid) == 0)
-            continue; // the orphan of a worker
+            continue;                     // the orphan of a worker
         ::kill(-reply.exit.pid, SIGKILL); // what it has forked and left behind
-        const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+        const auto seconds = [](const timeval &t) {
+            return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+        };
         reply.exit.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
         send_struct(socket, reply);
     }

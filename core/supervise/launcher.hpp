@@ -18,10 +18,10 @@ namespace arhost::supervise {
 // A process that has just been started.
 struct Spawned {
     pid_t pid = 0;
-    ring::UniqueFd pidfd;     // readable once it is dead
-    ring::Channel channel;    // its descriptor 3
-    ring::UniqueFd doorbell;  // its descriptor 4
-    ring::UniqueFd output;    // what it writes to stdout and stderr
+    ring::UniqueFd pidfd;    // readable once it is dead
+    ring::Channel channel;   // its descriptor 3
+    ring::UniqueFd doorbell; // its descriptor 4
+    ring::UniqueFd output;   // what it writes to stdout and stderr
 };
 
 struct Exit {

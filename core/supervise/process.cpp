@@ -93,10 +93,13 @@ void Process::end(const std::string &reason) {
         return;
     end_reason_ = reason;
     signal_process(spawned_.pidfd, SIGABRT);
-    kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(100), [this] { kill_now(); });
+    kill_deadline_ =
+        context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(100), [this] { kill_now(); });
 }
 
-void Process::kill_now() { signal_process(spawned_.pidfd, SIGKILL); }
+void Process::kill_now() {
+    signal_process(spawned_.pidfd, SIGKILL);
+}
 
 double Process::cpu_seconds() const {
     clockid_t clock;
@@ -118,7 +121,7 @@ void Process::take_messages(int most) {
             // Its death follows most times; a worker that only closed its end is useless.
             if (!ending())
                 kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
-                                                 [this] { end("closed its control channel"); });
+                                                     [this] { end("closed its control channel"); });
             return;
         case ReceiveState::breach:
             return end("broke the contract: it sent a malformed message");

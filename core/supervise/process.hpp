@@ -17,7 +17,8 @@
 
 namespace arhost::supervise {
 
-using LogFunction = std::function<void(arhost_severity severity, const std::string &component, const std::string &text)>;
+using LogFunction =
+    std::function<void(arhost_severity severity, const std::string &component, const std::string &text)>;
 
 // What every component of a host shares.
 struct Context {

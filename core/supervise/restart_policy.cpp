@@ -18,7 +18,8 @@ std::optional<std::chrono::milliseconds> RestartPolicy::died(double jitter) {
     for (std::uint32_t i = 1; i < failures_ && delay < limits_.longest_delay; ++i)
         delay *= 2;
     delay = std::min(delay, limits_.longest_delay);
-    return delay + std::chrono::milliseconds(static_cast<std::int64_t>(static_cast<double>(delay.count()) * jitter / 4));
+    return delay +
+           std::chrono::milliseconds(static_cast<std::int64_t>(static_cast<double>(delay.count()) * jitter / 4));
 }
 
 } // namespace arhost::supervise

@@ -20,7 +20,8 @@ class HostGone : public std::runtime_error {
 
 class Link {
 public:
-    Link(ring::Channel channel, ring::UniqueFd doorbell) : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
+    Link(ring::Channel channel, ring::UniqueFd doorbell)
+        : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
 
     // Waits for the next control message; throws HostGone.
     ring::Message receive() const;
@@ -30,7 +31,9 @@ public:
 
     // Maps the pages that came with `open`; before this, there are no rings.
     void map_pages(ring::Message &open);
-    bool cancelled() const { return host_page_ && host_page_.as<ring::HostPage>().cancelled.load(std::memory_order_relaxed) != 0; }
+    bool cancelled() const {
+        return host_page_ && host_page_.as<ring::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
+    }
 
     // The next command; nullopt after `timeout` without one. Throws HostGone.
     std::optional<ring::Command> next(std::chrono::milliseconds timeout);
@@ -54,7 +57,8 @@ private:
     // Relaxed: the host reads it after this process has died.
     void mark(ring::Call call) const {
         if (worker_page_)
-            worker_page_.as<ring::WorkerPage>().call.store(static_cast<std::uint32_t>(call), std::memory_order_relaxed);
+            worker_page_.as<ring::WorkerPage>().call.store(static_cast<std::uint32_t>(call),
+                                                           std::memory_order_relaxed);
     }
 
     ring::Channel channel_;

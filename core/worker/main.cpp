@@ -24,8 +24,8 @@ constexpr int control_fd = 3, doorbell_fd = 4;
 class HostSide {
 public:
     explicit HostSide(Link &link)
-        : link_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost", ARHOST_VERSION, this, &on_log,
-                             &on_progress, &on_cancelled, &on_extension} {}
+        : link_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost",      ARHOST_VERSION, this,
+                             &on_log,      &on_progress,       &on_cancelled, &on_extension} {}
     const arhost_host *get() const { return &host_; }
     std::string last_error() const {
         std::lock_guard lock(mutex_);
@@ -92,7 +92,8 @@ private:
         arhost_status status;
         {
             Link::InCall call(link_, Call::create);
-            status = plugin_.create(host_.get(), options.data(), static_cast<std::uint32_t>(options.size()), &instance_);
+            status =
+                plugin_.create(host_.get(), options.data(), static_cast<std::uint32_t>(options.size()), &instance_);
         }
         if (status == ARHOST_OK && !instance_)
             throw std::runtime_error("the plugin's create succeeded without an instance");

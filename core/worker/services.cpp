@@ -10,7 +10,9 @@ namespace {
 
 using namespace ring;
 
-std::uint8_t *as_pixels(std::span<std::byte> bytes) { return reinterpret_cast<std::uint8_t *>(bytes.data()); }
+std::uint8_t *as_pixels(std::span<std::byte> bytes) {
+    return reinterpret_cast<std::uint8_t *>(bytes.data());
+}
 
 void require(bool condition, const char *what) {
     if (!condition)
@@ -42,7 +44,8 @@ public:
             return status;
         format_ = properties.format;
         if (!arhost_frame_layout(&format_) || format_.byte_size != properties.format.byte_size)
-            throw std::runtime_error("the source's frame format is not valid, or not laid out by arhost_frame_layout");
+            throw std::runtime_error(
+                "the source's frame format is not valid, or not laid out by arhost_frame_layout");
         ready["format"] = to_json(format_);
         ready["frame_count"] = properties.frame_count;
         if (properties.has_intrinsics)
@@ -79,7 +82,8 @@ private:
 
 class TrackerService final : public Service {
 public:
-    TrackerService(const arhost_tracker &tracker, arhost_instance *instance) : tracker_(tracker), instance_(instance) {}
+    TrackerService(const arhost_tracker &tracker, arhost_instance *instance)
+        : tracker_(tracker), instance_(instance) {}
 
     arhost_status start(const Message &create, Json &) override {
         const Json &json = create.body.at("setup");

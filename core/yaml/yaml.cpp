@@ -83,7 +83,8 @@ Node Node::parse(const std::string &text, const std::string &name) {
     try {
         const std::vector<YAML::Node> documents = YAML::LoadAll(text);
         if (documents.size() > 1)
-            throw Error(name + ": has " + std::to_string(documents.size()) + " YAML documents; keep one (remove the '---')");
+            throw Error(name + ": has " + std::to_string(documents.size()) +
+                        " YAML documents; keep one (remove the '---')");
         return Node(documents.empty() ? YAML::Node() : documents[0], "", document);
     } catch (const YAML::Exception &error) {
         throw Error(name + ":" + std::to_string(error.mark.line + 1) + ":" + std::to_string(error.mark.column + 1) +
@@ -107,9 +108,7 @@ void Node::override_value(const std::string &path, const std::string &value) {
     const std::vector<std::string> parts = split_path(path);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool last = i + 1 == parts.size();
-        const auto refuse = [&](const std::string &why) {
-            throw Error("--set " + path + "=" + value + ": " + why);
-        };
+        const auto refuse = [&](const std::string &why) { throw Error("--set " + path + "=" + value + ": " + why); };
         if (parts[i].empty())
             refuse("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
         canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
@@ -145,7 +144,9 @@ bool Node::is_overridden() const {
     return false;
 }
 
-std::filesystem::path Node::file() const { return document_->name; }
+std::filesystem::path Node::file() const {
+    return document_->name;
+}
 
 std::string Node::where() const {
     if (is_overridden())
@@ -166,7 +167,8 @@ void Node::allow_keys(std::span<const std::string_view> keys) const {
         const std::string_view known[] = {key};
         if (std::find(keys.begin(), keys.end(), known[0]) == keys.end()) {
             const std::string near = nearest(key, keys);
-            value.fail("unknown key; " + (near.empty() ? "known here: " + listed(keys) : "did you mean '" + near + "'?"));
+            value.fail("unknown key; " +
+                       (near.empty() ? "known here: " + listed(keys) : "did you mean '" + near + "'?"));
         }
         if (!seen.insert(key).second)
             value.fail("the key stands here twice; keep one of them");
@@ -265,7 +267,8 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
     const std::string value = text();
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
         const std::string near = nearest(value, choices);
-        fail("'" + value + "' is not one of " + listed(choices) + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+        fail("'" + value + "' is not one of " + listed(choices) +
+             (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
     return value;
 }

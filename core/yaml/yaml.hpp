@@ -58,10 +58,10 @@ public:
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
     bool is_null() const { return node_.IsNull(); }
-    bool is_overridden() const;             // by `--set`, itself or a node above it
+    bool is_overridden() const;                       // by `--set`, itself or a node above it
     const std::string &path() const { return path_; } // from the root, "" for the root itself
     std::filesystem::path file() const;
-    std::string where() const;                         // "file:line:column"
+    std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
     // Maps. `allow_keys` refuses keys that are not in the list (naming the nearest one) or come twice;
@@ -82,7 +82,7 @@ public:
                          std::int64_t maximum = std::numeric_limits<std::int64_t>::max()) const;
     double real(double minimum = -std::numeric_limits<double>::infinity(),
                 double maximum = std::numeric_limits<double>::infinity()) const; // finite
-    std::string text() const; // not empty
+    std::string text() const;                                                    // not empty
     // One of `choices`; the message lists them and names the nearest.
     std::string choice(std::span<const std::string_view> choices) const;
     std::string choice(std::initializer_list<std::string_view> choices) const {

@@ -27,8 +27,8 @@ namespace arhost::test {
 inline std::filesystem::path shared_data(const std::string &relative) {
     return std::filesystem::path(ARHOST_SHARED_DATA) / relative;
 }
-#define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                      \
-    if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                          \
+#define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                         \
+    if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
     GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is not here"
 
 // A folder that is empty at the test's start and gone after it.
@@ -55,7 +55,8 @@ private:
 // A frame or image buffer, 64-byte aligned, with guard bytes behind it that must stay as they are.
 class GuardedBuffer {
 public:
-    explicit GuardedBuffer(std::size_t size) : size_(size), bytes_(static_cast<uint8_t *>(std::aligned_alloc(64, (size + guard + 63) / 64 * 64))) {
+    explicit GuardedBuffer(std::size_t size)
+        : size_(size), bytes_(static_cast<uint8_t *>(std::aligned_alloc(64, (size + guard + 63) / 64 * 64))) {
         std::memset(bytes_.get(), 0xa5, size + guard);
     }
     uint8_t *data() const { return bytes_.get(); }
@@ -91,8 +92,8 @@ public:
         if (entry->negotiate(&offer, &answer) != ARHOST_OK)
             throw std::runtime_error("negotiate failed");
         plugin_ = answer.plugin;
-        host_ = {sizeof host_, ARHOST_ABI_VERSION, "arhost-test", "0", this, &on_log, &on_progress, &on_cancelled,
-                 &on_extension};
+        host_ = {sizeof host_, ARHOST_ABI_VERSION, "arhost-test", "0",          this,
+                 &on_log,      &on_progress,       &on_cancelled, &on_extension};
     }
     ~PluginUnderTest() {
         destroy(); // the library stays loaded: sanitizers want its symbols at exit

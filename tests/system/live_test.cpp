@@ -38,7 +38,8 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
     std::uint64_t dropped = 0;
     for (const auto &[stage, count] : stats["frames"]["dropped"].items())
         dropped += count.get<std::uint64_t>();
-    EXPECT_EQ(dropped + lines.size(), 60u) << "each frame is shown or counted where it was dropped\n" << stats.dump(1);
+    EXPECT_EQ(dropped + lines.size(), 60u) << "each frame is shown or counted where it was dropped\n"
+                                           << stats.dump(1);
     for (const auto &line : lines)
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
@@ -49,14 +50,16 @@ TEST(Live, TheVideoGoesOnWhileABackendHangs) {
     ASSERT_EQ(run.run(), 0) << run.output();
     const auto lines = counted(run);
     expect_own_overlays_in_order(lines);
-    const auto plain = std::count_if(lines.begin(), lines.end(), [](const auto &line) { return line.overlay == "none"; });
+    const auto plain =
+        std::count_if(lines.begin(), lines.end(), [](const auto &line) { return line.overlay == "none"; });
     EXPECT_GE(plain, 5) << "the plain video was to go on until the deadline";
     EXPECT_NE(lines.back().overlay, "none") << "the overlay was to come back";
     EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
 }
 
 TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
-    ArhostRun run(counting("live", "frames: 90", "", "", "restart: {proven_after_frames: 100000, first_delay_ms: 600}\n"));
+    ArhostRun run(
+        counting("live", "frames: 90", "", "", "restart: {proven_after_frames: 100000, first_delay_ms: 600}\n"));
     run.write("scene.yaml", small_scene);
     run.start();
     while (run.running() && counted(run).size() < 15)
@@ -71,7 +74,8 @@ TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
 
 TEST(Live, ASlowOutputDropsItsOwnFramesOnly) {
     ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_counter, options: {frames: 60}}\n"
-                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: slow.txt, options: {delay_ms: 120}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: slow.txt, "
+                  "options: {delay_ms: 120}}\n"
                   "stats: stats.json\n");
     ASSERT_EQ(run.run(), 0) << run.output();
     const auto stats = run.stats();

@@ -17,11 +17,15 @@ std::string configuration(const std::string &tracker, const std::string &more = 
         markers += (id ? ", " : "") + ("{id: " + std::to_string(id) + ", side_mm: 95.5}");
     return "version: 1\nsource: {plugin: source_file, path: \"" + shared_data("markers/rbt_sequence").string() +
            "/color_image_%04d.png\", fps: 30}\n"
-           "camera: {width: 640, height: 480, fx: 607.178466796875, fy: 607.2342529296875, cx: 321.39129638671875, cy: 241.91822814941406}\n"
-           "tracker:\n  plugin: " + tracker + "\n  markers: [" + markers + "]\n"
+           "camera: {width: 640, height: 480, fx: 607.178466796875, fy: 607.2342529296875, cx: 321.39129638671875, "
+           "cy: 241.91822814941406}\n"
+           "tracker:\n  plugin: " +
+           tracker + "\n  markers: [" + markers +
+           "]\n"
            "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml}\n"
            "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n"
-           "stats: stats.json\n" + more;
+           "stats: stats.json\n" +
+           more;
 }
 
 const char *const aruco = "tracker_aruco\n  options: {dictionary: DICT_APRILTAG_36h11}";

@@ -47,7 +47,9 @@ TEST(Run, StopsAfterTheFramesThatAreAskedFor) {
 TEST(Run, TakesValuesFromTheCommandLine) {
     ArhostRun run(counting("lockstep", "frames: 300", "", ""));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "source.options.frames=4", "--set", "outputs[0].path=other.txt"}), 0)
+    ASSERT_EQ(
+        run.run({"--config", "run.yaml", "--set", "source.options.frames=4", "--set", "outputs[0].path=other.txt"}),
+        0)
         << run.output();
     EXPECT_TRUE(run.exists("other.txt"));
     EXPECT_FALSE(run.exists("counted.txt"));
@@ -83,7 +85,8 @@ TEST(Run, GoesOnWithoutTrackerAndRayTracer) {
 
 TEST(Run, FeedsSeveralOutputs) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
-                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, options: {delay_ms: 1}}\n");
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
+                  "options: {delay_ms: 1}}\n");
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_EQ(counted(run).size(), 50u);
     EXPECT_EQ(run.read("counted.txt"), run.read("second.txt"));

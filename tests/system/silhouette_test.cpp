@@ -38,9 +38,12 @@ std::string configuration(const std::string &tracker) {
            ", family: tag36h11, id: 0, side_mm: 80}}\n"
            "camera: {width: 960, height: 540, fx: 760, fy: 755, cx: 489.3, cy: 262.8,\n"
            "  distortion: {model: brown, coefficients: [-0.21, 0.09, 0.0012, -0.0008, 0.01]}}\n"
-           "tracker: {plugin: " + tracker + ", markers: [{id: 0, side_mm: 80}]}\n"
+           "tracker: {plugin: " +
+           tracker +
+           ", markers: [{id: 0, side_mm: 80}]}\n"
            "raytracer: {plugin: rt_embree, scene: plate.yaml}\n"
-           "outputs:\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n- {plugin: sink_poses, path: poses.jsonl}\n";
+           "outputs:\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n- {plugin: sink_poses, path: "
+           "poses.jsonl}\n";
 }
 
 // Pure green whatever the light: a mask of it is the silhouette.
@@ -108,7 +111,8 @@ TEST_P(Silhouette, LandsWhereTheTruePosePutsIt) {
         ++seen;
     }
     ASSERT_EQ(seen, frames);
-    std::printf("silhouette, %s, %d frames, Brown distortion: mean %.2f px, worst frame %.2f px (target 1 px mean); area %+.2f %%\n",
+    std::printf("silhouette, %s, %d frames, Brown distortion: mean %.2f px, worst frame %.2f px (target 1 px mean); "
+                "area %+.2f %%\n",
                 GetParam(), seen, sum_px / seen, worst_px, 100 * area_error / seen);
     EXPECT_LE(sum_px / seen, 1.0);
     EXPECT_LE(std::abs(area_error / seen), 0.01) << "the silhouette is too large or too small";

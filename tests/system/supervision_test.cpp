@@ -154,7 +154,8 @@ TEST(Supervision, SurvivesKillsAndStopsAtRandom) {
 
 TEST(Supervision, ASinkThatCanNotWriteIsGivenUpAndTheOthersGoOn) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
-                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, options: {error_at: 5}}\n");
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
+                  "options: {error_at: 5}}\n");
     EXPECT_EQ(run.run(), 1);
     EXPECT_EQ(counted(run).size(), 50u);
     EXPECT_THAT(run.output(), HasSubstr("can't write frame 5"));

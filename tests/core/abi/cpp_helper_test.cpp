@@ -17,13 +17,28 @@ public:
     void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
 };
 constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "refuse", "false", "Fails")};
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_TRACKER, "thrower", "Thrower", "0", "arhost",
-                                          "Apache-2.0", "Throws.", 0, 1, options, nullptr};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_TRACKER,
+                                          "thrower",
+                                          "Thrower",
+                                          "0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Throws.",
+                                          0,
+                                          1,
+                                          options,
+                                          nullptr};
 
 std::string logged;
-const arhost_host host = {sizeof host, ARHOST_ABI_VERSION, "test", "0", nullptr,
+const arhost_host host = {sizeof host,
+                          ARHOST_ABI_VERSION,
+                          "test",
+                          "0",
+                          nullptr,
                           [](const arhost_host *, arhost_severity, const char *text) { logged = text; },
-                          [](const arhost_host *, double, const char *) {}, [](const arhost_host *) { return 0; },
+                          [](const arhost_host *, double, const char *) {},
+                          [](const arhost_host *) { return 0; },
                           [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 
 } // namespace
@@ -51,7 +66,8 @@ TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
     tracker.stop(instance);
     answer.plugin->destroy(instance);
 
-    EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_ERROR_INVALID_ARGUMENT) << "an option is missing";
+    EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_ERROR_INVALID_ARGUMENT)
+        << "an option is missing";
 }
 
 TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {

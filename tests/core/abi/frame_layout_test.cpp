@@ -35,8 +35,11 @@ TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyOne) {
 }
 
 TEST(FrameLayout, RefusesWhatIsNoFormat) {
-    for (auto [pixel_format, width, height] : {std::tuple{ARHOST_YUYV, 101, 8}, {ARHOST_NV12, 100, 7}, {ARHOST_I420, 99, 8},
-                                               {ARHOST_BGR8, 0, 8}, {ARHOST_BGR8, 8, 20000}}) {
+    for (auto [pixel_format, width, height] : {std::tuple{ARHOST_YUYV, 101, 8},
+                                               {ARHOST_NV12, 100, 7},
+                                               {ARHOST_I420, 99, 8},
+                                               {ARHOST_BGR8, 0, 8},
+                                               {ARHOST_BGR8, 8, 20000}}) {
         arhost_frame_format format =
             format_of(pixel_format, static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
         EXPECT_FALSE(arhost_frame_layout(&format));

@@ -93,11 +93,15 @@ TEST(JsonAbi, KeepsIntrinsicsToTheLastBit) {
 }
 
 TEST(JsonAbi, RefusesFormatsAndIntrinsicsOutOfRange) {
-    Json format = {{"pixel_format", ARHOST_YUYV}, {"width", 640}, {"height", 480}, {"yuv_matrix", ARHOST_BT601},
+    Json format = {{"pixel_format", ARHOST_YUYV},       {"width", 640}, {"height", 480}, {"yuv_matrix", ARHOST_BT601},
                    {"yuv_range", ARHOST_LIMITED_RANGE}, {"fps", 30.0}};
     EXPECT_EQ(format_from_json(format).stride[0], 1280u);
-    for (const auto &[key, value] : std::map<std::string, Json>{
-             {"pixel_format", 99}, {"width", 641}, {"height", 0}, {"width", 1 << 20}, {"yuv_matrix", 0}, {"fps", -1}}) {
+    for (const auto &[key, value] : std::map<std::string, Json>{{"pixel_format", 99},
+                                                                {"width", 641},
+                                                                {"height", 0},
+                                                                {"width", 1 << 20},
+                                                                {"yuv_matrix", 0},
+                                                                {"fps", -1}}) {
         Json wrong = format;
         wrong[key] = value;
         EXPECT_THROW(format_from_json(wrong), std::exception) << key;

@@ -65,7 +65,8 @@ TEST(Reactor, LetsADeadlineSetAnother) {
     Reactor reactor;
     int calls = 0;
     Reactor::Registration next;
-    auto first = reactor.at(Reactor::Clock::now(), [&] { next = reactor.at(Reactor::Clock::now(), [&] { ++calls; }); });
+    auto first =
+        reactor.at(Reactor::Clock::now(), [&] { next = reactor.at(Reactor::Clock::now(), [&] { ++calls; }); });
     while (calls == 0)
         reactor.run_once();
     EXPECT_EQ(calls, 1);

@@ -22,8 +22,8 @@ constexpr std::size_t words = 4096;
 constexpr SlotLayout layout{words * sizeof(std::uint64_t), 4};
 
 // The worker: writes the sequence number all over the slot that it is told.
-[[noreturn]] void serve(const SharedMemory &host_memory, const SharedMemory &worker_memory, const SharedMemory &pixels,
-                        int doorbell) {
+[[noreturn]] void serve(const SharedMemory &host_memory, const SharedMemory &worker_memory,
+                        const SharedMemory &pixels, int doorbell) {
     const Mapping host = host_memory.map(Access::read_only), mine = worker_memory.map(Access::read_write),
                   slots = pixels.map(Access::read_write);
     CommandConsumer commands(host.as<HostPage>().commands, mine.as<WorkerPage>().commands);

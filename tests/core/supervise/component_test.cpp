@@ -30,13 +30,15 @@ struct Bench {
             events.push_back("hello " + description.id);
             std::vector<OptionValue> values;
             for (const OptionDeclaration &o : description.options)
-                values.push_back({o.key, o.type, options.value(o.key, o.default_value ? std::atoi(o.default_value->c_str()) : 0), 0.0, ""});
+                values.push_back({o.key, o.type,
+                                  options.value(o.key, o.default_value ? std::atoi(o.default_value->c_str()) : 0),
+                                  0.0, ""});
             for (OptionValue &value : values)
                 if (value.key == "width" || value.key == "height")
                     value.integer = 8;
-            return Component::Create{{{"options", to_json(values)},
-                                      {"setup", {{"first_sequence", 0}, {"fps", 0.0}, {"paced", false}}}},
-                                     {}};
+            return Component::Create{
+                {{"options", to_json(values)}, {"setup", {{"first_sequence", 0}, {"fps", 0.0}, {"paced", false}}}},
+                {}};
         };
         hooks.ready = [this](const Json &ready) {
             events.push_back("ready");
@@ -44,7 +46,8 @@ struct Bench {
         };
         hooks.running = [this] { events.push_back("running"); };
         hooks.result = [this](const Command &command, const Result &result) {
-            events.push_back("result " + std::to_string(command.sequence) + (result.status == ARHOST_OK ? "" : " failed"));
+            events.push_back("result " + std::to_string(command.sequence) +
+                             (result.status == ARHOST_OK ? "" : " failed"));
         };
         hooks.lost = [this](const std::vector<Command> &unanswered) {
             events.push_back("lost " + std::to_string(unanswered.size()));
@@ -53,9 +56,9 @@ struct Bench {
             events.push_back(by_configuration ? "misconfigured" : "given up");
         };
         hooks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
-        component = std::make_unique<Component>(context, "source",
-                                                std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
-                                                limits, std::move(hooks));
+        component = std::make_unique<Component>(
+            context, "source", std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
+            limits, std::move(hooks));
         component->start();
     }
     // Runs until the event has come, or the time is over.
@@ -91,7 +94,8 @@ TEST(Component, StartsServesAndStops) {
     EXPECT_EQ(output->layout.slot(output->mapping, 1)[0], std::byte(1)) << "the frame's first pixel is its number";
     bench.component->stop();
     ASSERT_TRUE(bench.until("stopped"));
-    EXPECT_EQ(bench.events, (std::vector<std::string>{"hello source_counter", "ready", "running", "result 0", "result 1", "stopped"}));
+    EXPECT_EQ(bench.events, (std::vector<std::string>{"hello source_counter", "ready", "running", "result 0",
+                                                      "result 1", "stopped"}));
     EXPECT_EQ(bench.component->restarts(), 0u);
 }
 
@@ -112,7 +116,8 @@ TEST(Component, ReturnsWhatWasLostAndGetsNewMemoryAfterADeath) {
 
 TEST(Component, IsEndedWhenItIsStoppedForLongerThanItsDeadline) {
     Bench bench;
-    bench.make("source_counter", {.frame = 200ms, .restart = {.first_delay = 1ms}}, {{"frames", 100}, {"crash_at", -1}});
+    bench.make("source_counter", {.frame = 200ms, .restart = {.first_delay = 1ms}},
+               {{"frames", 100}, {"crash_at", -1}});
     ASSERT_TRUE(bench.until("running"));
     ::kill(bench.component->pid(), SIGSTOP);
     bench.read(0);

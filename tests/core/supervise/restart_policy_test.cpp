@@ -7,7 +7,8 @@ using namespace arhost::supervise;
 using namespace std::chrono_literals;
 
 TEST(RestartPolicy, DoublesItsDelayAndThenGivesUp) {
-    RestartPolicy policy({.proven_after_frames = 10, .quarantine_after = 5, .first_delay = 250ms, .longest_delay = 1500ms});
+    RestartPolicy policy(
+        {.proven_after_frames = 10, .quarantine_after = 5, .first_delay = 250ms, .longest_delay = 1500ms});
     EXPECT_EQ(policy.died(0), 250ms);
     EXPECT_EQ(policy.died(0), 500ms);
     EXPECT_EQ(policy.died(0), 1000ms);

@@ -20,7 +20,8 @@ template <class Call> std::string error_of(Call &&call) {
 }
 
 Node sample() {
-    return Node::parse("mode: lockstep\ntracker:\n  side_mm: -3\n  ids: [1, x]\noutputs: [{path: a.mp4}]\n", "lab.yaml");
+    return Node::parse("mode: lockstep\ntracker:\n  side_mm: -3\n  ids: [1, x]\noutputs: [{path: a.mp4}]\n",
+                       "lab.yaml");
 }
 
 } // namespace
@@ -34,22 +35,27 @@ TEST(Yaml, NamesFileLineColumnAndKeyOfAWrongValue) {
 
 TEST(Yaml, NamesTheNearestKeyForAnUnknownOne) {
     const Node node = Node::parse("traker: 1\n", "a.yaml");
-    EXPECT_EQ(error_of([&] { node.allow_keys({"tracker", "source"}); }),
+    EXPECT_EQ(error_of([&] {
+                  node.allow_keys({"tracker", "source"});
+              }),
               "a.yaml:1:9: traker: unknown key; did you mean 'tracker'?");
     EXPECT_THAT(error_of([&] { node.allow_keys({"source", "mode"}); }), HasSubstr("known here: source, mode"));
 }
 
 TEST(Yaml, RefusesAKeyThatStandsTwice) {
     const Node node = Node::parse("mode: live\nmode: lockstep\n", "a.yaml");
-    EXPECT_EQ(error_of([&] { node.allow_keys({"mode"}); }), "a.yaml:2:7: mode: the key stands here twice; keep one of them");
+    EXPECT_EQ(error_of([&] { node.allow_keys({"mode"}); }),
+              "a.yaml:2:7: mode: the key stands here twice; keep one of them");
 }
 
 TEST(Yaml, SaysWhereTheSyntaxIsWrong) {
-    EXPECT_THAT(error_of([] { Node::parse("a: [1, 2\nb: 3\n", "a.yaml"); }), testing::MatchesRegex("a.yaml:[0-9]+:[0-9]+: YAML syntax: .*"));
+    EXPECT_THAT(error_of([] { Node::parse("a: [1, 2\nb: 3\n", "a.yaml"); }),
+                testing::MatchesRegex("a.yaml:[0-9]+:[0-9]+: YAML syntax: .*"));
 }
 
 TEST(Yaml, SaysWhyAFileCantBeRead) {
-    EXPECT_EQ(error_of([] { Node::load("/no/such.yaml"); }), "/no/such.yaml: can't be read: No such file or directory");
+    EXPECT_EQ(error_of([] { Node::load("/no/such.yaml"); }),
+              "/no/such.yaml: can't be read: No such file or directory");
     EXPECT_EQ(error_of([] { Node::load("/tmp"); }), "/tmp: is a folder, not a YAML file");
 }
 

@@ -13,10 +13,10 @@
 
 namespace arhost::test {
 
-#define ARHOST_FAULT_OPTIONS                                                                                       \
-    option(ARHOST_OPTION_INTEGER, "crash_at", "-1", "Dies of SIGSEGV at this frame, each time; -1: never"),        \
-        option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                \
-        option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),             \
+#define ARHOST_FAULT_OPTIONS                                                                                         \
+    option(ARHOST_OPTION_INTEGER, "crash_at", "-1", "Dies of SIGSEGV at this frame, each time; -1: never"),          \
+        option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                  \
+        option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),               \
         option(ARHOST_OPTION_REAL, "delay_ms", "0", "Sleeps so long in each frame, in ms", 0, 60000)
 
 class Faults {

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A library that has nothing to do with arhost. */
 int answer(void);
-__attribute__((visibility("default"))) int answer(void) { return 42; }
+__attribute__((visibility("default"))) int answer(void) {
+    return 42;
+}

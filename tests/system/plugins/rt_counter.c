@@ -46,8 +46,12 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     return ARHOST_OK;
 }
 
-static void destroy(arhost_instance *self) { free(self); }
-static const void *get_extension(const char *id) { return (void)id, (const void *)0; }
+static void destroy(arhost_instance *self) {
+    free(self);
+}
+static const void *get_extension(const char *id) {
+    return (void)id, (const void *)0;
+}
 
 static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
     (void)self;
@@ -85,19 +89,33 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     return ARHOST_OK;
 }
 
-static void stop(arhost_instance *self) { (void)self; }
+static void stop(arhost_instance *self) {
+    (void)self;
+}
 
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Dies at this frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL, "Never returns from this frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL, "Returns an error for this frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL, "Sleeps so long in each frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL,
+     "Never returns from this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
+     "Returns an error for this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL,
+     "Sleeps so long in each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL, "Dies in create"},
 };
-static const arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_RAYTRACER, "rt_counter", "Counter", "0.1.0",
-                                             "arhost", "Apache-2.0", "Draws a frame's number, for tests.",
-                                             ARHOST_TRACES_LENS, sizeof options / sizeof *options, options, NULL};
+static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                             ARHOST_KIND_RAYTRACER,
+                                             "rt_counter",
+                                             "Counter",
+                                             "0.1.0",
+                                             "arhost",
+                                             "Apache-2.0",
+                                             "Draws a frame's number, for tests.",
+                                             ARHOST_TRACES_LENS,
+                                             sizeof options / sizeof *options,
+                                             options,
+                                             NULL};
 static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
 

@@ -42,8 +42,9 @@ public:
             return ARHOST_END;
         faults_.at(buffer.sequence);
         if (paced_)
-            std::this_thread::sleep_until(begin_ + std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                                       std::chrono::duration<double>(static_cast<double>(buffer.sequence - first_) / fps_)));
+            std::this_thread::sleep_until(
+                begin_ + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                             std::chrono::duration<double>(static_cast<double>(buffer.sequence - first_) / fps_)));
         for (std::uint32_t y = 0; y < height_; ++y)
             for (std::uint32_t x = 0; x < width_; ++x) {
                 std::uint8_t *pixel = buffer.plane[0] + y * buffer.format->stride[0] + 3 * x;
@@ -66,13 +67,13 @@ private:
     std::chrono::steady_clock::time_point begin_;
 };
 
-constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_INTEGER, "frames", "100", "How many frames"),
-    option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096), option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
-    ARHOST_FAULT_OPTIONS};
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_SOURCE, "source_counter", "Counter", "0.1.0",
-                                          "arhost", "Apache-2.0", "Numbered frames, for tests.", ARHOST_CAN_SEEK,
-                                          std::size(options), options, nullptr};
+constexpr arhost_option_descriptor options[] = {option(ARHOST_OPTION_INTEGER, "frames", "100", "How many frames"),
+                                                option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096),
+                                                option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
+                                                ARHOST_FAULT_OPTIONS};
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),     ARHOST_KIND_SOURCE, "source_counter",   "Counter", "0.1.0", "arhost", "Apache-2.0",
+    "Numbered frames, for tests.", ARHOST_CAN_SEEK,    std::size(options), options,   nullptr};
 
 } // namespace
 

@@ -15,7 +15,8 @@ using namespace arhost;
 class Counter {
 public:
     Counter(const Host &host, const Options &options)
-        : host_(host), faults_(options), crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
+        : host_(host), faults_(options), crash_in_destroy_(options.boolean("crash_in_destroy")),
+          lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
           nan_at_(options.integer("nan_at")) {}
 
     ~Counter() {
@@ -69,9 +70,18 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"), ARHOST_FAULT_OPTIONS};
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor), ARHOST_KIND_TRACKER, "tracker_counter", "Counter", "0.1.0",
-                                          "arhost", "Apache-2.0", "Tracks numbered frames, for tests.", 0,
-                                          std::size(options), options, nullptr};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_TRACKER,
+                                          "tracker_counter",
+                                          "Counter",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Tracks numbered frames, for tests.",
+                                          0,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
 
 } // namespace
 

@@ -123,9 +123,13 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     });
 }
 
-template <class T> void destroy(arhost_instance *instance) { delete &instance_of<T>(instance); }
+template <class T> void destroy(arhost_instance *instance) {
+    delete &instance_of<T>(instance);
+}
 
-inline const void *no_extension(const char *) { return nullptr; }
+inline const void *no_extension(const char *) {
+    return nullptr;
+}
 
 // Members that a class may leave out.
 template <class T> void stop(T &plugin) {
@@ -186,7 +190,7 @@ template <class T> constexpr arhost_sink make_sink_functions() {
     sink.write = [](arhost_instance *i, const arhost_output *output) {
         return with<T>(i, [&](T &p) -> arhost_status { return p.write(*output); });
     };
-    if constexpr (requires(T &p) { p.idle(); })
+    if constexpr (requires(T & p) { p.idle(); })
         sink.idle = [](arhost_instance *i) { return with<T>(i, [](T &p) -> arhost_status { return p.idle(); }); };
     sink.stop = [](arhost_instance *i) { return with<T>(i, [](T &p) { return stop(p), ARHOST_OK; }); };
     return sink;
@@ -208,16 +212,13 @@ inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer,
 } // namespace arhost
 
 // Defines arhost_entry for a class and its arhost_descriptor. Once a library, outside any namespace.
-#define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                         \
-    static constexpr arhost_plugin arhost_plugin_object = {sizeof(arhost_plugin),                                 \
-                                                           &(descriptor_object),                                  \
-                                                           &arhost::detail::functions_object<Class>,              \
-                                                           arhost::detail::create<Class>,                         \
-                                                           arhost::detail::destroy<Class>,                        \
-                                                           arhost::detail::get_extension<Class>};                 \
-    extern "C" ARHOST_EXPORT const arhost_entry_point arhost_entry = {                                            \
-        sizeof(arhost_entry_point), [](const arhost_offer *offer, arhost_answer *answer) {                        \
-            return arhost::negotiate(offer, answer, arhost_plugin_object);                                        \
+#define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                            \
+    static constexpr arhost_plugin arhost_plugin_object = {                                                          \
+        sizeof(arhost_plugin),         &(descriptor_object),           &arhost::detail::functions_object<Class>,     \
+        arhost::detail::create<Class>, arhost::detail::destroy<Class>, arhost::detail::get_extension<Class>};        \
+    extern "C" ARHOST_EXPORT const arhost_entry_point arhost_entry = {                                               \
+        sizeof(arhost_entry_point), [](const arhost_offer *offer, arhost_answer *answer) {                           \
+            return arhost::negotiate(offer, answer, arhost_plugin_object);                                           \
         }};
 
 #define ARHOST_SOURCE(Class, descriptor) ARHOST_PLUGIN_OF_KIND(Class, descriptor, source_functions)

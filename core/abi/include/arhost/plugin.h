@@ -131,10 +131,10 @@ typedef struct arhost_option {
 
 /* What a plugin can do beyond its kind's minimum: descriptor.capabilities. */
 enum {
-    ARHOST_CAN_SEEK = 1 << 0,       /* source: start at any sequence number gives the same frames */
-    ARHOST_IS_LIVE = 1 << 1,        /* source: a camera; frames that are not read in time are gone */
-    ARHOST_TRACES_LENS = 1 << 2,    /* raytracer: applies the distortion of arhost_intrinsics */
-    ARHOST_NEEDS_DISPLAY = 1 << 3,  /* sink: opens a window */
+    ARHOST_CAN_SEEK = 1 << 0,        /* source: start at any sequence number gives the same frames */
+    ARHOST_IS_LIVE = 1 << 1,         /* source: a camera; frames that are not read in time are gone */
+    ARHOST_TRACES_LENS = 1 << 2,     /* raytracer: applies the distortion of arhost_intrinsics */
+    ARHOST_NEEDS_DISPLAY = 1 << 3,   /* sink: opens a window */
     ARHOST_IS_REALTIME_SINK = 1 << 4 /* sink: wants the newest frame rather than every frame */
 };
 
@@ -142,17 +142,17 @@ enum {
 typedef struct arhost_descriptor {
     uint32_t struct_size;
     arhost_kind kind;
-    const char *id;          /* equals the file's name without ".so": "rt_embree" */
-    const char *name;        /* for people: "Embree ray tracer" */
-    const char *version;     /* of the plugin, "1.2.0" */
+    const char *id;      /* equals the file's name without ".so": "rt_embree" */
+    const char *name;    /* for people: "Embree ray tracer" */
+    const char *version; /* of the plugin, "1.2.0" */
     const char *vendor;
     const char *licence;     /* SPDX */
     const char *description; /* one sentence */
     uint32_t capabilities;   /* ARHOST_CAN_SEEK | … */
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count of them; NULL where there are none */
-    const char *const *devices; /* NULL-terminated list of the device nodes needed, as glob patterns
-                                   ("/dev/video*"), or NULL: the sandbox allows no other */
+    const char *const *devices;              /* NULL-terminated list of the device nodes needed, as glob patterns
+                                                ("/dev/video*"), or NULL: the sandbox allows no other */
 } arhost_descriptor;
 
 /* One made plugin; what is in it is the plugin's own affair. */

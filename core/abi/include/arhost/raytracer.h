@@ -15,9 +15,9 @@ extern "C" {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;          /* px, of the images to make */
-    uint32_t reserved;               /* 0 */
-    const arhost_scene *scene;       /* read-only, valid until stop; checked by the host */
+    uint32_t width, height;              /* px, of the images to make */
+    uint32_t reserved;                   /* 0 */
+    const arhost_scene *scene;           /* read-only, valid until stop; checked by the host */
     const arhost_intrinsics *intrinsics; /* those that every request will bear: build ray tables now */
 } arhost_raytracer_setup;
 

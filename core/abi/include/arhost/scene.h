@@ -43,7 +43,7 @@ typedef struct arhost_geometry {
     arhost_buffer positions; /* stride 12 (FLOAT3) or 16 (FLOAT4) */
     arhost_buffer normals;   /* one a vertex, unit length: smooth shading; absent: flat */
     arhost_buffer texcoords;
-    arhost_buffer indices;   /* stride 12; each < positions.count */
+    arhost_buffer indices; /* stride 12; each < positions.count */
 } arhost_geometry;
 
 typedef int32_t arhost_material_model;
@@ -105,16 +105,16 @@ typedef struct arhost_scene {
     uint32_t struct_size;
     uint64_t byte_size; /* of the arena, the header and the last buffer's 16 spare bytes included */
     arhost_axes axes;
-    uint32_t max_depth; /* bounces after the primary ray */
+    uint32_t max_depth;  /* bounces after the primary ray */
     float ambient[3];    /* light from everywhere */
     float background[3]; /* seen by reflected and refracted rays that hit nothing; primary rays: alpha 0 */
-    float bounds_min[3], bounds_max[3]; /* of all objects, world */
+    float bounds_min[3], bounds_max[3];                  /* of all objects, world */
     float shadow_alpha_opaque, shadow_alpha_translucent; /* on catchers: 0.6 and 0.3 */
-    arhost_buffer geometries; /* arhost_geometry, stride sizeof */
-    arhost_buffer materials;  /* arhost_material */
-    arhost_buffer objects;    /* arhost_object; may be 0 */
-    arhost_buffer lights;     /* arhost_light */
-    arhost_buffer names;      /* bytes, stride 1 */
+    arhost_buffer geometries;                            /* arhost_geometry, stride sizeof */
+    arhost_buffer materials;                             /* arhost_material */
+    arhost_buffer objects;                               /* arhost_object; may be 0 */
+    arhost_buffer lights;                                /* arhost_light */
+    arhost_buffer names;                                 /* bytes, stride 1 */
 } arhost_scene;
 
 #ifdef __cplusplus

@@ -30,7 +30,7 @@ typedef struct arhost_source_properties {
     int32_t has_intrinsics;     /* non-zero where the source knows its own camera */
     arhost_frame_format format; /* with its struct_size set; laid out by arhost_frame_layout */
     arhost_intrinsics intrinsics;
-    uint64_t frame_count;       /* of the whole sequence; 0: unknown or endless */
+    uint64_t frame_count; /* of the whole sequence; 0: unknown or endless */
 } arhost_source_properties;
 
 /* Where `read` puts a frame. Bytes that it does not write keep an older frame's value. */
@@ -39,8 +39,8 @@ typedef struct arhost_frame_buffer {
     uint32_t reserved;
     const arhost_frame_format *format;
     uint8_t *plane[ARHOST_MAX_PLANES];
-    uint8_t *grey; /* full-range luma for trackers. The worker fills it after read, unless the source
-                      sets has_grey, or it is plane 0 */
+    uint8_t *grey;     /* full-range luma for trackers. The worker fills it after read, unless the source
+                          sets has_grey, or it is plane 0 */
     uint64_t sequence; /* the number that this frame will bear; a seekable source gives this frame */
 } arhost_frame_buffer;
 
@@ -66,8 +66,7 @@ typedef struct arhost_source {
     /* [worker] The next frame; waits for it, asking host->cancelled meanwhile. ARHOST_OK, ARHOST_END
      * (and again ARHOST_END if asked again), or an error. A file that is cut short gives ARHOST_END
      * after what could be read, and a log message of severity WARNING. */
-    arhost_status (*read)(arhost_instance *instance, const arhost_frame_buffer *buffer,
-                          arhost_frame_info *info);
+    arhost_status (*read)(arhost_instance *instance, const arhost_frame_buffer *buffer, arhost_frame_info *info);
 
     /* [worker] Once before destroy, if start succeeded. */
     void (*stop)(arhost_instance *instance);

@@ -40,7 +40,7 @@ typedef struct arhost_marker {
     int32_t id;
     char family[ARHOST_MAX_FAMILY]; /* "tag36h11", "DICT_6X6_250" */
     arhost_marker_state state;
-    uint32_t age_frames;  /* since it was last detected; 0 where state is DETECTED */
+    uint32_t age_frames; /* since it was last detected; 0 where state is DETECTED */
     double corners_px[4][2];
     /* Marker-to-camera, column-major, GL eye space: x right, y up, looking along −z; millimetres.
      * Rotation orthonormal to 1e-9, last row 0 0 0 1. */
@@ -73,8 +73,7 @@ typedef struct arhost_tracker {
     /* [worker] Finds the listed markers and no others, in the order of the setup's list. Those not
      * found are left out. The frame is read-only and may be gone after the call. The same frames give
      * the same result. `result` comes zeroed but for struct_size. ARHOST_OK also when none is found. */
-    arhost_status (*track)(arhost_instance *instance, const arhost_frame *frame,
-                           arhost_tracker_result *result);
+    arhost_status (*track)(arhost_instance *instance, const arhost_frame *frame, arhost_tracker_result *result);
 
     /* [worker] Once before destroy, if start succeeded. */
     void (*stop)(arhost_instance *instance);
