@@ -2,6 +2,7 @@
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
+#include <opencv2/aruco.hpp>
 
 #include <regex>
 
@@ -80,4 +81,15 @@ TEST(Documentation, TheLabConfigurationSaysWhatIsMissingWhereThereIsNoCamera) {
     EXPECT_EQ(run.run({"--config", (root / "config/lab.yaml").string()}), 2);
     EXPECT_THAT(run.output(), testing::HasSubstr("/dev/video0"));
     EXPECT_THAT(run.output(), testing::HasSubstr("source_synthetic"));
+}
+
+TEST(Documentation, ShowsTheMarkerThatTheLabConfigurationLooksFor) {
+    cv::Mat expected;
+    cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_6X6_250), 23, 8, expected);
+    cv::Mat shown(8, 8, CV_8UC1, cv::Scalar(0));
+    const std::string svg = read_file(root / "docs/images/marker-23.svg");
+    const std::regex white(R"re(class="white" x="(\d)" y="(\d)")re");
+    for (std::sregex_iterator it(svg.begin(), svg.end(), white), end; it != end; ++it)
+        shown.at<std::uint8_t>(std::stoi((*it)[2]), std::stoi((*it)[1])) = 255;
+    EXPECT_EQ(cv::norm(expected, shown, cv::NORM_L1), 0);
 }
