@@ -220,7 +220,9 @@ void Component::on_died(const Death &death) {
     in_flight_.clear();
 
     state_ = State::waiting;
-    hooks_.lost(unanswered);
+    const bool finished = death.clean && stop_answer_;
+    if (!finished)
+        hooks_.lost(unanswered);
 
     const std::uint64_t frame = unanswered.empty() ? Crash::no_frame : unanswered.front().sequence;
     const bool crash = !death.clean && configuration_error_.empty();
