@@ -237,10 +237,11 @@ void Component::on_died(const Death &death) {
             context_.log(ARHOST_SEVERITY_WARNING, name_, reason + ", after it had finished");
         return stopped(stop_answer_->first, stop_answer_->second);
     }
-    // Only a sink has files that are worth a second try.
-    if (stop_sent_ && (description_.kind != ARHOST_KIND_SINK || ++deaths_in_stop_ > 1)) {
+    // Only a sink has files that are worth further tries: one after a hang, several after a death.
+    const bool matters = description_.kind == ARHOST_KIND_SINK;
+    deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
+    if (stop_sent_ && (!matters || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
         context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
-        const bool matters = description_.kind == ARHOST_KIND_SINK;
         return stopped(matters ? ARHOST_ERROR_INTERNAL : ARHOST_OK, reason);
     }
     if (!configuration_error_.empty())
