@@ -60,9 +60,12 @@ TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
 
     refuse.integer = 0;
     ASSERT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_OK);
-    EXPECT_EQ(tracker.start(instance, nullptr), ARHOST_ERROR_INTERNAL);
+    const arhost_tracker_setup setup{};
+    EXPECT_EQ(tracker.start(instance, &setup), ARHOST_ERROR_INTERNAL);
     EXPECT_EQ(logged, "no luck");
-    EXPECT_EQ(tracker.track(instance, nullptr, nullptr), ARHOST_ERROR_OUT_OF_MEMORY);
+    const arhost_frame frame{};
+    arhost_tracker_result result{};
+    EXPECT_EQ(tracker.track(instance, &frame, &result), ARHOST_ERROR_OUT_OF_MEMORY);
     tracker.stop(instance);
     answer.plugin->destroy(instance);
 
