@@ -396,23 +396,34 @@ bool Pipeline::track() {
     return true;
 }
 
-void Pipeline::on_tracked(const Command &command, const Result &result) {
-    statistics_.stages["tracker"].add(std::chrono::nanoseconds(result.busy_ns));
+// Counts a stage's answer; the frame that goes on with it, or null where there is none: it has been
+// overtaken, or passes the stage by.
+Frame *Pipeline::take_answer(const Command &command, const Result &result, const char *stage) {
+    statistics_.stages[stage].add(std::chrono::nanoseconds(result.busy_ns));
     const auto found = frames_.find(command.sequence);
     if (found == frames_.end())
-        return;
+        return nullptr;
     Frame &frame = *found->second;
     if (frame.overtaken) {
         ++statistics_.dropped["late"];
         frames_.erase(found);
-        return;
+        return nullptr;
     }
-    frame.tries = 0;
     if (result.status < 0) {
-        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
+        context_.log(ARHOST_SEVERITY_WARNING, stage,
                      "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
-        return pass(frame, "tracker");
+        pass(frame, stage);
+        return nullptr;
     }
+    return &frame;
+}
+
+void Pipeline::on_tracked(const Command &command, const Result &result) {
+    Frame *answered = take_answer(command, result, "tracker");
+    if (!answered)
+        return;
+    Frame &frame = *answered;
+    frame.tries = 0;
     const char *problem = take_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
     frame.result = Lease();
     if (problem) {
@@ -467,21 +478,10 @@ bool Pipeline::render() {
 }
 
 void Pipeline::on_rendered(const Command &command, const Result &result) {
-    statistics_.stages["raytracer"].add(std::chrono::nanoseconds(result.busy_ns));
-    const auto found = frames_.find(command.sequence);
-    if (found == frames_.end())
+    Frame *answered = take_answer(command, result, "raytracer");
+    if (!answered)
         return;
-    Frame &frame = *found->second;
-    if (frame.overtaken) {
-        ++statistics_.dropped["late"];
-        frames_.erase(found);
-        return;
-    }
-    if (result.status < 0) {
-        context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
-                     "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
-        return pass(frame, "raytracer");
-    }
+    Frame &frame = *answered;
     frame.render = result.render;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;

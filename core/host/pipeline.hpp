@@ -65,6 +65,7 @@ private:
     void stop_components();
 
     void on_read(const ring::Command &command, const ring::Result &result);
+    Frame *take_answer(const ring::Command &command, const ring::Result &result, const char *stage);
     void on_tracked(const ring::Command &command, const ring::Result &result);
     void on_rendered(const ring::Command &command, const ring::Result &result);
     void on_stage_lost(const std::vector<ring::Command> &unanswered, Frame::Stage waiting, const char *stage);
