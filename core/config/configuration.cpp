@@ -2,6 +2,7 @@
 #include "config/configuration.hpp"
 
 #include "camera/calibration.hpp"
+#include "config/options.hpp"
 #include "config/schema.hpp"
 
 #include <charconv>
@@ -84,6 +85,15 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plu
 }
 
 } // namespace
+
+std::vector<ring::OptionValue> options_for(const ring::PluginDescription &plugin, arhost_kind kind,
+                                           const ComponentConfiguration &component, std::size_t candidate) {
+    const bool configured = candidate == 0;
+    if (plugin.kind != kind)
+        component.node.require(configured ? "plugin" : "fallback")
+            .fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " + ring::to_text(kind));
+    return resolve_options(plugin, configured ? component.options : std::nullopt, component.path, component.node);
+}
 
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins) {
     root.allow_keys(keys_of(""));

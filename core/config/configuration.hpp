@@ -57,6 +57,12 @@ struct Configuration {
     std::optional<std::filesystem::path> stats{}; // absolute
 };
 
+// The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind
+// or the configured options do not fit it. `candidate` 0 is the plugin, 1 its fallback, which takes its
+// own defaults.
+std::vector<ring::OptionValue> options_for(const ring::PluginDescription &plugin, arhost_kind kind,
+                                           const ComponentConfiguration &component, std::size_t candidate);
+
 // Reads the whole; throws yaml::Error at the first fault. `built_in_plugins` is where arhost's own are.
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins);
 

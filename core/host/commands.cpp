@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/commands.hpp"
 
-#include "config/options.hpp"
 #include "config/schema.hpp"
 #include "host/probe.hpp"
 
@@ -160,15 +159,9 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
     const auto check_component = [&](const config::ComponentConfiguration &component, arhost_kind kind) {
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const ProbeResult result = probe(context, component.plugins[i]);
-            const yaml::Node node = component.node.require(i == 0 ? "plugin" : "fallback");
             if (const auto *reason = std::get_if<std::string>(&result))
-                node.fail(*reason);
-            const auto &plugin = std::get<ring::PluginDescription>(result);
-            if (plugin.kind != kind)
-                node.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " +
-                          ring::to_text(kind));
-            config::resolve_options(plugin, i == 0 ? component.options : std::nullopt, component.path,
-                                    component.node);
+                component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
+            config::options_for(std::get<ring::PluginDescription>(result), kind, component, i);
         }
     };
     check_component(configuration.source, ARHOST_KIND_SOURCE);

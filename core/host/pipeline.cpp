@@ -4,7 +4,6 @@
 #include "camera/calibration.hpp"
 #include "camera/mapping.hpp"
 #include "compositor/compositor.hpp"
-#include "config/options.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -73,32 +72,15 @@ Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &
     return hooks;
 }
 
-namespace {
-
-void check_kind(const PluginDescription &plugin, arhost_kind kind, const yaml::Node &node) {
-    if (plugin.kind != kind)
-        node.require("plugin").fail("'" + plugin.id + "' is a " + to_text(plugin.kind) + ", not a " + to_text(kind));
-}
-
-// Options for the plugin as configured; a fallback takes its defaults.
-Json options_for(const PluginDescription &plugin, const config::ComponentConfiguration &component,
-                 std::size_t candidate) {
-    const bool configured = candidate == 0;
-    return to_json(config::resolve_options(plugin, configured ? component.options : std::nullopt, component.path,
-                                           component.node));
-}
-
-} // namespace
-
 void Pipeline::make_source() {
     const config::SourceConfiguration &source = configuration_.source;
     Component::Hooks hooks = hooks_for("source", source.node);
     hooks.hello = [this, &source](const PluginDescription &plugin, std::size_t candidate) {
-        check_kind(plugin, ARHOST_KIND_SOURCE, source.node);
+        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate));
         Json setup = {{"first_sequence", next_read_}, {"fps", source.fps}, {"paced", live_}};
         if (configuration_.camera)
             setup["intrinsics"] = to_json(*configuration_.camera);
-        return Component::Create{{{"options", options_for(plugin, source, candidate)}, {"setup", setup}}, {}};
+        return Component::Create{{{"options", options}, {"setup", setup}}, {}};
     };
     hooks.ready = [this, &source](const Json &ready) {
         const arhost_frame_format format = format_from_json(ready.at("format"));
@@ -145,12 +127,12 @@ void Pipeline::make_tracker() {
         marker_ids_.insert(marker.id);
     Component::Hooks hooks = hooks_for("tracker", tracker.node);
     hooks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
-        check_kind(plugin, ARHOST_KIND_TRACKER, tracker.node);
+        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate));
         Json markers = Json::array();
         for (const arhost_marker_config &marker : tracker.markers)
             markers.push_back({{"id", marker.id}, {"side_mm", marker.side_mm}});
         return Component::Create{
-            {{"options", options_for(plugin, tracker, candidate)},
+            {{"options", options},
              {"setup", {{"format", to_json(*format_)}, {"intrinsics", to_json(intrinsics_)}, {"markers", markers}}}},
             {}};
     };
@@ -167,13 +149,13 @@ void Pipeline::make_raytracer() {
     const config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
     Component::Hooks hooks = hooks_for("raytracer", raytracer.node);
     hooks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
-        check_kind(plugin, ARHOST_KIND_RAYTRACER, raytracer.node);
+        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate));
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS))
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
                          plugin.id +
                              " can't trace through a distorted lens; the overlay will be off towards the corners");
         return Component::Create{
-            {{"options", options_for(plugin, raytracer, candidate)},
+            {{"options", options},
              {"setup",
               {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(intrinsics_)}}}},
             {arena_.fd()}};
@@ -206,11 +188,11 @@ void Pipeline::make_outputs() {
         sink->depth = live_ ? live_sink_depth : 0;
         Component::Hooks hooks = hooks_for(name, output.node);
         hooks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
-            check_kind(plugin, ARHOST_KIND_SINK, output.node);
+            const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SINK, output, candidate));
             if (plugin.capabilities & ARHOST_IS_REALTIME_SINK)
                 sink->depth = live_sink_depth; // a window never makes a film wait
             const double fps = configuration_.source.fps > 0 ? configuration_.source.fps : format_->fps;
-            return Component::Create{{{"options", options_for(plugin, output, candidate)},
+            return Component::Create{{{"options", options},
                                       {"setup",
                                        {{"width", format_->width},
                                         {"height", format_->height},
