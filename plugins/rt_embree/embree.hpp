@@ -9,6 +9,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <type_traits>
+
 // Always, since the kernels are compiled for several instruction sets and must not share a copy.
 #define RT_EMBREE_INLINE inline __attribute__((always_inline))
 
@@ -45,29 +47,79 @@ RT_EMBREE_INLINE const Query &query_of(const RTCFilterFunctionNArguments &argume
     return *reinterpret_cast<const Query *>(arguments.context);
 }
 
-// valid: 16 ints, −1 for the rays that are to be traced.
-RT_EMBREE_INLINE void intersect16(const int *valid, RTCScene scene, Query &query, RTCRayHit16 &rays) {
+// How many rays Embree traces together on this processor. Wider packets it takes apart into single rays
+// (Embree 4), or into streams that trace the rays that are not valid as well (Embree 3).
+inline int native_packet_width(RTCDevice device) {
+    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
+           : rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
+                                                                                     : 4;
+}
+
+namespace detail {
+
+// Calls one of Embree's rtcIntersect<n> and rtcOccluded<n>.
+template <auto function, class Rays>
+RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays &rays) {
 #if RTC_VERSION_MAJOR >= 4
-    RTCIntersectArguments arguments;
-    rtcInitIntersectArguments(&arguments);
+    std::conditional_t < requires {
+        rays.hit;
+    }
+    , RTCIntersectArguments, RTCOccludedArguments > arguments;
+    if constexpr (requires { rays.hit; })
+        rtcInitIntersectArguments(&arguments);
+    else
+        rtcInitOccludedArguments(&arguments);
     arguments.flags = query.flags;
     arguments.context = &query.context;
-    rtcIntersect16(valid, scene, &rays, &arguments);
+    function(valid, scene, &rays, &arguments);
 #else
-    rtcIntersect16(valid, scene, &query.context, &rays);
+    function(valid, scene, &query.context, &rays);
 #endif
 }
 
-RT_EMBREE_INLINE void occluded16(const int *valid, RTCScene scene, Query &query, RTCRay16 &rays) {
-#if RTC_VERSION_MAJOR >= 4
-    RTCOccludedArguments arguments;
-    rtcInitOccludedArguments(&arguments);
-    arguments.flags = query.flags;
-    arguments.context = &query.context;
-    rtcOccluded16(valid, scene, &rays, &arguments);
-#else
-    rtcOccluded16(valid, scene, &query.context, &rays);
-#endif
+// The same for 16 rays, in narrower packets. Both kinds of packet are rows of 4-byte numbers, one a ray.
+template <auto function, class Part, class Rays>
+RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &query, Rays &rays) {
+    constexpr int parts = sizeof(Rays) / sizeof(Part), width = 16 / parts;
+    constexpr int rows = sizeof(Rays) / (16 * sizeof(int)), row_bytes = width * sizeof(int);
+    static_assert(sizeof(Rays) == parts * sizeof(Part) && sizeof(Part) == rows * row_bytes);
+    for (int part = 0; part < parts; ++part, valid += width) {
+        int any = 0;
+        for (int i = 0; i < width; ++i)
+            any |= valid[i];
+        if (!any)
+            continue;
+        Part narrow;
+        char *const from = reinterpret_cast<char *>(&rays) + part * row_bytes,
+                    *to = reinterpret_cast<char *>(&narrow);
+        for (int row = 0; row < rows; ++row)
+            __builtin_memcpy(to + row * row_bytes, from + row * parts * row_bytes, row_bytes);
+        trace<function>(valid, scene, query, narrow);
+        for (int row = 0; row < rows; ++row)
+            __builtin_memcpy(from + row * parts * row_bytes, to + row * row_bytes, row_bytes);
+    }
+}
+
+} // namespace detail
+
+// valid: 16 ints, −1 for the rays that are to be traced, aligned to 64 bytes as the rays are.
+RT_EMBREE_INLINE void intersect16(const int *valid, RTCScene scene, int packet_width, Query &query,
+                                  RTCRayHit16 &rays) {
+    if (packet_width == 16)
+        detail::trace<rtcIntersect16>(valid, scene, query, rays);
+    else if (packet_width == 8)
+        detail::trace_in_parts<rtcIntersect8, RTCRayHit8>(valid, scene, query, rays);
+    else
+        detail::trace_in_parts<rtcIntersect4, RTCRayHit4>(valid, scene, query, rays);
+}
+
+RT_EMBREE_INLINE void occluded16(const int *valid, RTCScene scene, int packet_width, Query &query, RTCRay16 &rays) {
+    if (packet_width == 16)
+        detail::trace<rtcOccluded16>(valid, scene, query, rays);
+    else if (packet_width == 8)
+        detail::trace_in_parts<rtcOccluded8, RTCRay8>(valid, scene, query, rays);
+    else
+        detail::trace_in_parts<rtcOccluded4, RTCRay4>(valid, scene, query, rays);
 }
 
 } // namespace rt_embree

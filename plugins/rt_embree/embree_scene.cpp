@@ -160,6 +160,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     commit(root_.get());
 
     view_.root = root_.get();
+    view_.packet_width = native_packet_width(device_.get());
     view_.objects = objects_.data();
     const auto lights = elements<arhost_light>(arena, arena.lights);
     view_.lights = lights.data();

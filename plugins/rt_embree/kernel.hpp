@@ -32,6 +32,7 @@ struct Object {
 
 struct Scene {
     RTCScene root;
+    std::int32_t packet_width; // Embree's
     const Object *objects;
     const arhost_light *lights;
     std::uint32_t light_count;

@@ -49,7 +49,7 @@ ARHOST_INLINE Bool trace(const Scene &scene, Query query, RTCRayHit16 &rays, Boo
     store(valid, active);
     store(rays.hit.geomID, Int(no_hit));
     store(rays.hit.instID[0], Int(no_hit));
-    intersect16(valid, scene.root, query, rays);
+    intersect16(valid, scene.root, scene.packet_width, query, rays);
     return active & (load(rays.hit.geomID) != Int(no_hit));
 }
 
@@ -170,7 +170,7 @@ ARHOST_INLINE Bool unshadowed(const Scene &scene, const arhost_light &light, con
     store(valid, active);
     // Embree 3.13.5 hangs in coherent occlusion queries through instances with AVX-512.
     Query query = make_query(scene.has_instances ? Coherence::incoherent : Coherence::coherent);
-    occluded16(valid, scene.root, query, rays);
+    occluded16(valid, scene.root, scene.packet_width, query, rays);
     return active & (load(rays.tfar) >= Float(0.0f)); // −∞ where something was hit
 }
 
