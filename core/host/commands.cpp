@@ -73,10 +73,7 @@ config::Configuration read_configuration(const Arguments &arguments) {
 double cpu_seconds_of_host() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval &t) {
-        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-    };
-    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    return supervise::cpu_seconds(usage);
 }
 
 // Whole under its name, or not there: written beside it and renamed.
@@ -84,7 +81,10 @@ bool write_statistics(const fs::path &file, Console &console, const std::string 
     std::error_code ignored;
     if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) { // /dev/null, say
         std::ofstream stream(file);
-        return static_cast<bool>(stream << text << std::flush);
+        if (stream << text << std::flush)
+            return true;
+        console.log(ARHOST_SEVERITY_ERROR, "stats", "can't write " + file.string() + ": " + std::strerror(errno));
+        return false;
     }
     fs::create_directories(file.parent_path(), ignored);
     const fs::path temporary = file.string() + ".tmp";
@@ -101,22 +101,22 @@ bool write_statistics(const fs::path &file, Console &console, const std::string 
 } // namespace
 
 int run(const Arguments &arguments, supervise::Launcher &launcher) {
-    Console console(arguments.verbose);
     const config::Configuration configuration = read_configuration(arguments);
-
-    ring::Reactor reactor;
-    Pipeline *running = nullptr;
-    Pipeline pipeline(configuration, make_context(reactor, launcher, console),
-                      [&](const Progress &progress) { console.show(progress, running->statistics()); });
-    running = &pipeline;
 
     sigset_t signals;
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
     ::sigaddset(&signals, SIGTERM);
     ::sigaddset(&signals, SIGHUP);
-    ::sigprocmask(SIG_BLOCK, &signals, nullptr);
+    ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread, which must not take them
     const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
+
+    Console console(arguments.verbose);
+    ring::Reactor reactor;
+    Pipeline *running = nullptr;
+    Pipeline pipeline(configuration, make_context(reactor, launcher, console),
+                      [&](const Progress &progress) { console.show(progress, running->statistics()); });
+    running = &pipeline;
     bool stopped_by_signal = false;
     auto first_signal = std::chrono::steady_clock::time_point::min();
     const auto watch = reactor.watch(signal_fd.get(), [&] {

@@ -1,13 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/console.hpp"
 
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/sinks/stdout_sinks.h>
 
-#include <cstdio>
 #include <unistd.h>
 
 namespace arhost::host {
 namespace {
+
+constexpr std::size_t lines_in_wait = 1024;
+
+template <class Sink>
+std::shared_ptr<spdlog::logger> make_logger(const std::shared_ptr<spdlog::details::thread_pool> &thread) {
+    return std::make_shared<spdlog::async_logger>("arhost", std::make_shared<Sink>(), thread,
+                                                  spdlog::async_overflow_policy::overrun_oldest);
+}
 
 // Whatever a component logs, it stays one line and can't steer the terminal.
 std::string one_line(const std::string &text) {
@@ -22,9 +31,13 @@ std::string one_line(const std::string &text) {
 
 Console::Console(bool verbose)
     : terminal_(::isatty(STDERR_FILENO) != 0),
-      logger_(std::make_shared<spdlog::logger>("arhost", std::make_shared<spdlog::sinks::stderr_color_sink_st>())) {
-    logger_->set_pattern("%^%l%$: %v");
-    logger_->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
+      thread_(std::make_shared<spdlog::details::thread_pool>(lines_in_wait, 1)),
+      log_(make_logger<spdlog::sinks::stderr_color_sink_st>(thread_)),
+      line_(make_logger<spdlog::sinks::stderr_sink_st>(thread_)) {
+    log_->set_pattern("%^%l%$: %v");
+    log_->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
+    line_->set_formatter(
+        std::make_unique<spdlog::pattern_formatter>("%v", spdlog::pattern_time_type::local, std::string()));
 }
 
 Console::~Console() {
@@ -33,7 +46,7 @@ Console::~Console() {
 
 void Console::clear_line() {
     if (line_shown_)
-        std::fputs("\r\033[K", stderr);
+        line_->info("\r\033[K");
     line_shown_ = false;
 }
 
@@ -42,13 +55,13 @@ void Console::log(arhost_severity severity, const std::string &component, const 
                        : severity == ARHOST_SEVERITY_WARNING ? spdlog::level::warn
                        : severity == ARHOST_SEVERITY_INFO    ? spdlog::level::info
                                                              : spdlog::level::debug;
-    if (!logger_->should_log(level))
+    if (!log_->should_log(level))
         return;
     clear_line();
     const char *blame = severity == ARHOST_SEVERITY_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
                         : severity == ARHOST_SEVERITY_HOST_MISBEHAVING ? "the host misbehaves: "
                                                                        : "";
-    logger_->log(level, "{}: {}{}", component, blame, one_line(text));
+    log_->log(level, "{}: {}{}", component, blame, one_line(text));
 }
 
 void Console::show(const Progress &progress, const Statistics &statistics) {
@@ -70,10 +83,10 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
         if (const auto timing = statistics.stages.find(stage); timing != statistics.stages.end())
             line += fmt::format("  {} {:.1f} ms", stage, timing->second.percentile_ms(0.5));
     if (terminal_) {
-        std::fprintf(stderr, "\r\033[K%s", line.c_str());
+        line_->info("\r\033[K{}", line);
         line_shown_ = true;
     } else {
-        std::fprintf(stderr, "%s\n", line.c_str());
+        line_->info("{}\n", line);
     }
     last_shown_ = now;
     last_frame_ = progress.frame;

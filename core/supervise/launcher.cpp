@@ -12,7 +12,6 @@
 #include <poll.h>
 #include <set>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -112,10 +111,7 @@ void reap(int socket, std::set<pid_t> &spawned) {
         if (spawned.erase(reply.exit.pid) == 0)
             continue;                     // the orphan of a worker
         ::kill(-reply.exit.pid, SIGKILL); // what it has forked and left behind
-        const auto seconds = [](const timeval &t) {
-            return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-        };
-        reply.exit.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+        reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
 }
@@ -154,6 +150,13 @@ void reap(int socket, std::set<pid_t> &spawned) {
 }
 
 } // namespace
+
+double cpu_seconds(const rusage &usage) {
+    const auto seconds = [](const timeval &t) {
+        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
 
 Launcher::Launcher() {
     int ends[2];

@@ -11,6 +11,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <sys/resource.h>
 #include <sys/types.h>
 
 namespace arhost::supervise {
@@ -27,8 +28,10 @@ struct Spawned {
 struct Exit {
     pid_t pid;
     int wait_status;    // as of wait(2)
-    double cpu_seconds; // user and system
+    double cpu_seconds;
 };
+
+double cpu_seconds(const rusage &usage); // user and system
 
 class Launcher {
 public:

@@ -131,9 +131,7 @@ void Process::take_messages(int most) {
         try {
             if (message.body["type"] == "log") {
                 const auto severity = message.body.at("severity").get<arhost_severity>();
-                const std::string text = message.body.at("text").get<std::string>().substr(0, 4000);
-                remember(text);
-                context_.log(severity, name_, text);
+                log(severity, message.body.at("text").get<std::string>().substr(0, 4000));
             } else {
                 events_.message(message);
             }
@@ -141,6 +139,24 @@ void Process::take_messages(int most) {
             return end(std::string("can't be served: ") + error.what());
         }
     }
+}
+
+// What the plugin says; it must not drown what others say.
+void Process::log(arhost_severity severity, const std::string &text) {
+    constexpr int most_a_second = 100;
+    remember(text);
+    if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
+        if (lines_in_second_ > most_a_second)
+            context_.log(worst_left_out_, name_,
+                         std::to_string(lines_in_second_ - most_a_second) + " more lines within a second left out");
+        log_second_ends_ = now + std::chrono::seconds(1);
+        lines_in_second_ = 0;
+        worst_left_out_ = ARHOST_SEVERITY_DEBUG;
+    }
+    if (++lines_in_second_ <= most_a_second)
+        context_.log(severity, name_, text);
+    else
+        worst_left_out_ = std::max(worst_left_out_, severity);
 }
 
 void Process::on_doorbell() {
@@ -184,8 +200,7 @@ void Process::take_output(std::size_t most_bytes) {
                 partial_line_ += bytes[i];
                 continue;
             }
-            remember(partial_line_);
-            context_.log(ARHOST_SEVERITY_DEBUG, name_, partial_line_);
+            log(ARHOST_SEVERITY_DEBUG, partial_line_);
             partial_line_.clear();
         }
     }

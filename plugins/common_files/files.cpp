@@ -47,6 +47,14 @@ void make_parent_folders(const std::filesystem::path &file) {
         throw io_failure("can't make the folder", file.parent_path(), error.value());
 }
 
+void check_can_write(const std::filesystem::path &file) {
+    std::error_code ignored;
+    const bool is_new = !std::filesystem::exists(file, ignored);
+    File(file, O_WRONLY | O_CREAT);
+    if (is_new)
+        remove_file(file);
+}
+
 void remove_file(const std::filesystem::path &file) {
     if (::unlink(file.c_str()) != 0 && errno != ENOENT)
         throw io_failure("can't delete", file, errno);

@@ -21,6 +21,9 @@ Failure io_failure(const std::string &what, const std::filesystem::path &file, i
 // Makes the folders that `file` is to lie in.
 void make_parent_folders(const std::filesystem::path &file);
 
+// Fails now, rather than at the first frame, where `file` can't be written. Leaves it as it is.
+void check_can_write(const std::filesystem::path &file);
+
 // Deletes a file if it is there.
 void remove_file(const std::filesystem::path &file);
 

@@ -51,8 +51,7 @@ public:
 
     void start(const arhost_sink_setup &setup) {
         files::make_parent_folders(path_);
-        files::File(scratch_, O_WRONLY | O_CREAT); // tells now, rather than at a frame, where nothing can be written
-        files::remove_file(scratch_);
+        files::check_can_write(scratch_); // tells now, rather than at a frame
         if (pattern_) {
             if (setup.first_sequence == 0)
                 warn_of_older_images();
@@ -64,14 +63,17 @@ public:
                           "path: '" + path_.string() + "' is a folder: add a file's name");
         if (frame_ < 0)
             kept_.emplace(kept_path_, setup.width, setup.height, setup.first_sequence);
-        // From here on the file's presence tells, also after a restart, that it is this run's.
-        if (frame_ < 0 ? setup.first_sequence == 0 : setup.first_sequence <= wanted())
-            files::remove_file(path_);
+        may_be_older_ = frame_ < 0 ? setup.first_sequence == 0 : setup.first_sequence <= wanted();
     }
 
     arhost_status write(const arhost_output &output) {
         const Image image{output.width, output.height, output.stride, output.bgr};
         const std::uint64_t sequence = output.record->sequence;
+        // From the first frame on (a run that is refused harms nothing) the file's presence tells, also after
+        // a restart, that it is this run's.
+        if (may_be_older_)
+            files::remove_file(path_);
+        may_be_older_ = false;
         if (pattern_) {
             if (sequence % every_ == 0)
                 replace(pattern_->file(sequence), image);
@@ -89,7 +91,7 @@ public:
                 replace(path_, *last);
         kept_.reset();
         files::remove_file(kept_path_);
-        if (!pattern_ && !fs::exists(path_))
+        if (!pattern_ && (may_be_older_ || !fs::exists(path_)))
             host_.warn(
                 "'" + path_.string() + "' was not written: " +
                 (frame_ < 0 ? "no frame came" : "the run ended before frame " + std::to_string(frame_) + " came"));
@@ -120,6 +122,7 @@ private:
     std::int64_t frame_;  // of a plain path: which one, or -1, the last
     std::uint64_t every_; // of a pattern
     std::optional<images::LastFrame> kept_;
+    bool may_be_older_ = false; // than this run: what lies at `path_`
 };
 
 constexpr arhost_option_descriptor options[] = {

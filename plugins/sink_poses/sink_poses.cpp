@@ -20,15 +20,21 @@ public:
 
     void start(const arhost_sink_setup &setup) {
         arhost::files::make_parent_folders(path_);
-        file_.emplace(path_, O_RDWR | O_CREAT | O_APPEND);
-        end_ = setup.first_sequence == 0 ? 0 : end_of_frames_before(setup.first_sequence);
-        if (setup.first_sequence > 0 && end_ == 0)
+        if (setup.first_sequence == 0) // a run that is refused leaves an earlier log as it was
+            return arhost::files::check_can_write(path_);
+        open();
+        end_ = end_of_frames_before(setup.first_sequence);
+        if (end_ == 0)
             host_.warn("'" + path_ + "' holds no frame before " + std::to_string(setup.first_sequence) +
                        ": what was logged before the restart is gone");
         file_->truncate(end_);
     }
 
     arhost_status write(const arhost_output &output) {
+        if (!file_) {
+            open();
+            file_->truncate(0);
+        }
         line_.clear();
         arhost::poses::append_line(line_, *output.record);
         try {
@@ -42,6 +48,8 @@ public:
     }
 
 private:
+    void open() { file_.emplace(path_, O_RDWR | O_CREAT | O_APPEND); }
+
     // The log is whole lines, frames ascending, and after a kill perhaps a part of a line.
     std::uint64_t end_of_frames_before(std::uint64_t first_sequence) const {
         std::string text(file_->size(), '\0');

@@ -68,25 +68,17 @@ public:
         if (fs::is_directory(path_, ignored))
             throw Failure(ARHOST_ERROR_CONFIGURATION,
                           "path: '" + path_.string() + "' is a folder: add a file's name");
-        const auto first = static_cast<std::int64_t>(setup.first_sequence);
-        bool has_beginning = false;
-        for (const Segment &segment : find_segments(path_))
-            if (segment.first >= first)
-                files::remove_file(segment.path); // is made anew, or lies there from an earlier run
-            else
-                has_beginning |= segment.first == 0;
-        files::remove_file(partial_);
-        // The first segment goes first once the film is in place: a kill after that leaves nothing to do.
-        finished_ = first > 0 && !has_beginning && fs::exists(path_, ignored);
-        if (first > 0 && !has_beginning && !finished_)
-            host_.warn("the film's part before frame " + std::to_string(first) + " is gone: '" +
-                       segment_of(path_, 0).path.string() + "' is not there");
-        writer_.emplace(segment_of(path_, first).path, encoder_->context());
+        files::check_can_write(partial_);
+        first_ = static_cast<std::int64_t>(setup.first_sequence);
+        if (first_ > 0)
+            begin();
     }
 
     arhost_status write(const arhost_output &output) {
         if (static_cast<int>(output.width) != settings_.width || static_cast<int>(output.height) != settings_.height)
             throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "a frame's size is not that of the start");
+        if (!writer_)
+            begin();
         const auto number = static_cast<std::int64_t>(output.record->sequence);
         writer_->append(encoder_->encode(output.bgr, output.stride, number));
         finished_ = false;
@@ -94,6 +86,8 @@ public:
     }
 
     void stop() {
+        if (!writer_)
+            return host_.warn("no frame came: '" + path_.string() + "' was not written");
         writer_.reset();
         encoder_.reset();
         const std::vector<Segment> segments = find_segments(path_);
@@ -104,6 +98,24 @@ public:
     }
 
 private:
+    // Not before a frame is there: a run that is refused leaves what an earlier one could not finish.
+    void begin() {
+        bool has_beginning = false;
+        for (const Segment &segment : find_segments(path_))
+            if (segment.first >= first_)
+                files::remove_file(segment.path); // is made anew, or lies there from an earlier run
+            else
+                has_beginning |= segment.first == 0;
+        files::remove_file(partial_);
+        // The first segment goes first once the film is in place: a kill after that leaves nothing to do.
+        std::error_code ignored;
+        finished_ = first_ > 0 && !has_beginning && fs::exists(path_, ignored);
+        if (first_ > 0 && !has_beginning && !finished_)
+            host_.warn("the film's part before frame " + std::to_string(first_) + " is gone: '" +
+                       segment_of(path_, 0).path.string() + "' is not there");
+        writer_.emplace(segment_of(path_, first_).path, encoder_->context());
+    }
+
     void finish(const std::vector<Segment> &segments) {
         try {
             const std::int64_t frames = join(
@@ -127,6 +139,7 @@ private:
     EncoderSettings settings_;
     std::optional<Encoder> encoder_;
     std::optional<SegmentWriter> writer_;
+    std::int64_t first_ = 0; // number of the frame to begin with
     bool finished_ = false; // by a process that died before it could say so
 };
 

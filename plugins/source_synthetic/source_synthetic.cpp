@@ -184,14 +184,8 @@ private:
             skipped_ += late;
             frame += late;
         }
-        for (;;) {
-            const std::int64_t left_ns = epoch_ns_ + time_ns(frame) - now_ns();
-            if (left_ns <= 0)
-                return ARHOST_OK;
-            if (host_.cancelled())
-                return ARHOST_ERROR_CANCELLED;
-            std::this_thread::sleep_for(std::chrono::nanoseconds(std::min<std::int64_t>(left_ns, 20'000'000)));
-        }
+        const std::chrono::steady_clock::time_point due(std::chrono::nanoseconds(epoch_ns_ + time_ns(frame)));
+        return host_.wait_until(due) ? ARHOST_OK : ARHOST_ERROR_CANCELLED;
     }
 
     arhost::Host host_;

@@ -195,11 +195,18 @@ TEST_F(SinkImages, TheChosenFrameSurvivesARestartBeforeAndAfterIt) {
     }
 }
 
-TEST_F(SinkImages, AnImageOfAnEarlierRunIsNotTakenForThisOnes) {
+TEST_F(SinkImages, AnImageOfAnEarlierRunIsNotTakenForThisOnesButStaysUntilAFrameComes) {
     for (const char *frame : {"-1", "9"}) {
         std::ofstream(path("demo.png")) << "old";
         SinkUnderTest s = sink("demo.png", {{"frame", frame}});
         ASSERT_EQ(s.start(width, height), ARHOST_OK);
+        EXPECT_EQ(read_text(path("demo.png")), "old") << "the run may yet be refused";
+        ASSERT_EQ(s.write(0, 1), ARHOST_OK);
+        if (frame == std::string("-1")) {
+            ASSERT_EQ(s.stop(), ARHOST_OK);
+            EXPECT_NE(read_text(path("demo.png")), "old");
+            continue;
+        }
         EXPECT_EQ(s.stop(), ARHOST_OK);
         EXPECT_THAT(names(), IsEmpty());
         EXPECT_THAT(s.log(), HasSubstr("3 '" + path("demo.png").string() + "' was not written"));

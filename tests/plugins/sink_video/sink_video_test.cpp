@@ -326,6 +326,14 @@ TEST_F(SinkVideo, AFreshStartRemovesWhatAnEarlierRunLeft) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from7.txt", "demo.mp4"));
 }
 
+TEST_F(SinkVideo, ARunThatIsRefusedLeavesWhatAnEarlierOneCouldNotFinish) {
+    run_and_die(0, 5);
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    EXPECT_EQ(s.stop(), ARHOST_OK);
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
+}
+
 TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsWhole) {
     run(sink(), 0, 3);
     const std::string old = read_text(path());
@@ -407,7 +415,7 @@ TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
     const UnwritableFolder locked(path("locked"));
     SinkUnderTest s = sink({{"path", path("locked/demo.mp4").string()}});
     EXPECT_EQ(s.start(width, height), ARHOST_ERROR_IO);
-    EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.from0.mkv': Permission denied"));
+    EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.partial': Permission denied"));
 }
 
 TEST_F(SinkVideo, NoPartOfThePathIsTakenForAProtocolOrPattern) {

@@ -18,11 +18,13 @@
 #include <arhost/arhost.h>
 
 #include <algorithm>
+#include <chrono>
 #include <new>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <thread>
 
 namespace arhost {
 
@@ -46,6 +48,18 @@ public:
     void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
     bool cancelled() const { return host_->cancelled(host_) != 0; }
+    // Sleeps until `when`, or until the host cancels: then it returns false.
+    bool wait_until(std::chrono::steady_clock::time_point when) const {
+        constexpr auto patience = std::chrono::milliseconds(20); // between looks at cancelled()
+        for (;;) {
+            const auto now = std::chrono::steady_clock::now();
+            if (now >= when)
+                return true;
+            if (cancelled())
+                return false;
+            std::this_thread::sleep_until(std::min(when, now + patience));
+        }
+    }
 
 private:
     const arhost_host *host_;
