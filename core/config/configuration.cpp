@@ -141,9 +141,11 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", plugin_path, restart));
     std::set<std::filesystem::path> files;
-    for (const ComponentConfiguration &output : configuration.outputs)
-        if (output.path && !files.insert(std::filesystem::absolute(output.path->text()).lexically_normal()).second)
-            output.path->fail("another output writes '" + output.path->text() + "' already");
+    for (const ComponentConfiguration &output : configuration.outputs) {
+        const auto path = output.path || !output.options ? output.path : output.options->find("path");
+        if (path && !files.insert(std::filesystem::absolute(path->text()).lexically_normal()).second)
+            path->fail("another output writes '" + path->text() + "' already");
+    }
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =

@@ -9,7 +9,7 @@ using namespace ring;
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene,
                            std::chrono::milliseconds patience, Hooks hooks)
-    : context_(context), hooks_(std::move(hooks)), patience_(patience) {
+    : context_(context), hooks_(std::move(hooks)), scene_(scene.string()), patience_(patience) {
     supervise::Process::Events events;
     events.message = [this](Message &message) {
         const std::string type = message.body.at("type").get<std::string>();
@@ -30,7 +30,8 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
 
 void SceneLoading::watch() {
     deadline_ = context_.reactor.at(Reactor::Clock::now() + patience_, [this] {
-        process_->end("without a word of progress for " + std::to_string(patience_.count()) + " ms");
+        process_->end("without a word of progress for " + std::to_string(patience_.count()) +
+                      " ms (raytracer.start_deadline_ms)");
     });
 }
 
@@ -38,7 +39,7 @@ void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
     const Hooks hooks = std::move(hooks_);
     if (!death.clean || !arena_)
-        return hooks.failed(failure_.empty() ? "the scene loader was " + death.how : failure_);
+        return hooks.failed(failure_.empty() ? scene_ + ": the scene loader was " + death.how : failure_);
     try {
         // The loader is gone, so nobody maps it writable; where somebody does, this throws.
         SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));

@@ -31,7 +31,7 @@ private:
 
     supervise::Context &context_;
     Hooks hooks_;
-    std::string failure_;
+    std::string scene_, failure_;
     ring::UniqueFd arena_;
     std::chrono::milliseconds patience_;
     ring::Reactor::Registration deadline_;

@@ -31,7 +31,9 @@ double finite(const Json &json, const char *key) {
 Json to_json(const arhost_descriptor &d) {
     Json options = Json::array();
     for (std::uint32_t i = 0; i < d.option_count; ++i) {
-        const arhost_option_descriptor &o = d.options[i];
+        // Elements are as long as the plugin's headers had them, which may be newer than these.
+        const auto &o = *reinterpret_cast<const arhost_option_descriptor *>(
+            reinterpret_cast<const char *>(d.options) + std::size_t(i) * d.options->struct_size);
         Json option = {{"key", text_or_empty(o.key)},
                        {"type", o.type},
                        {"minimum", o.minimum},

@@ -49,6 +49,18 @@ void Reactor::run_once() {
         timeout_ms = static_cast<int>(
             std::clamp<std::int64_t>(std::chrono::ceil<std::chrono::milliseconds>(left).count(), 0, 60'000));
     }
+    take_events(timeout_ms);
+    if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
+        take_events(0); // what came while this process was stopped came in time
+    if (overslept(Clock::now()))
+        return;
+    while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
+        auto due = deadlines_.extract(deadlines_.begin());
+        due.mapped().callback();
+    }
+}
+
+void Reactor::take_events(int timeout_ms) {
     std::array<epoll_event, 32> events;
     const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), timeout_ms);
     if (count < 0 && errno != EINTR)
@@ -61,10 +73,19 @@ void Reactor::run_once() {
         const std::shared_ptr<Callback> callback = found->second.callback;
         (*callback)();
     }
-    while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
-        auto due = deadlines_.extract(deadlines_.begin());
-        due.mapped().callback();
-    }
+}
+
+// A deadline that is seen much too late tells that this process did not run; others may not have run either.
+// Postpones all deadlines by the time since the last look: at worst a hang is found that much later.
+bool Reactor::overslept(Clock::time_point now) {
+    const Clock::time_point before = std::exchange(looked_at_deadlines_, now);
+    if (deadlines_.empty() || now - std::max(deadlines_.begin()->first, before) < std::chrono::milliseconds(250))
+        return false;
+    std::multimap<Clock::time_point, Deadline> postponed;
+    for (auto &[when, deadline] : deadlines_)
+        postponed.emplace_hint(postponed.end(), when + (now - before), std::move(deadline));
+    deadlines_ = std::move(postponed);
+    return true;
 }
 
 } // namespace arhost::ring

@@ -47,7 +47,8 @@ public:
     // Calls back once.
     [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
 
-    // Waits until something happens, and handles it.
+    // Waits until something happens, and handles it. What has come in counts before a deadline does, and time
+    // in which this process did not run (Ctrl-Z, a frozen container) counts for none.
     void run_once();
 
 private:
@@ -60,11 +61,14 @@ private:
         Callback callback;
     };
     void remove(std::uint64_t id);
+    void take_events(int timeout_ms);
+    bool overslept(Clock::time_point now);
 
     UniqueFd epoll_;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
+    Clock::time_point looked_at_deadlines_ = Clock::now();
 };
 
 } // namespace arhost::ring

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
+#include <fstream>
 #include <poll.h>
 #include <set>
 #include <sys/prctl.h>
@@ -100,6 +101,31 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     send_struct(socket, reply, {pidfd.get()});
 }
 
+// Kills every child that is no worker: the launcher is the subreaper, so what a worker leaves behind comes here,
+// and what that has left behind with the next call.
+void kill_orphans(const std::set<pid_t> &workers) {
+    std::ifstream children("/proc/thread-self/children");
+    for (pid_t child; children >> child;)
+        if (!workers.contains(child))
+            ::kill(child, SIGKILL);
+}
+
+// The host is gone: so are the workers in a moment, and so must be what they have started.
+[[noreturn]] void end_all(const std::set<pid_t> &spawned) {
+    for (const pid_t worker : spawned)
+        ::kill(-worker, SIGKILL);
+    for (int i = 0; i < 500; ++i) { // a process that hangs in the kernel is not waited for
+        kill_orphans({});
+        pid_t gone;
+        while ((gone = ::waitpid(-1, nullptr, WNOHANG)) > 0) {
+        }
+        if (gone < 0)
+            break;
+        ::usleep(1000);
+    }
+    ::_exit(0);
+}
+
 void reap(int socket, std::set<pid_t> &spawned) {
     for (;;) {
         Reply reply{};
@@ -107,10 +133,10 @@ void reap(int socket, std::set<pid_t> &spawned) {
         reply.kind = Reply::exited;
         reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
         if (reply.exit.pid <= 0)
-            return;
+            return kill_orphans(spawned);
         if (spawned.erase(reply.exit.pid) == 0)
             continue;                     // the orphan of a worker
-        ::kill(-reply.exit.pid, SIGKILL); // what it has forked and left behind
+        ::kill(-reply.exit.pid, SIGKILL); // what it has forked; kill_orphans finds what has left its group
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -120,7 +146,7 @@ void reap(int socket, std::set<pid_t> &spawned) {
     ::prctl(PR_SET_NAME, "arhost-launcher");
     ::prctl(PR_SET_CHILD_SUBREAPER, 1);
     std::set<pid_t> spawned;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    // No PR_SET_PDEATHSIG: the socket tells when the host is gone, and then there is something left to do.
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGHUP, SIG_IGN);
@@ -143,7 +169,7 @@ void reap(int socket, std::set<pid_t> &spawned) {
             Request request;
             std::vector<UniqueFd> fds;
             if (!receive_struct(socket, request, fds) || fds.size() != 3)
-                ::_exit(0); // the host is gone; the workers follow
+                end_all(spawned);
             spawn_for(socket, request, fds, spawned);
         }
     }

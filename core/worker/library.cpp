@@ -65,6 +65,10 @@ const arhost_plugin &open_plugin(const std::filesystem::path &file) {
         refuse("lacks create, destroy or get_extension");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
         refuse("its descriptor counts options but lists none");
+    if (plugin->descriptor->option_count > 0 &&
+        (plugin->descriptor->options->struct_size < sizeof(arhost_option_descriptor) ||
+         plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
+        refuse("its options' struct_size is not that of an arhost_option_descriptor");
     if (!plugin->functions || !kind_is_complete(plugin->descriptor->kind, plugin->functions))
         refuse("its kind is unknown or lacks a function that the kind must have");
     return *plugin;

@@ -49,8 +49,9 @@ public:
     bool exists(const std::string &name) const { return std::filesystem::exists(path(name)); }
     nlohmann::json stats() const { return nlohmann::json::parse(read("stats.json")); }
 
-    // Starts `arhost ARGUMENTS`; output() and wait() follow.
-    void start(std::vector<std::string> arguments = {"--config", "run.yaml"}) {
+    // Starts `arhost ARGUMENTS`; output() and wait() follow. `prepare` is called in the child, which becomes arhost.
+    void start(
+        std::vector<std::string> arguments = {"--config", "run.yaml"}, void (*prepare)() = [] {}) {
         pid_ = ::fork();
         if (pid_ == 0) {
             if (::chdir(folder_.path().c_str()) != 0)
@@ -58,6 +59,7 @@ public:
             const int out = ::open("output.txt", O_CREAT | O_WRONLY | O_TRUNC | O_APPEND, 0644);
             ::dup2(out, STDOUT_FILENO);
             ::dup2(out, STDERR_FILENO);
+            prepare();
             ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
             arguments.insert(arguments.begin(), ARHOST_BINARY_DIRECTORY "/bin/arhost");
             std::vector<char *> argv;
@@ -145,8 +147,8 @@ struct CountedLine {
     std::string overlay;
     int kind;
 };
-inline std::vector<CountedLine> counted(const ArhostRun &run) {
-    std::istringstream text(run.read("counted.txt"));
+inline std::vector<CountedLine> counted(const ArhostRun &run, const std::string &file = "counted.txt") {
+    std::istringstream text(run.read(file));
     std::vector<CountedLine> lines;
     for (CountedLine line; text >> line.sequence >> line.video >> line.overlay >> line.kind;)
         lines.push_back(line);

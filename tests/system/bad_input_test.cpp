@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include <sys/stat.h>
+
 using namespace arhost::test;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -18,6 +20,14 @@ std::string replaced(std::string text, const std::string &from, const std::strin
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     return text.replace(at, from.size(), to);
+}
+
+// Takes a parser more than half a second.
+std::string big_scene() {
+    std::string text = "version: 1\nnumbers: [0";
+    for (int i = 0; i < 300'000; ++i)
+        text += ", 0";
+    return text + "]\n";
 }
 
 struct Case {
@@ -127,6 +137,27 @@ const std::vector<Case> cases = {
      good + "camera: {file: none.yaml}\n",
      small_scene,
      {"run.yaml:8:", "camera.file", "none.yaml does not exist"}},
+    {"TwoOutputsOfOneFile",
+     replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, path: ./counted.txt}"),
+     small_scene,
+     {"run.yaml:6:", "another output writes './counted.txt' already"}},
+    {"TwoOutputsOfOneFileByAnOption",
+     replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, options: {path: counted.txt}}"),
+     small_scene,
+     {"run.yaml:6:", "another output writes 'counted.txt' already"}},
+    {"SceneThatIsAFifo",
+     replaced(good, "scene.yaml", "fifo.obj"),
+     small_scene,
+     {"run.yaml:5:", "there is no scene file"}},
+    {"SceneWithAMeshThatIsAFifo",
+     good,
+     replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: fifo.obj"),
+     {"scene.yaml:4:", "fifo.obj", "is not a regular file"}},
+    {"CalibrationThatIsAFifo", good + "camera: {file: fifo.obj}\n", small_scene, {"fifo.obj", "no regular file"}},
+    {"SceneThatIsLoadedTooSlowly",
+     replaced(good, "scene.yaml,", "scene.yaml, start_deadline_ms: 20,"),
+     big_scene(),
+     {"scene.yaml: the scene loader was without a word of progress for 20 ms", "raytracer.start_deadline_ms"}},
     {"ZeroAxis",
      good + "coordinates: {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [0, 0, 0]}]}\n",
      small_scene,
@@ -147,6 +178,7 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
     run.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
     run.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
     run.write("empty.obj", "v 0 0 0\n");
+    ASSERT_EQ(::mkfifo(run.path("fifo.obj").c_str(), 0600), 0);
     EXPECT_EQ(run.run(), 2) << run.output();
     const std::string output = run.output();
     for (const std::string &part : GetParam().expected)
@@ -158,6 +190,13 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, testing::ValuesIn(cases), [](const auto &info) { return info.param.name; });
+
+TEST(Check, EndsWhereTheSceneIsLoadedTooSlowly) {
+    ArhostRun run(good);
+    run.write("scene.yaml", big_scene());
+    EXPECT_EQ(run.run({"check", "run.yaml", "--set", "raytracer.start_deadline_ms=20"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader was without a word of progress for 20 ms"));
+}
 
 TEST(BadCommandLine, IsRefused) {
     ArhostRun run(good);

@@ -92,8 +92,23 @@ TEST(Run, FeedsSeveralOutputs) {
     EXPECT_EQ(run.read("counted.txt"), run.read("second.txt"));
 }
 
+TEST(Run, ASlowWindowDropsItsOwnFramesAndTheFileGetsAll) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 200}}\n"
+                  "outputs:\n- {plugin: sink_realtime, path: window.txt, options: {delay_ms: 50}}\n"
+                  "- {plugin: sink_counter, path: counted.txt}\nstats: stats.json\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 200u);
+    for (std::uint64_t i = 0; i < 200; ++i)
+        EXPECT_EQ(lines[i].sequence, i);
+    const auto shown = static_cast<std::uint64_t>(counted(run, "window.txt").size());
+    const auto dropped = run.stats()["frames"]["dropped"].value("sink_realtime", std::uint64_t(0));
+    EXPECT_EQ(shown + dropped, 200u);
+    EXPECT_GT(dropped, 50u) << "the run waited for a window";
+}
+
 TEST(Run, FinishesItsFilesOnCtrlCAndExitsWith130) {
-    for (const int signal : {SIGINT, SIGTERM}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         ArhostRun run(counting("lockstep", "frames: 100000", "", "delay_ms: 1"));
         run.write("scene.yaml", small_scene);
         run.start();
@@ -105,6 +120,82 @@ TEST(Run, FinishesItsFilesOnCtrlCAndExitsWith130) {
         expect_every_frame_augmented(run, lines.size());
         EXPECT_EQ(run.stats()["frames"]["composited"], lines.size());
     }
+}
+
+TEST(Run, TakesTwoSignalsInOneMomentForOne) { // timeout(1) sends to the process and to its group
+    ArhostRun run(counting("lockstep", "frames: 100000", "", "delay_ms: 1"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    while (run.running() && counted(run).size() < 20)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (int i = 0; i < 3 && run.running(); ++i) {
+        ::kill(run.pid(), SIGTERM);
+        std::this_thread::sleep_for(std::chrono::milliseconds(3));
+    }
+    ASSERT_EQ(run.wait(), 130) << run.output();
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    expect_every_frame_augmented(run, counted(run).size());
+}
+
+TEST(Run, ASecondCtrlCALittleLaterEndsItAtOnce) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100000, delay_ms: 1}}\n"
+                  "outputs: [{plugin: sink_counter, path: counted.txt, options: {hang_in_stop: true}}]\n");
+    run.start();
+    while (run.running() && counted(run).size() < 20)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ::kill(run.pid(), SIGINT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    ASSERT_TRUE(run.running()) << "it was to wait for the output";
+    ::kill(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(std::chrono::seconds(5)), 130) << run.output();
+}
+
+TEST(Run, NeedsNoStandardStreams) {
+    struct {
+        const char *name;
+        void (*prepare)();
+    } const cases[] = {{"closed",
+                        [] {
+                            for (int fd : {0, 1, 2})
+                                ::close(fd);
+                        }},
+                       {"a pipe that nobody reads", [] {
+                            int ends[2];
+                            if (::pipe(ends) != 0)
+                                ::_exit(126);
+                            ::dup2(ends[1], STDOUT_FILENO);
+                            ::dup2(ends[1], STDERR_FILENO);
+                            ::close(ends[0]);
+                            ::close(ends[1]);
+                            ::signal(SIGPIPE, SIG_DFL);
+                        }}};
+    for (const auto &c : cases) {
+        ArhostRun run(counting("lockstep", "frames: 60, crash_at: 30", "crash_at: 20", "error_at: 10"));
+        run.write("scene.yaml", small_scene);
+        // The source dies at frame 30 each time, which is logged, too.
+        run.start({"--config", "run.yaml", "-v", "--set", "restart.first_delay_ms=1"}, c.prepare);
+        EXPECT_EQ(run.wait(), 1) << c.name;
+        const auto lines = counted(run);
+        ASSERT_EQ(lines.size(), 30u) << c.name;
+        for (std::uint64_t i = 0; i < lines.size(); ++i)
+            EXPECT_EQ(lines[i].overlay, i == 10 || i == 20 ? "none" : std::to_string(i)) << c.name;
+        EXPECT_EQ(run.stats()["frames"]["composited"], 30) << c.name;
+    }
+}
+
+TEST(Run, WritesItsStatisticsToSpecialFilesToo) {
+    for (const char *file : {"/dev/null", "/dev/full", "."}) {
+        ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
+                      "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: " +
+                      std::string(file) + "\n");
+        const bool works = std::string(file) == "/dev/null";
+        EXPECT_EQ(run.run(), works ? 0 : 1) << run.output();
+        EXPECT_EQ(counted(run).size(), 5u);
+        if (!works) {
+            EXPECT_THAT(run.output(), HasSubstr("stats: can't write "));
+        }
+    }
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 TEST(Run, LeavesNoProcessBehindWhenItIsKilled) {
@@ -144,6 +235,8 @@ TEST(CommandLine, TellsVersionHelpAndPlugins) {
     EXPECT_THAT(run.output(), HasSubstr("broken_version     can't be used: "));
     EXPECT_THAT(run.output(), HasSubstr("no_plugin          can't be used: "));
     EXPECT_THAT(run.output(), HasSubstr("while its library was loaded"));
+    EXPECT_THAT(run.output(), HasSubstr("first                The first of three (default '1')"));
+    EXPECT_THAT(run.output(), HasSubstr("third                The third of three (default 'c')"));
     EXPECT_EQ(run.run({}), 2);
     EXPECT_EQ(run.run({"--nonsense"}), 2);
 }

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include <iterator>
 #include <random>
 
 using namespace arhost::test;
@@ -28,6 +29,17 @@ void expect_all_frames_in_order(const ArhostRun &run, std::uint64_t frames) {
 void wait_for_frames(const ArhostRun &run, std::size_t frames) {
     while (run.running() && counted(run).size() < frames)
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
+
+bool is_gone(pid_t pid) {
+    for (int i = 0; i < 1000 && ::kill(pid, 0) == 0; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    return ::kill(pid, 0) != 0;
+}
+
+std::vector<pid_t> forked_children(const ArhostRun &run) {
+    std::istringstream text(run.read("children.txt"));
+    return {std::istream_iterator<pid_t>(text), {}};
 }
 
 } // namespace
@@ -62,6 +74,143 @@ TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
     expect_all_frames_in_order(run, 40);
     EXPECT_THAT(run.output(), HasSubstr("hung: no answer within 700 ms"));
     EXPECT_EQ(counted(run)[20].overlay, "none");
+}
+
+TEST(Supervision, AHungPluginThatIgnoresSigabrtIsKilled) {
+    ArhostRun run(counting("lockstep", "frames: 30", "hang_at: 20, ignore_abort: true", ""));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml", "--set", "tracker.deadline_ms=100"});
+    ASSERT_EQ(run.wait(std::chrono::seconds(20)), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(counted(run)[20].overlay, "none");
+    const std::string how = run.stats()["crashes"][0]["how"];
+    EXPECT_THAT(how, HasSubstr("hung"));
+    EXPECT_THAT(how, HasSubstr("signal 9"));
+}
+
+TEST(Supervision, AWorkerThatClosesItsControlChannelIsStartedAgain) {
+    ArhostRun run(counting("lockstep", "frames: 90, delay_ms: 20", "close_control_at: 10", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 90);
+    EXPECT_THAT(run.output(), HasSubstr("closed its control channel"));
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
+}
+
+TEST(Supervision, APluginThatCallsExitIsStartedAgain) {
+    ArhostRun run(counting("lockstep", "frames: 30", "exit_at: 15", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(counted(run)[15].overlay, "none");
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 2);
+}
+
+TEST(Supervision, ABackendThatIsGivenUpInMidRunTakesNoFrameWithIt) {
+    struct Case {
+        const char *tracker, *raytracer, *component;
+    };
+    for (const Case &c : {Case{"crash_at: 20", "", "tracker"}, Case{"", "crash_at: 20", "raytracer"}}) {
+        ArhostRun run(counting("lockstep", "frames: 60", c.tracker, c.raytracer,
+                               "restart: {proven_after_frames: 1000, quarantine_after: 1}\n"));
+        run.write("scene.yaml", small_scene);
+        EXPECT_EQ(run.run(), 1);
+        expect_all_frames_in_order(run, 60);
+        const auto lines = counted(run);
+        ASSERT_EQ(lines.size(), 60u);
+        for (std::uint64_t i = 0; i < 60; ++i)
+            EXPECT_EQ(lines[i].overlay == "none", i >= 20) << c.component << " " << i;
+        EXPECT_THAT(run.output(), HasSubstr("the video goes on without it"));
+    }
+}
+
+TEST(Supervision, AnOutputThatIsGivenUpInMidRunTakesNoFrameOfTheOthersWithIt) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 60}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
+                  "options: {crash_at: 20}}\nrestart: {proven_after_frames: 1000, quarantine_after: 1}\n");
+    EXPECT_EQ(run.run(), 1);
+    expect_all_frames_in_order(run, 60);
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+}
+
+TEST(Supervision, AWorkerThatSealsItsMemoryDoesNoHarm) {
+    for (const char *seal : {"seal", "write"}) {
+        ArhostRun run(
+            counting("lockstep", "frames: 30", std::string("seal: ") + seal, "", "restart: {first_delay_ms: 1}\n"));
+        run.write("scene.yaml", small_scene);
+        ASSERT_EQ(run.run(), 0) << run.output();
+        expect_all_frames_in_order(run, 30);
+        EXPECT_EQ(run.stats()["restarts"]["tracker"], 1) << seal;
+        EXPECT_EQ(run.stats()["frames"]["augmented"], 30) << seal;
+    }
+}
+
+TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
+    const std::string yaml = counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", "");
+    enum class End { worker_dies, run_stops, host_is_killed };
+    for (const End end : {End::worker_dies, End::run_stops, End::host_is_killed}) {
+        ArhostRun run(yaml);
+        run.write("scene.yaml", small_scene);
+        run.start();
+        wait_for_frames(run, 20);
+        const std::vector<pid_t> children = forked_children(run);
+        ASSERT_EQ(children.size(), 2u);
+        if (end == End::worker_dies)
+            ::kill(run.worker("tracker_counter"), SIGKILL);
+        else
+            ::kill(run.pid(), end == End::run_stops ? SIGTERM : SIGKILL);
+        for (const pid_t child : children) {
+            EXPECT_TRUE(is_gone(child)) << static_cast<int>(end);
+            ::kill(child, SIGKILL);
+        }
+        if (end == End::worker_dies) {
+            EXPECT_TRUE(run.running());
+        }
+    }
+}
+
+TEST(Supervision, APluginsLastWordsNeedNotBeUtf8) {
+    ArhostRun run(counting("lockstep", "frames: 30", "crash_at: 20", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.stats()["crashes"][0]["log_tail"].get<std::string>(), HasSubstr("last words: \uFFFD"));
+}
+
+// As Ctrl-Z does for longer than a deadline: the workers go on, their answers wait for the host.
+TEST(Supervision, NothingIsTakenForHungBecauseTheHostWasStopped) {
+    ArhostRun run(counting("lockstep", "frames: 120", "", "delay_ms: 5"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    for (const std::size_t frame : {20, 60}) {
+        wait_for_frames(run, frame);
+        ::kill(run.pid(), SIGSTOP);
+        std::this_thread::sleep_for(std::chrono::milliseconds(800));
+        ::kill(run.pid(), SIGCONT);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_all_frames_in_order(run, 120);
+    EXPECT_THAT(run.output(), testing::Not(HasSubstr("hung")));
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 120);
+}
+
+// As a container that is frozen: the workers have not run, and the host may be thawed first.
+TEST(Supervision, NothingIsTakenForHungBecauseAllWereStopped) {
+    ArhostRun run(counting("lockstep", "frames: 100", "", "delay_ms: 5"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    wait_for_frames(run, 20);
+    const std::vector<pid_t> workers = run.workers();
+    for (const pid_t worker : workers)
+        ::kill(worker, SIGSTOP);
+    ::kill(run.pid(), SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    ::kill(run.pid(), SIGCONT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    for (const pid_t worker : workers)
+        ::kill(worker, SIGCONT);
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_all_frames_in_order(run, 100);
+    EXPECT_THAT(run.output(), testing::Not(HasSubstr("hung")));
 }
 
 TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <optional>
+#include <thread>
 
 using namespace arhost::ring;
 using namespace std::chrono_literals;
@@ -59,6 +60,42 @@ TEST(Reactor, LetsACallbackEndItsOwnWatchAndAnother) {
     two.put();
     reactor.run_once();
     EXPECT_EQ(calls, 1) << "the other watch was called after its end";
+}
+
+TEST(Reactor, TakesWhatHasComeBeforeADeadline) {
+    Reactor reactor;
+    const Pipe pipe;
+    bool missed = false;
+    auto deadline = reactor.at(Reactor::Clock::now() + 5ms, [&] { missed = true; });
+    Reactor::Registration watch, delay;
+    watch = reactor.watch(pipe.read.get(), [&] { deadline.cancel(), watch.cancel(); });
+    const Pipe busy;
+    delay = reactor.watch(busy.read.get(), [&] {
+        std::this_thread::sleep_for(10ms); // the answer comes while this process is busy
+        pipe.put();
+        delay.cancel();
+    });
+    busy.put();
+    while (watch.active())
+        reactor.run_once();
+    EXPECT_FALSE(missed);
+}
+
+TEST(Reactor, DoesNotCountTimeInWhichThisProcessDidNotRun) {
+    Reactor reactor;
+    const Pipe pipe;
+    bool missed = false;
+    auto deadline = reactor.at(Reactor::Clock::now() + 50ms, [&] { missed = true; });
+    Reactor::Registration watch;
+    watch = reactor.watch(pipe.read.get(), [&] {
+        std::this_thread::sleep_for(400ms);
+        watch.cancel();
+    });
+    pipe.put();
+    reactor.run_once();
+    EXPECT_FALSE(missed);
+    while (!missed)
+        reactor.run_once();
 }
 
 TEST(Reactor, LetsADeadlineSetAnother) {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <thread>
 #include <unistd.h>
 
@@ -15,23 +16,39 @@ namespace arhost::test {
 
 #define ARHOST_FAULT_OPTIONS                                                                                         \
     option(ARHOST_OPTION_INTEGER, "crash_at", "-1", "Dies of SIGSEGV at this frame, each time; -1: never"),          \
+        option(ARHOST_OPTION_INTEGER, "exit_at", "-1", "Calls exit(0) at this frame; -1: never"),                    \
         option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                  \
+        option(ARHOST_OPTION_BOOL, "ignore_abort", "false", "Ignores SIGABRT"),                                      \
         option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),               \
+        option(ARHOST_OPTION_INTEGER, "close_control_at", "-1", "Closes descriptor 3 at this frame; -1: never"),     \
+        option(ARHOST_OPTION_INTEGER, "fork_at", "-1", "Leaves two children behind, listed in children.txt"),        \
         option(ARHOST_OPTION_REAL, "delay_ms", "0", "Sleeps so long in each frame, in ms", 0, 60000)
 
 class Faults {
 public:
     explicit Faults(const Options &options)
-        : crash_at_(options.integer("crash_at")), hang_at_(options.integer("hang_at")),
-          error_at_(options.integer("error_at")), delay_ms_(options.real("delay_ms")) {}
+        : crash_at_(options.integer("crash_at")), exit_at_(options.integer("exit_at")),
+          hang_at_(options.integer("hang_at")), error_at_(options.integer("error_at")),
+          close_control_at_(options.integer("close_control_at")), fork_at_(options.integer("fork_at")),
+          delay_ms_(options.real("delay_ms")) {
+        if (options.boolean("ignore_abort"))
+            std::signal(SIGABRT, SIG_IGN);
+    }
     void at(std::uint64_t sequence) const {
         const auto frame = static_cast<std::int64_t>(sequence);
         if (frame == crash_at_) {
-            std::signal(SIGSEGV, SIG_DFL); // sanitizers have a handler of their own
+            (void)!::write(STDERR_FILENO, "last words: \xff\xc3(\n", 16); // no UTF-8
+            std::signal(SIGSEGV, SIG_DFL);                                // sanitizers have a handler of their own
             std::raise(SIGSEGV);
         }
+        if (frame == exit_at_)
+            ::_exit(0);
         while (frame == hang_at_)
             ::pause();
+        if (frame == close_control_at_)
+            ::close(3);
+        if (frame == fork_at_)
+            leave_children();
         if (frame == error_at_)
             throw Failure(ARHOST_ERROR_INTERNAL, "an error, as asked for");
         if (delay_ms_ > 0)
@@ -39,7 +56,31 @@ public:
     }
 
 private:
-    std::int64_t crash_at_, hang_at_, error_at_;
+    // One in this process's group, and one that has left it, as daemons do.
+    static void leave_children() {
+        std::string pids;
+        for (const bool daemon : {false, true}) {
+            int ready[2];
+            if (::pipe(ready) != 0)
+                std::abort();
+            const pid_t child = ::fork();
+            if (child == 0) {
+                if (daemon)
+                    ::setsid();
+                (void)!::write(ready[1], "!", 1);
+                for (;;)
+                    ::pause();
+            }
+            char byte;
+            (void)!::read(ready[0], &byte, 1);
+            ::close(ready[0]);
+            ::close(ready[1]);
+            pids += std::to_string(child) + "\n";
+        }
+        std::ofstream("children.txt") << pids << std::flush;
+    }
+
+    std::int64_t crash_at_, exit_at_, hang_at_, error_at_, close_control_at_, fork_at_;
     double delay_ms_;
 };
 

@@ -5,6 +5,11 @@
 // before first_sequence.
 #include "faults.hpp"
 
+#ifndef ID // sink_realtime is the same, as a window
+#define ID "sink_counter"
+#define CAPABILITIES 0
+#endif
+
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -16,7 +21,8 @@ using namespace arhost;
 class Counter {
 public:
     Counter(const Host &, const Options &options)
-        : faults_(options), end_at_(options.integer("end_at")), path_(options.text("path")) {}
+        : faults_(options), end_at_(options.integer("end_at")), hang_in_stop_(options.boolean("hang_in_stop")),
+          path_(options.text("path")) {}
 
     void start(const arhost_sink_setup &setup) {
         std::string kept;
@@ -43,27 +49,32 @@ public:
                                                                                               : ARHOST_OK;
     }
 
-    void stop() { std::ofstream(path_ + ".done") << "done\n" << std::flush; }
+    void stop() {
+        while (hang_in_stop_)
+            ::pause();
+        std::ofstream(path_ + ".done") << "done\n" << std::flush;
+    }
 
 private:
     test::Faults faults_;
     std::int64_t end_at_;
+    bool hang_in_stop_;
     std::string path_;
 };
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The file"),
     option(ARHOST_OPTION_INTEGER, "end_at", "-1", "Ends the run from this frame on, as a closed window; -1: never"),
-    ARHOST_FAULT_OPTIONS};
+    option(ARHOST_OPTION_BOOL, "hang_in_stop", "false", "Never returns from stop"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
-                                          "sink_counter",
+                                          ID,
                                           "Counter",
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
                                           "Writes frames' numbers, for tests.",
-                                          0,
+                                          CAPABILITIES,
                                           std::size(options),
                                           options,
                                           nullptr};

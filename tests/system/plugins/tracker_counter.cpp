@@ -6,7 +6,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <fcntl.h>
 #include <limits>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
 
 namespace {
 
@@ -15,9 +19,9 @@ using namespace arhost;
 class Counter {
 public:
     Counter(const Host &host, const Options &options)
-        : host_(host), faults_(options), crash_in_destroy_(options.boolean("crash_in_destroy")),
-          lost_from_(options.integer("lost_from")), lost_to_(options.integer("lost_to")),
-          nan_at_(options.integer("nan_at")) {}
+        : host_(host), faults_(options), seal_(options.text("seal")),
+          crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")),
+          lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")) {}
 
     ~Counter() {
         if (crash_in_destroy_) {
@@ -34,7 +38,11 @@ public:
             host_.log(ARHOST_SEVERITY_DEBUG, "last words");
     }
 
-    void start(const arhost_tracker_setup &setup) { id_ = setup.markers[0].id; }
+    void start(const arhost_tracker_setup &setup) {
+        id_ = setup.markers[0].id;
+        if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // in its first life alone
+            seal_output();
+    }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
@@ -58,18 +66,43 @@ public:
     }
 
 private:
+    // Plays the worker's part until it has the memory for its results, and seals that before the host does.
+    void seal_output() const {
+        constexpr int control = 3;
+        const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
+        say(R"({"type": "ready"})");
+        char text[4096];
+        iovec part{text, sizeof text};
+        alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))];
+        msghdr message{};
+        message.msg_iov = &part;
+        message.msg_iovlen = 1;
+        message.msg_control = ancillary;
+        message.msg_controllen = sizeof ancillary;
+        int memory = -1;
+        if (::recvmsg(control, &message, 0) > 0 && CMSG_FIRSTHDR(&message))
+            std::memcpy(&memory, CMSG_DATA(CMSG_FIRSTHDR(&message)), sizeof memory);
+        if (::fcntl(memory, F_ADD_SEALS, seal_ == "seal" ? F_SEAL_SEAL : F_SEAL_WRITE) != 0)
+            std::abort();
+        say(R"({"type": "attached", "role": "output", "generation": 1})");
+    }
+
     Host host_;
     test::Faults faults_;
+    std::string seal_;
     bool crash_in_destroy_;
     std::int64_t lost_from_, lost_to_, nan_at_;
     std::int32_t id_ = 0;
 };
 
+constexpr const char *seals[] = {"no", "seal", "write", nullptr};
 constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_TEXT, "seal", "no", "The seal that it puts on the memory it is given", 0, 0, seals),
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),
-    option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"), ARHOST_FAULT_OPTIONS};
+    option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
+    ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
                                           "tracker_counter",
