@@ -53,6 +53,7 @@ std::vector<fs::path> PluginPath::all() const {
             if (entry.path().extension() == ".so")
                 found.emplace(entry.path().stem().string(), entry.path());
     std::vector<fs::path> files;
+    files.reserve(found.size());
     for (const auto &[name, file] : found)
         files.push_back(file);
     return files;

@@ -433,7 +433,7 @@ private:
 
     // "geometry 3 (object 1 'bunny')"
     std::string geometry_name(std::size_t geometry) const {
-        const std::string text = "geometry " + std::to_string(geometry);
+        std::string text = "geometry " + std::to_string(geometry);
         for (std::size_t i = 0; i < objects_.size(); ++i)
             if (objects_[i].geometry == geometry)
                 return text + " (" + name_of(i) + ")";

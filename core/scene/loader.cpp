@@ -327,7 +327,7 @@ private:
         const auto name = node.find("name");
         if (!name)
             return otherwise;
-        const std::string text = name->text();
+        std::string text = name->text();
         if (std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
             name->fail("must not hold control characters");
         return text;

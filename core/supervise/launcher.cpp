@@ -17,6 +17,7 @@
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <tuple>
 
 namespace arhost::supervise {
 namespace {
@@ -211,7 +212,8 @@ Spawned Launcher::spawn(const std::filesystem::path &program) {
     std::strcpy(request.program, program.c_str());
 
     Spawned spawned;
-    auto [mine, theirs] = ring::Channel::make_pair();
+    ring::Channel mine, theirs;
+    std::tie(mine, theirs) = ring::Channel::make_pair();
     ring::DoorbellPair doorbell = ring::make_doorbell();
     int pipe_ends[2];
     if (::pipe2(pipe_ends, O_CLOEXEC) != 0)

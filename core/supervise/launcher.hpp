@@ -27,7 +27,7 @@ struct Spawned {
 
 struct Exit {
     pid_t pid;
-    int wait_status;    // as of wait(2)
+    int wait_status; // as of wait(2)
     double cpu_seconds;
 };
 

@@ -87,6 +87,7 @@ private:
     bool make(const Message &create) {
         const std::vector<OptionValue> values = options_from_json(create.body.at("options"));
         std::vector<arhost_option> options;
+        options.reserve(values.size());
         for (const OptionValue &v : values)
             options.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
         arhost_status status;
@@ -201,7 +202,7 @@ int main() {
         std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
         return 2;
     }
-    worker::Link link(ring::Channel(ring::UniqueFd(worker::control_fd)), ring::UniqueFd(worker::doorbell_fd));
+    worker::Link link{ring::Channel(ring::UniqueFd(worker::control_fd)), ring::UniqueFd(worker::doorbell_fd)};
     try {
         return worker::serve(link);
     } catch (const worker::HostGone &) {

@@ -264,7 +264,7 @@ std::string Node::text() const {
 }
 
 std::string Node::choice(std::span<const std::string_view> choices) const {
-    const std::string value = text();
+    std::string value = text();
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
         const std::string near = nearest(value, choices);
         fail("'" + value + "' is not one of " + listed(choices) +

@@ -50,7 +50,7 @@ void make_parent_folders(const std::filesystem::path &file) {
 void check_can_write(const std::filesystem::path &file) {
     std::error_code ignored;
     const bool is_new = !std::filesystem::exists(file, ignored);
-    File(file, O_WRONLY | O_CREAT);
+    const File trial(file, O_WRONLY | O_CREAT);
     if (is_new)
         remove_file(file);
 }

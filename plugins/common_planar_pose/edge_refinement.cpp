@@ -59,6 +59,7 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
             return std::nullopt;
         const Line line = fit_line(points);
         std::vector<double> residuals;
+        residuals.reserve(points.size());
         for (const cv::Point2f &point : points)
             residuals.push_back(std::abs(line.direction.cross(cv::Point2d(point) - line.point)));
         std::vector<double> sorted = residuals;

@@ -149,6 +149,7 @@ std::vector<cv::Point2d> Lens::distort(const std::vector<cv::Point2d> &undistort
         return pixels;
     }
     std::vector<cv::Point3d> rays;
+    rays.reserve(undistorted_px.size());
     for (const cv::Point2d &p : undistorted_px)
         rays.emplace_back(p.x / matrix_(0, 0), p.y / matrix_(1, 1), 1);
     if (fisheye_)

@@ -74,7 +74,8 @@ void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {
     for (std::int32_t y = pixels.y0; y < pixels.y1; y += block)
         for (std::int32_t x = pixels.x0; x < pixels.x1; x += block, to += rays().block_size())
             for (std::int32_t lane = 0; lane < lanes; ++lane) {
-                const double u = x + lane % block, v = y + lane / block;
+                const std::int32_t column = x + lane % block, row = y + lane / block;
+                const double u = column, v = row;
                 const Direction centre = look(u, v);
                 widen(centre);
                 store(centre, to + lane);
@@ -107,6 +108,7 @@ std::vector<Sample> sample_positions(std::int32_t count) {
     std::sort(columns.begin(), columns.end(),
               [](unsigned a, unsigned b) { return radical_inverse_2(a) < radical_inverse_2(b); });
     std::vector<Sample> samples;
+    samples.reserve(count);
     for (std::int32_t row = 0; row < count; ++row)
         samples.push_back({(columns[row] + 0.5f) / count - 0.5f, (row + 0.5f) / count - 0.5f});
     return samples;

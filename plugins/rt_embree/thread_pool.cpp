@@ -26,7 +26,7 @@ ThreadPool::ThreadPool(unsigned threads) {
     if (threads == 0)
         threads = std::max(1u, std::thread::hardware_concurrency());
     for (unsigned i = 1; i < threads; ++i)
-        helpers_.emplace_back([this](std::stop_token stop) { help(stop); });
+        helpers_.emplace_back([this](const std::stop_token &stop) { help(stop); });
 }
 
 void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_t)> &work) {
@@ -46,7 +46,7 @@ void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_
     done_.wait(lock, [this] { return busy_ == 0; });
 }
 
-void ThreadPool::help(std::stop_token stop) {
+void ThreadPool::help(const std::stop_token &stop) {
     std::size_t seen = 0;
     std::unique_lock lock(mutex_);
     while (called_.wait(lock, stop, [&] { return round_ != seen; })) {

@@ -37,7 +37,7 @@ public:
     void for_each(std::size_t count, const std::function<void(std::size_t)> &work);
 
 private:
-    void help(std::stop_token stop);
+    void help(const std::stop_token &stop);
     void take_turns();
 
     std::mutex mutex_; // guards what follows, but for next_

@@ -140,7 +140,7 @@ private:
     std::optional<Encoder> encoder_;
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the frame to begin with
-    bool finished_ = false; // by a process that died before it could say so
+    bool finished_ = false;  // by a process that died before it could say so
 };
 
 constexpr const char *codecs[] = {"h264", "mpeg4", nullptr};

@@ -124,7 +124,7 @@ Surface paper(Colour white, Point p, const Noise &noise, float texel) {
     return surface;
 }
 
-Item marker_sheet(const MarkerSheet &sheet, std::shared_ptr<const Noise> noise) {
+Item marker_sheet(const MarkerSheet &sheet, const std::shared_ptr<const Noise> &noise) {
     auto print = std::make_shared<const Print>(sheet_print(sheet));
     const Placement place(sheet_at, 0);
     const auto distance = [](Point p) { return box(p, sheet_half, 0.3f); };
@@ -201,7 +201,7 @@ Print notes_print(const Noise &noise) {
     return print;
 }
 
-void add_notes(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
+void add_notes(std::vector<Item> &items, const std::shared_ptr<const Noise> &noise) {
     auto print = std::make_shared<const Print>(notes_print(*noise));
     const Point half{105, 148.5f};
     items.push_back(lay(
@@ -229,7 +229,7 @@ void add_notes(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
                      }});
 }
 
-void add_notebook(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
+void add_notebook(std::vector<Item> &items, const std::shared_ptr<const Noise> &noise) {
     const Point half{70, 105};
     items.push_back(lay(
         Placement({-186, 34}, 11), 130, 11, [=](Point p) { return box(p, half, 5); },
@@ -288,7 +288,7 @@ float handwriting(Point p, const Noise &noise) {
     return nearest;
 }
 
-void add_sticky_note(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
+void add_sticky_note(std::vector<Item> &items, const std::shared_ptr<const Noise> &noise) {
     items.push_back(lay(
         Placement({-128, -168}, -7), 60, 1.2f,
         [](Point p) {
@@ -305,7 +305,7 @@ void add_sticky_note(std::vector<Item> &items, std::shared_ptr<const Noise> nois
         }));
 }
 
-void add_pencil(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
+void add_pencil(std::vector<Item> &items, const std::shared_ptr<const Noise> &noise) {
     constexpr float tip = -82, cone_end = -62, end = 82, half_width = 3.7f;
     const Placement place({141, -132}, 38);
     const Point flat_light = place.turned({towards_window.x, towards_window.y});
@@ -346,7 +346,7 @@ void add_pencil(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
         }));
 }
 
-void add_eraser(std::vector<Item> &items, std::shared_ptr<const Noise> noise) {
+void add_eraser(std::vector<Item> &items, const std::shared_ptr<const Noise> &noise) {
     items.push_back(lay(
         Placement({116, -176}, -24), 32, 9,
         [](Point p) {

@@ -130,6 +130,7 @@ public:
         const double unit_mm = sheet_.side_mm / drawn_side;
         std::vector<Mt> poses;
         const int count = motion_blur_ > 0 ? 5 : 1;
+        poses.reserve(count);
         for (int i = 0; i < count; ++i)
             poses.push_back(pose_at(static_cast<double>(frame) + motion_blur_ * (i - (count - 1) / 2.0) / count, 1));
         const Shot shot{poses, card_at(frame), frame};

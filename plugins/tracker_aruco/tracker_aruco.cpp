@@ -94,13 +94,13 @@ bool is_dictionary(const cv::FileNode &root) {
     if (!count.isInt() || !size.isInt() || static_cast<int>(count) < 1 || static_cast<int>(size) < 1 ||
         static_cast<int>(size) > 32)
         return false;
+    const auto side = static_cast<std::size_t>(static_cast<int>(size));
     for (int i = 0; i < static_cast<int>(count); ++i) {
         const cv::FileNode marker = root["marker_" + std::to_string(i)];
         if (!marker.isString())
             return false;
         const std::string bits = marker.string();
-        if (bits.size() != static_cast<std::size_t>(static_cast<int>(size) * static_cast<int>(size)) ||
-            bits.find_first_not_of("01") != std::string::npos)
+        if (bits.size() != side * side || bits.find_first_not_of("01") != std::string::npos)
             return false;
     }
     return true;

@@ -26,8 +26,8 @@ protected:
                                                                       RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3));
         const float corners[] = {7.5f, -100, -5, 7.5f, 100, -5, -100, 0, -5};
         std::copy_n(corners, 9, vertices);
-        auto *indices = static_cast<unsigned *>(rtcSetNewGeometryBuffer(
-            triangle.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 1));
+        auto *indices = static_cast<unsigned *>(rtcSetNewGeometryBuffer(triangle.get(), RTC_BUFFER_TYPE_INDEX, 0,
+                                                                        RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 1));
         for (unsigned i = 0; i < 3; ++i)
             indices[i] = i;
         rtcCommitGeometry(triangle.get());
