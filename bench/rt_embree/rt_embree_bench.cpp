@@ -78,13 +78,21 @@ TriangleMesh bunny() {
     return mesh;
 }
 
+arhost_light lamp() {
+    arhost_light light = make_light(ARHOST_POINT_LIGHT);
+    light.position[0] = 80, light.position[1] = 200, light.position[2] = 150;
+    for (float &channel : light.intensity)
+        channel = 0.8f;
+    return light;
+}
+
 Arena scene_of(const TriangleMesh &mesh, const arhost_material &material, bool lit) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
     builder.settings.max_depth = 10;
     builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
     if (lit)
-        builder.add_light({ARHOST_POINT_LIGHT, ARHOST_FALLOFF_NONE, {80, 200, 150}, {0.8f, 0.8f, 0.8f}});
+        builder.add_light(lamp());
     return std::move(builder).build();
 }
 
@@ -187,7 +195,7 @@ Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settin
     const arhost_camera from = camera();
     const int packet_width = native_width ? scene.view().packet_width : 16;
     return time_frames([&] {
-        threads.for_each(tiles.size(), [&](std::size_t i) {
+        threads.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
             rt_embree::Query query = rt_embree::make_query(rt_embree::Coherence::coherent);
             alignas(64) int valid[16];
             std::fill_n(valid, 16, -1);
@@ -223,8 +231,11 @@ int main(int argc, char **argv) {
         settings.instruction_set = argv[2];
 
     const TriangleMesh mesh = bunny();
-    const arhost_material diffuse{ARHOST_DIFFUSE, 0, {0.7f, 0.6f, 0.5f}, {0.7f, 0.6f, 0.5f}, {}, 1, {}, 0};
-    const arhost_material mirror{ARHOST_MIRROR, 0, {}, {}, {}, 1, {0.9f, 0.9f, 0.9f}, 0};
+    arhost_material diffuse = make_material(ARHOST_DIFFUSE), mirror = make_material(ARHOST_MIRROR);
+    for (int i = 0; i < 3; ++i) {
+        diffuse.ambient[i] = diffuse.diffuse[i] = 0.7f - 0.1f * static_cast<float>(i);
+        mirror.reflectivity[i] = 0.9f;
+    }
     TriangleMesh flat = mesh;
     flat.normals.clear();
     const Arena unlit = scene_of(flat, diffuse, false), lit = scene_of(mesh, diffuse, true),

@@ -63,11 +63,9 @@ std::size_t read_and_unzip(const char *path, std::vector<char> &out) {
 }
 
 ArenaBuilder scene_of(TriangleMesh mesh) {
-    arhost_material grey{};
-    grey.model = ARHOST_DIFFUSE;
-    grey.exponent = 1;
     ArenaBuilder builder;
-    builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey));
+    builder.add_object("mesh", builder.add_triangles(std::move(mesh)),
+                       builder.add_material(make_material(ARHOST_DIFFUSE)));
     return builder;
 }
 

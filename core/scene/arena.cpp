@@ -18,6 +18,7 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t alignment = 64, spare_bytes = 16;
+constexpr float emission_limit = 1e6f, extinction_limit = 1e6f;
 // Of lengths of normals and of the bounds' fit: what float arithmetic may lose.
 constexpr float tolerance = 1e-3f;
 
@@ -117,13 +118,20 @@ private:
 };
 
 arhost_geometry put_geometry(Writer &writer, const TriangleMesh &mesh) {
-    return {ARHOST_TRIANGLES,           0,
-            writer.put(mesh.positions), writer.put(mesh.normals),
-            writer.put(mesh.texcoords), writer.put(mesh.triangles)};
+    arhost_geometry geometry{};
+    geometry.type = ARHOST_TRIANGLES;
+    geometry.positions = writer.put(mesh.positions);
+    geometry.normals = writer.put(mesh.normals);
+    geometry.texcoords = writer.put(mesh.texcoords);
+    geometry.indices = writer.put(mesh.triangles);
+    return geometry;
 }
 
 arhost_geometry put_geometry(Writer &writer, const Spheres &spheres) {
-    return {ARHOST_SPHERES, 0, writer.put(spheres), {}, {}, {}};
+    arhost_geometry geometry{};
+    geometry.type = ARHOST_SPHERES;
+    geometry.positions = writer.put(spheres);
+    return geometry;
 }
 
 Box box_of(const TriangleMesh &mesh) {
@@ -139,6 +147,37 @@ void copy(const glm::vec3 &from, float *to) {
 }
 
 } // namespace
+
+arhost_material make_material(arhost_material_model model) {
+    arhost_material material{};
+    material.model = model;
+    material.colour_texture = material.metallic_roughness_texture = material.normal_texture =
+        material.emission_texture = ARHOST_NONE;
+    material.exponent = 1;
+    copy(glm::vec3(1), material.reflectivity);
+    material.metallic = material.roughness = 1;
+    material.index = 1.5f;
+    material.fresnel_exponent = 5; // Schlick's, and with the minimum that of an index of 1.5
+    material.fresnel_minimum = 0.04f;
+    material.fresnel_maximum = 1;
+    copy(glm::vec3(1), material.refraction);
+    copy(glm::vec3(1), material.shadow_attenuation);
+    material.importance_cutoff = 0.01f;
+    material.reflection_depth = material.refraction_depth = max_depth_limit;
+    return material;
+}
+
+arhost_light make_light(arhost_light_type type) {
+    arhost_light light{};
+    light.type = type;
+    light.falloff = ARHOST_FALLOFF_NONE;
+    light.direction[2] = -1;
+    copy(glm::vec3(1), light.intensity);
+    light.axis_u[0] = light.axis_v[1] = 0.5f;
+    light.radius = 0.5f;
+    light.cosine_inner = light.cosine_outer = 0;
+    return light;
+}
 
 Arena::Arena(std::size_t byte_size)
     : size_(byte_size), bytes_(static_cast<std::byte *>(std::aligned_alloc(alignment, align_up(byte_size)))) {
@@ -163,7 +202,12 @@ std::uint32_t ArenaBuilder::add_material(const arhost_material &material) {
 
 std::uint32_t ArenaBuilder::add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
                                        arhost_role role, const glm::mat4x3 &world_from_object) {
-    arhost_object object{geometry, material, role, static_cast<std::uint32_t>(names_.size()), {}};
+    arhost_object object{};
+    object.geometry = geometry;
+    object.material = material;
+    object.role = role;
+    object.name = static_cast<std::uint32_t>(names_.size());
+    object.node = object.skin = ARHOST_NONE;
     for (int column = 0; column < 4; ++column)
         copy(world_from_object[column], object.world_from_object + 3 * column);
     names_ += name + '\0';
@@ -216,6 +260,8 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     copy(settings.background, scene.background);
     scene.shadow_alpha_opaque = settings.shadow_alpha_opaque;
     scene.shadow_alpha_translucent = settings.shadow_alpha_translucent;
+    scene.coloured_shadows = settings.coloured_shadows;
+    scene.environment.texture = ARHOST_NONE;
     scene.geometries = geometries;
     scene.materials = writer.put(materials_);
     scene.objects = writer.put(objects_);
@@ -409,26 +455,53 @@ private:
     void check_material(std::size_t i) {
         const arhost_material &material = materials_[i];
         const std::string what = "material " + std::to_string(i) + ": ";
-        if (material.model < ARHOST_DIFFUSE || material.model > ARHOST_MIRROR)
+        if (material.model < ARHOST_DIFFUSE || material.model > ARHOST_METALLIC_ROUGHNESS)
             fault(what + "its model is of no known kind");
-        if (material.reserved != 0 || material.reserved_2 != 0)
-            fault(what + "a reserved field is not 0");
+        for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
+                                            material.normal_texture, material.emission_texture})
+            if (texture != ARHOST_NONE)
+                fault(what + "it has texture " + std::to_string(texture) + ", but there are 0");
         check_floats(material.ambient, 0, 1, what + "ambient");
         check_floats(material.diffuse, 0, 1, what + "diffuse");
         check_floats(material.specular, 0, 1, what + "specular");
         check_floats(material.reflectivity, 0, 1, what + "reflectivity");
         check_floats({&material.exponent, 1}, 1, coordinate_limit_mm, what + "exponent");
+        check_floats(material.emission, 0, emission_limit, what + "emission");
+        check_floats({&material.alpha_cutoff, 1}, 0, 1, what + "alpha_cutoff");
+        check_floats({&material.metallic, 1}, 0, 1, what + "metallic");
+        check_floats({&material.roughness, 1}, 0, 1, what + "roughness");
+        check_floats({&material.index, 1}, 1, 4, what + "index");
+        check_floats({&material.fresnel_exponent, 1}, 0.01f, 100, what + "fresnel_exponent");
+        check_floats({&material.fresnel_minimum, 1}, 0, 1, what + "fresnel_minimum");
+        check_floats({&material.fresnel_maximum, 1}, material.fresnel_minimum, 1, what + "fresnel_maximum");
+        check_floats(material.refraction, 0, 1, what + "refraction");
+        check_floats(material.extinction, 0, extinction_limit, what + "extinction");
+        check_floats(material.shadow_attenuation, 0, 1, what + "shadow_attenuation");
+        check_floats(material.cutoff_colour, 0, 1, what + "cutoff_colour");
+        check_floats({&material.importance_cutoff, 1}, 0, 1, what + "importance_cutoff");
     }
 
     void check_light(std::size_t i) {
         const arhost_light &light = lights_[i];
         const std::string what = "light " + std::to_string(i) + ": ";
-        if (light.type != ARHOST_POINT_LIGHT)
+        if (light.type < ARHOST_POINT_LIGHT || light.type > ARHOST_SPHERE_LIGHT)
             fault(what + "its type is of no known kind");
         if (light.falloff != ARHOST_FALLOFF_NONE && light.falloff != ARHOST_FALLOFF_INVERSE_SQUARE)
             fault(what + "its falloff is of no known kind");
         check_floats(light.position, -coordinate_limit_mm, coordinate_limit_mm, what + "position");
         check_floats(light.intensity, 0, std::numeric_limits<float>::max(), what + "intensity");
+        const auto length_of = [](const float(&v)[3]) { return glm::length(glm::dvec3(v[0], v[1], v[2])); };
+        check_floats(light.direction, -1 - tolerance, 1 + tolerance, what + "direction");
+        if (light.type != ARHOST_POINT_LIGHT && light.type != ARHOST_SPHERE_LIGHT &&
+            !within(static_cast<float>(length_of(light.direction)), 1 - tolerance, 1 + tolerance))
+            fault(what + "its direction is not of length 1");
+        check_floats(light.axis_u, -coordinate_limit_mm, coordinate_limit_mm, what + "axis_u");
+        check_floats(light.axis_v, -coordinate_limit_mm, coordinate_limit_mm, what + "axis_v");
+        check_floats({&light.radius, 1}, 0, coordinate_limit_mm, what + "radius");
+        check_floats({&light.cosine_outer, 1}, -1, 1, what + "cosine_outer");
+        check_floats({&light.cosine_inner, 1}, light.cosine_outer, 1, what + "cosine_inner");
+        if (light.type == ARHOST_DIRECTIONAL_LIGHT && light.falloff != ARHOST_FALLOFF_NONE)
+            fault(what + "light from infinitely far can't fall off");
     }
 
     // "geometry 3 (object 1 'bunny')"

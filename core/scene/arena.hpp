@@ -34,11 +34,17 @@ struct TriangleMesh {
 
 using Spheres = std::vector<glm::vec4>; // centre and radius
 
+// A material with a field's customary value in each, black but for glass and mirrors; without textures.
+arhost_material make_material(arhost_material_model model);
+// A white light at the origin, its direction down −z; one with an extent measures 1 mm.
+arhost_light make_light(arhost_light_type type);
+
 struct Settings {
     arhost_axes axes = ARHOST_Z_UP;
     std::uint32_t max_depth = 5;
     glm::vec3 ambient{0.2f}, background{1}; // linear light
     float shadow_alpha_opaque = 0.6f, shadow_alpha_translucent = 0.3f;
+    bool coloured_shadows = false;
 };
 
 // 64-byte aligned memory that holds an arena.

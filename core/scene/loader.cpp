@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <numbers>
 
 namespace arhost::scene {
 namespace {
@@ -94,6 +95,8 @@ Settings settings_of(const Node &root) {
         settings.ambient = colour_of(*node, light_limit);
     if (const auto node = root.find("background"))
         settings.background = colour_of(*node, light_limit);
+    if (const auto node = root.find("coloured_shadows"))
+        settings.coloured_shadows = node->boolean();
     if (const auto node = root.find("shadow_alpha")) {
         node->allow_keys({"opaque", "translucent"});
         if (const auto alpha = node->find("opaque"))
@@ -104,49 +107,176 @@ Settings settings_of(const Node &root) {
     return settings;
 }
 
+std::uint32_t depth_or(const Node &parent, std::string_view key, std::uint32_t otherwise) {
+    const auto node = parent.find(key);
+    return node ? static_cast<std::uint32_t>(node->integer(0, max_depth_limit)) : otherwise;
+}
+
+float real_or(const Node &parent, std::string_view key, double low, double high, float otherwise) {
+    const auto node = parent.find(key);
+    return node ? static_cast<float>(node->real(low, high)) : otherwise;
+}
+
+// What is absorbed per mm: as such, or as the colour that is left of white after some way.
+glm::vec3 extinction_of(const Node &glass) {
+    const auto extinction = glass.find("extinction");
+    const auto attenuation = glass.find("attenuation");
+    if (extinction && attenuation)
+        attenuation->fail("says the same as 'extinction'; give one of them");
+    if (extinction)
+        return colour_of(*extinction, light_limit);
+    if (!attenuation)
+        return glm::vec3(0);
+    attenuation->allow_keys({"colour", "distance_mm"});
+    const Node colour_node = attenuation->require("colour");
+    const glm::vec3 left = colour_of(colour_node);
+    const double distance_mm = attenuation->require("distance_mm").real(1e-3, coordinate_limit_mm);
+    glm::vec3 per_mm;
+    for (int i = 0; i < 3; ++i) {
+        if (left[i] < 1e-6f)
+            colour_node.fail("must be above 0: no way of glass is quite black");
+        per_mm[i] = static_cast<float>(-std::log(static_cast<double>(left[i])) / distance_mm);
+    }
+    return per_mm;
+}
+
+arhost_material glass_of(const Node &node) {
+    node.allow_keys({"model", "index", "fresnel", "reflection", "refraction", "extinction", "attenuation",
+                     "shadow_attenuation", "cutoff_colour", "importance_cutoff", "reflection_depth",
+                     "refraction_depth"});
+    arhost_material glass = make_material(ARHOST_GLASS);
+    glass.index = real_or(node, "index", 1, 4, glass.index);
+    const float at_right_angle = (glass.index - 1) / (glass.index + 1);
+    glass.fresnel_minimum = at_right_angle * at_right_angle;
+    if (const auto fresnel = node.find("fresnel")) {
+        fresnel->allow_keys({"exponent", "minimum", "maximum"});
+        glass.fresnel_exponent = real_or(*fresnel, "exponent", 0.01, 100, glass.fresnel_exponent);
+        glass.fresnel_minimum = real_or(*fresnel, "minimum", 0, 1, glass.fresnel_minimum);
+        glass.fresnel_maximum = real_or(*fresnel, "maximum", glass.fresnel_minimum, 1, glass.fresnel_maximum);
+    }
+    set(glass.reflectivity, colour_or(node, "reflection", glm::vec3(1)));
+    set(glass.refraction, colour_or(node, "refraction", glm::vec3(1)));
+    set(glass.extinction, extinction_of(node));
+    set(glass.shadow_attenuation, colour_or(node, "shadow_attenuation", glm::vec3(1)));
+    set(glass.cutoff_colour, colour_or(node, "cutoff_colour", glm::vec3(0)));
+    glass.importance_cutoff = real_or(node, "importance_cutoff", 0, 1, glass.importance_cutoff);
+    glass.reflection_depth = depth_or(node, "reflection_depth", glass.reflection_depth);
+    glass.refraction_depth = depth_or(node, "refraction_depth", glass.refraction_depth);
+    return glass;
+}
+
 arhost_material material_of(const Node &node) {
     if (!node.is_map())
         node.fail("must be a map with the key 'model'");
-    const Node model_node = node.require("model");
-    const std::string model = model_node.choice({"diffuse", "specular", "mirror"});
-    arhost_material material{};
-    material.exponent = 1;
+    const std::string model =
+        node.require("model").choice({"diffuse", "specular", "mirror", "metal", "glass", "metallic-roughness"});
+    if (model == "glass")
+        return glass_of(node);
     if (model == "mirror") {
         node.allow_keys({"model", "reflectivity"});
-        material.model = ARHOST_MIRROR;
-        set(material.reflectivity, colour_or(node, "reflectivity", glm::vec3(1)));
+        arhost_material mirror = make_material(ARHOST_MIRROR);
+        set(mirror.reflectivity, colour_or(node, "reflectivity", glm::vec3(1)));
+        return mirror;
+    }
+    if (model == "metallic-roughness") {
+        node.allow_keys({"model", "colour", "metallic", "roughness", "emission"});
+        arhost_material material = make_material(ARHOST_METALLIC_ROUGHNESS);
+        const glm::vec3 colour = colour_or(node, "colour", glm::vec3(1));
+        set(material.diffuse, colour);
+        set(material.ambient, colour);
+        material.metallic = real_or(node, "metallic", 0, 1, material.metallic);
+        material.roughness = real_or(node, "roughness", 0, 1, material.roughness);
+        if (const auto emission = node.find("emission"))
+            set(material.emission, colour_of(*emission, light_limit));
         return material;
     }
+    arhost_material material = make_material(model == "diffuse"    ? ARHOST_DIFFUSE
+                                             : model == "specular" ? ARHOST_SPECULAR
+                                                                   : ARHOST_METAL);
     const glm::vec3 diffuse = colour_of(node.require("diffuse"));
     set(material.diffuse, diffuse);
     set(material.ambient, colour_or(node, "ambient", diffuse));
     if (model == "diffuse") {
         node.allow_keys({"model", "ambient", "diffuse"});
-        material.model = ARHOST_DIFFUSE;
         return material;
     }
-    node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent"});
-    material.model = ARHOST_SPECULAR;
     set(material.specular, colour_of(node.require("specular")));
     material.exponent = static_cast<float>(node.require("exponent").real(1, 1e6));
+    if (model == "specular") {
+        node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent"});
+        return material;
+    }
+    node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent", "reflectivity"});
+    set(material.reflectivity, colour_of(node.require("reflectivity")));
     return material;
 }
 
-arhost_light light_of(const Node &node) {
-    node.allow_keys({"position", "intensity", "falloff"});
-    arhost_light light{};
-    light.type = ARHOST_POINT_LIGHT;
-    light.falloff = ARHOST_FALLOFF_NONE;
-    if (const auto falloff = node.find("falloff"))
-        light.falloff = falloff->choice({"none", "inverse-square"}) == "none" ? ARHOST_FALLOFF_NONE
-                                                                              : ARHOST_FALLOFF_INVERSE_SQUARE;
-    set(light.position, position_of(node.require("position")));
+glm::dvec3 direction_of(const Node &node) {
+    const glm::dvec3 direction = vector_of(node);
+    const double length = glm::length(direction);
+    if (!(length > 1e-9 && length < 1e9))
+        node.fail("has no direction");
+    return direction / length;
+}
+
+// The half sides of a rectangle that shines along `direction`, the first one level.
+void set_sides(arhost_light &light, const glm::dvec3 &direction, const glm::dvec3 &up, const Node &size_node) {
+    const std::vector<double> size = size_node.is_sequence() ? size_node.reals(2) : std::vector(2, size_node.real());
+    for (const double side : size)
+        if (!(side >= 1e-3 && side <= coordinate_limit_mm))
+            size_node.fail("each side must be 0.001 to 1e9 mm");
+    glm::dvec3 u = glm::cross(up, direction);
+    u = glm::length(u) > 1e-6 ? glm::normalize(u) : glm::dvec3(1, 0, 0);
+    set(light.axis_u, u * (size[0] / 2));
+    set(light.axis_v, glm::cross(direction, u) * (size[1] / 2));
+}
+
+arhost_light light_of(const Node &node, arhost_axes axes) {
+    if (!node.is_map())
+        node.fail("must be a map with the key 'intensity'");
+    const auto type_node = node.find("type");
+    const std::string type =
+        type_node ? type_node->choice({"point", "directional", "spot", "rectangle", "sphere"}) : "point";
+    arhost_light light = make_light(type == "point"         ? ARHOST_POINT_LIGHT
+                                    : type == "directional" ? ARHOST_DIRECTIONAL_LIGHT
+                                    : type == "spot"        ? ARHOST_SPOT_LIGHT
+                                    : type == "rectangle"   ? ARHOST_RECTANGLE_LIGHT
+                                                            : ARHOST_SPHERE_LIGHT);
     const Node intensity_node = node.require("intensity");
     const glm::dvec3 intensity = number_or_vector(intensity_node);
     for (int i = 0; i < 3; ++i)
         if (intensity[i] < 0 || intensity[i] > 1e12)
             intensity_node.fail("must be 0 to 1e12");
     set(light.intensity, intensity);
+    if (type == "directional") {
+        node.allow_keys({"type", "direction", "intensity"});
+        set(light.direction, direction_of(node.require("direction")));
+        return light;
+    }
+    set(light.position, position_of(node.require("position")));
+    if (const auto falloff = node.find("falloff"))
+        light.falloff = falloff->choice({"none", "inverse-square"}) == "none" ? ARHOST_FALLOFF_NONE
+                                                                              : ARHOST_FALLOFF_INVERSE_SQUARE;
+    if (type == "point") {
+        node.allow_keys({"type", "position", "intensity", "falloff"});
+    } else if (type == "sphere") {
+        node.allow_keys({"type", "position", "intensity", "falloff", "radius"});
+        light.radius = static_cast<float>(length_of(node.require("radius")));
+    } else if (type == "spot") {
+        node.allow_keys({"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees"});
+        set(light.direction, direction_of(node.require("direction")));
+        const double outer = node.require("outer_degrees").real(0, 180);
+        const auto inner = node.find("inner_degrees");
+        light.cosine_outer = static_cast<float>(std::cos(outer * std::numbers::pi / 180));
+        light.cosine_inner =
+            static_cast<float>(std::cos((inner ? inner->real(0, outer) : outer) * std::numbers::pi / 180));
+    } else {
+        node.allow_keys({"type", "position", "intensity", "falloff", "direction", "size"});
+        const glm::dvec3 direction = direction_of(node.require("direction"));
+        set(light.direction, direction);
+        set_sides(light, direction, axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0),
+                  node.require("size"));
+    }
     return light;
 }
 
@@ -271,8 +401,8 @@ public:
     SceneLoader(const Node &root, const LoadCallbacks &callbacks) : root_(root), callbacks_(callbacks) {}
 
     ArenaBuilder load() {
-        root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "materials",
-                          "lights", "objects"});
+        root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
+                          "materials", "lights", "objects"});
         builder_.settings = settings_of(root_);
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
@@ -281,7 +411,7 @@ public:
         }
         if (const auto lights = root_.find("lights"))
             for (const Node &node : lights->items())
-                builder_.add_light(light_of(node));
+                builder_.add_light(light_of(node, builder_.settings.axes));
         const std::vector<Node> objects = root_.require("objects").items();
         for (std::size_t i = 0; i < objects.size(); ++i)
             add_object(objects[i], i, objects.size());

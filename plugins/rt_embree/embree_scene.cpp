@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "embree_scene.hpp"
 
+#include <arhost/shading/scalar.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -26,8 +28,11 @@ bool is_identity(const float *m) {
     return std::equal(m, m + 12, identity);
 }
 
-unsigned mask_of(arhost_role role) {
-    return role == ARHOST_CATCHER ? catcher_mask : role == ARHOST_OCCLUDER ? occluder_mask : virtual_mask;
+unsigned mask_of(const Object &object) {
+    return object.role == ARHOST_CATCHER            ? catcher_mask
+           : object.role == ARHOST_OCCLUDER         ? occluder_mask
+           : object.material->model == ARHOST_GLASS ? glass_mask
+                                                    : opaque_mask;
 }
 
 // The inverse of a column-major 3×3 matrix, transposed: the cofactors. Normals get their length later, so
@@ -51,14 +56,19 @@ void make_normal_transform(const float *m, float *to) {
 
 Object make_object(const arhost_scene &arena, const arhost_object &from) {
     Object object{};
-    object.material = elements<arhost_material>(arena, arena.materials)[from.material];
+    object.material = &elements<arhost_material>(arena, arena.materials)[from.material];
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
     make_normal_transform(from.world_from_object, object.normal_transform);
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
-    if (geometry.type == ARHOST_TRIANGLES && geometry.normals.count > 0) {
-        object.normals = reinterpret_cast<const float *>(bytes(arena) + geometry.normals.offset);
+    if (geometry.type == ARHOST_TRIANGLES) {
+        const auto floats = [&](const arhost_buffer &buffer) {
+            return buffer.count ? reinterpret_cast<const float *>(bytes(arena) + buffer.offset) : nullptr;
+        };
+        object.normals = floats(geometry.normals);
         object.normal_stride = geometry.normals.stride;
+        object.texcoords = floats(geometry.texcoords);
+        object.texcoord_stride = geometry.texcoords.stride;
         object.indices = reinterpret_cast<const int *>(bytes(arena) + geometry.indices.offset);
         object.index_stride = geometry.indices.stride;
     }
@@ -152,7 +162,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         } else {
             geometry = new_geometry(object.geometry, object.role);
         }
-        rtcSetGeometryMask(geometry.get(), mask_of(object.role));
+        rtcSetGeometryMask(geometry.get(), mask_of(objects_.back()));
+        view_.has_glass |= mask_of(objects_.back()) == glass_mask;
         rtcCommitGeometry(geometry.get());
         rtcAttachGeometryByID(root_.get(), geometry.get(), number);
         check();
@@ -169,6 +180,24 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     copy3(arena.ambient, view_.ambient);
     copy3(arena.background, view_.background);
     view_.shadow_alpha_opaque = arena.shadow_alpha_opaque;
+    view_.shadow_alpha_translucent = arena.shadow_alpha_translucent;
+    view_.coloured_shadows = arena.coloured_shadows != 0;
+    for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
+        textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
+                             static_cast<std::int32_t>(texture.height), texture.format, texture.wrap_u,
+                             texture.wrap_v});
+    view_.textures = textures_.data();
+    for (int code = 0; code < 256; ++code)
+        linear_of_srgb8_.push_back(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));
+    view_.linear_of_srgb8 = linear_of_srgb8_.data();
+    if (const arhost_environment &from = arena.environment; from.texture != ARHOST_NONE) {
+        Environment &to = view_.environment;
+        to.image = &textures_[from.texture];
+        to.intensity = from.intensity;
+        std::copy_n(from.environment_from_world, 9, to.environment_from_world);
+        to.rows = elements<float>(arena, from.rows).data();
+        to.columns = elements<float>(arena, from.columns).data();
+    }
     view_.srgb8 = srgb8_.get();
 }
 

@@ -54,7 +54,9 @@ private:
     SceneHandle root_;
     std::vector<Object> objects_;
     std::vector<Box> visible_boxes_;
+    std::vector<Texture> textures_;
     std::unique_ptr<const arhost::shading::Srgb8Table> srgb8_;
+    std::vector<float> linear_of_srgb8_;
     Scene view_{};
 };
 

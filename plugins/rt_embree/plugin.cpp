@@ -16,6 +16,8 @@ public:
         settings_.samples = static_cast<std::int32_t>(options.integer("samples"));
         settings_.threads = static_cast<unsigned>(options.integer("threads"));
         settings_.robust = options.boolean("robust");
+        settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
+        settings_.one_path = options.text("glass") == "path";
         settings_.instruction_set = options.text("instruction_set");
         choose_kernel(settings_.instruction_set); // refuses now what can't run
     }
@@ -47,10 +49,16 @@ private:
     std::optional<Renderer> renderer_;
 };
 
+constexpr const char *glass[] = {"tree", "path", nullptr};
 constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 64),
+    arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
+                   "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
+    arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
+                   "Rays that glass sends on: 'tree' follows both, 'path' one that is chosen at random.", 0, 0,
+                   glass),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Threads that trace; 0: one a processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
                    "Watertight at the edges that triangles share, about a tenth slower."),

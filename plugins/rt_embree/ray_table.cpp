@@ -43,7 +43,7 @@ RayTable::RayTable(const arhost_intrinsics &intrinsics, bool has_slopes, ThreadP
     windows_.resize(tiles_.size());
 
     const arhost::shading::Lens lens(intrinsics);
-    threads.for_each(tiles_.size(), [&](std::size_t tile) { fill(tile, lens); });
+    threads.for_each(tiles_.size(), [&](std::size_t tile, std::size_t) { fill(tile, lens); });
 }
 
 void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {

@@ -13,8 +13,6 @@
 
 namespace rt_embree {
 
-inline constexpr std::int32_t tile_side = 32; // px
-
 // The part of the plane z = 1 that a tile, or an object's box, covers as the camera sees it.
 struct Window {
     double x0, y0, x1, y1;

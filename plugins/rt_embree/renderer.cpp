@@ -7,6 +7,7 @@
 #include <limits>
 #include <mutex>
 #include <span>
+#include <utility>
 
 namespace rt_embree {
 namespace {
@@ -144,11 +145,34 @@ Kernel choose_kernel(const std::string &instruction_set) {
                   "option 'instruction_set': this processor has no " + instruction_set + "; set it to 'auto'");
 }
 
+ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) {
+    // Two rays a pixel may wait after the first hit, fewer than three packets after others (scatter.inl). A
+    // packet is read whole, so that each row has room for one more.
+    constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
+    constexpr int pixel_rows = 8;
+    numbers_.resize(std::size_t{pixel_rows} * tile_pixels +
+                    std::size_t{WaitingRays::rows} * (first_capacity + std::size_t{max_depth} * capacity));
+    float *next = numbers_.data();
+    const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
+    for (float **row : {&scratch_.light[0], &scratch_.light[1], &scratch_.light[2], &scratch_.alpha, &scratch_.sum[0],
+                        &scratch_.sum[1], &scratch_.sum[2], &scratch_.sum[3]})
+        *row = take(tile_pixels);
+    for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
+        const std::int32_t size = depth == 0 ? first_capacity : capacity;
+        waiting_[depth] = {take(WaitingRays::rows * size), 0, size};
+    }
+    scratch_.waiting = waiting_.data();
+}
+
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), intrinsics_(checked(setup)), kernel_(choose_kernel(settings.instruction_set)),
       threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1, threads_),
       samples_(sample_positions(settings.samples)),
-      scene_(*setup.scene, threads_.thread_count(), settings.robust, host) {}
+      scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
+      one_path_(settings.one_path) {
+    for (unsigned i = 0; i < threads_.thread_count(); ++i)
+        scratch_.emplace_back(setup.scene->max_depth);
+}
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image) {
     if (!same(camera.intrinsics, intrinsics_))
@@ -167,18 +191,21 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                       camera_of(pose),
                       samples_.data(),
                       static_cast<std::int32_t>(samples_.size()),
+                      0,
+                      light_samples_,
+                      one_path_,
                       image.rgba,
                       image.stride};
     const std::vector<Tile> &tiles = ray_table_.tiles();
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;
-    threads_.for_each(tiles.size(), [&](std::size_t i) {
+    threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {
         const Tile &tile = tiles[i];
         const bool worthwhile = std::any_of(windows.begin(), windows.end(),
                                             [&](const Window &window) { return ray_table_.window(i).meets(window); });
         if (!worthwhile || host_.cancelled())
             return clear(image, tile.pixels);
-        const Rectangle part = kernel_.render_tile(frame, tile);
+        const Rectangle part = kernel_.render_tile(frame, tile, *scratch_[thread]);
         if (part.x0 < part.x1) {
             std::lock_guard lock(drawn_mutex);
             drawn = united(drawn, part);

@@ -18,7 +18,21 @@ struct Settings {
     std::int32_t samples = 1; // a pixel
     unsigned threads = 0;     // 0: one a processor
     bool robust = false;
+    std::int32_t light_samples = 4; // shadow rays to an extended light, from each sample
+    bool one_path = false;          // glass sends one ray on, chosen at random, in place of two
     std::string instruction_set = "auto";
+};
+
+// A thread's scratch memory.
+class ScratchMemory {
+public:
+    explicit ScratchMemory(std::uint32_t max_depth);
+    Scratch &operator*() { return scratch_; }
+
+private:
+    std::vector<float> numbers_;
+    std::vector<WaitingRays> waiting_;
+    Scratch scratch_{};
 };
 
 class Renderer {
@@ -39,6 +53,9 @@ private:
     RayTable ray_table_;
     std::vector<Sample> samples_;
     EmbreeScene scene_;
+    std::vector<ScratchMemory> scratch_; // one a thread
+    std::int32_t light_samples_;
+    bool one_path_;
 };
 
 // The kernel of that name, or with "auto" the widest that this processor can run.

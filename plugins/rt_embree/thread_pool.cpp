@@ -26,10 +26,10 @@ ThreadPool::ThreadPool(unsigned threads) {
     if (threads == 0)
         threads = std::max(1u, std::thread::hardware_concurrency());
     for (unsigned i = 1; i < threads; ++i)
-        helpers_.emplace_back([this](const std::stop_token &stop) { help(stop); });
+        helpers_.emplace_back([this, i](const std::stop_token &stop) { help(stop, i); });
 }
 
-void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_t)> &work) {
+void ThreadPool::for_each(std::size_t count, const Work &work) {
     {
         std::lock_guard lock(mutex_);
         work_ = &work;
@@ -40,30 +40,30 @@ void ThreadPool::for_each(std::size_t count, const std::function<void(std::size_
         ++round_;
     }
     called_.notify_all();
-    take_turns();
+    take_turns(0);
     // Each helper's results are published by its unlocking of the mutex in help().
     std::unique_lock lock(mutex_);
     done_.wait(lock, [this] { return busy_ == 0; });
 }
 
-void ThreadPool::help(const std::stop_token &stop) {
+void ThreadPool::help(const std::stop_token &stop, std::size_t thread) {
     std::size_t seen = 0;
     std::unique_lock lock(mutex_);
     while (called_.wait(lock, stop, [&] { return round_ != seen; })) {
         seen = round_;
         lock.unlock();
-        take_turns();
+        take_turns(thread);
         lock.lock();
         if (--busy_ == 0)
             done_.notify_one();
     }
 }
 
-void ThreadPool::take_turns() {
+void ThreadPool::take_turns(std::size_t thread) {
     const FlushDenormals flush;
     // Relaxed: only the number itself matters, and each is given out once.
     for (std::size_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
-        (*work_)(i);
+        (*work_)(i, thread);
 }
 
 } // namespace rt_embree

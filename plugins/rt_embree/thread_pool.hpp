@@ -32,18 +32,20 @@ public:
     explicit ThreadPool(unsigned threads);
     unsigned thread_count() const { return static_cast<unsigned>(helpers_.size()) + 1; }
 
-    // Calls work(0) to work(count − 1), each once, on whichever thread is free, and returns when all are
-    // done. `work` throws nothing. Not to be called by two threads at once.
-    void for_each(std::size_t count, const std::function<void(std::size_t)> &work);
+    // Calls work(i, thread) for i from 0 to count − 1, each once, on whichever thread is free (0 to
+    // thread_count() − 1), and returns when all are done. `work` throws nothing. Not to be called by two
+    // threads at once.
+    using Work = std::function<void(std::size_t i, std::size_t thread)>;
+    void for_each(std::size_t count, const Work &work);
 
 private:
-    void help(const std::stop_token &stop);
-    void take_turns();
+    void help(const std::stop_token &stop, std::size_t thread);
+    void take_turns(std::size_t thread);
 
     std::mutex mutex_; // guards what follows, but for next_
     std::condition_variable_any called_;
     std::condition_variable done_;
-    const std::function<void(std::size_t)> *work_ = nullptr;
+    const Work *work_ = nullptr;
     std::size_t count_ = 0, round_ = 0, busy_ = 0;
     std::atomic<std::size_t> next_{0};
     std::vector<std::jthread> helpers_; // last: joined before the rest goes

@@ -198,6 +198,18 @@ TEST(Check, EndsWhereTheSceneIsLoadedTooSlowly) {
     EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader was without a word of progress for 20 ms"));
 }
 
+TEST(BadInput, LeavesTheOutputsOfAnEarlierRunAsTheyWere) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
+                  "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: last.png}\n"
+                  "- {plugin: sink_video, path: film.mp4}\n- {plugin: sink_video, path: film.avi}\n");
+    for (const char *name : {"poses.jsonl", "last.png", "film.mp4"})
+        run.write(name, "old");
+    EXPECT_EQ(run.run(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("film.avi"));
+    for (const char *name : {"poses.jsonl", "last.png", "film.mp4"})
+        EXPECT_EQ(run.read(name), "old") << name;
+}
+
 TEST(BadCommandLine, IsRefused) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);

@@ -215,6 +215,26 @@ TEST(Run, LeavesNoProcessBehindWhenItIsKilled) {
     }
 }
 
+TEST(Run, GoesOnWhileTheTerminalIsHalted) {
+    ArhostRun run(counting("lockstep", "frames: 200", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml", "-v"}, [] { // stderr: a full pipe whose reader does not read
+        int ends[2];
+        if (::pipe2(ends, O_NONBLOCK) != 0)
+            ::_exit(126);
+        const char bytes[4096] = {};
+        while (::write(ends[1], bytes, sizeof bytes) > 0) {
+        }
+        ::fcntl(ends[1], F_SETFL, 0);
+        ::dup2(ends[1], STDERR_FILENO);
+    });
+    for (int i = 0; i < 5000 && !run.exists("stats.json"); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    EXPECT_TRUE(run.exists("stats.json"));
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    expect_every_frame_augmented(run, 200);
+}
+
 TEST(Run, ShowsItsProgressInPlainLinesWhereThereIsNoTerminal) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);

@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(
     Validate, RefusesWrong,
     testing::Values(
         Corruption{"Magic", [](Arena &a) { header(a).magic ^= 1; }, "magic number"},
-        Corruption{"Version", [](Arena &a) { header(a).version = 2; }, "version is 2, not 1"},
+        Corruption{"Version", [](Arena &a) { header(a).version = 1; }, "version is 1, not 2"},
         Corruption{"StructSize", [](Arena &a) { header(a).struct_size += 8; }, "header has the wrong size"},
         Corruption{"ByteSizeTooLarge", [](Arena &a) { header(a).byte_size += 64; }, "bytes, but"},
         Corruption{"ByteSizeHuge", [](Arena &a) { header(a).byte_size = ~0ull; }, "bytes, but"},
@@ -212,9 +212,14 @@ INSTANTIATE_TEST_SUITE_P(
                    "object 0 'square': a number of world_from_object is nan"},
         Corruption{"ObjectTransformFlat", [](Arena &a) { objects(a)[0].world_from_object[4] = 0; },
                    "world_from_object can't be inverted"},
-        Corruption{"MaterialModel", [](Arena &a) { materials(a)[0].model = 4; },
+        Corruption{"MaterialModel", [](Arena &a) { materials(a)[0].model = 7; },
                    "material 0: its model is of no known kind"},
-        Corruption{"MaterialReserved", [](Arena &a) { materials(a)[0].reserved_2 = 1; }, "reserved field"},
+        Corruption{"MaterialTexture", [](Arena &a) { materials(a)[0].colour_texture = 0; }, "texture 0, but there are 0"},
+        Corruption{"MaterialIndex", [](Arena &a) { materials(a)[0].index = 0.5f; }, "index is 0.5, outside 1 to 4"},
+        Corruption{"MaterialExtinction", [](Arena &a) { materials(a)[0].extinction[1] = -1; }, "extinction is -1"},
+        Corruption{"MaterialFresnel", [](Arena &a) { materials(a)[0].fresnel_maximum = 0; }, "fresnel_maximum is 0"},
+        Corruption{"MaterialEmission", [](Arena &a) { materials(a)[0].emission[2] = nan_value; }, "emission is"},
+        Corruption{"MaterialRoughness", [](Arena &a) { materials(a)[0].roughness = 2; }, "roughness is 2"},
         Corruption{"MaterialAmbient", [](Arena &a) { materials(a)[0].ambient[0] = 2; },
                    "material 0: ambient is 2, outside 0 to 1"},
         Corruption{"MaterialDiffuse", [](Arena &a) { materials(a)[0].diffuse[0] = -0.1f; }, "diffuse is -0.1"},
@@ -222,7 +227,21 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"MaterialExponent", [](Arena &a) { materials(a)[0].exponent = 0.5f; }, "exponent is 0.5"},
         Corruption{"MaterialReflectivity", [](Arena &a) { materials(a)[0].reflectivity[2] = 1.1f; },
                    "reflectivity is 1.1"},
-        Corruption{"LightType", [](Arena &a) { lights(a)[0].type = 2; }, "light 0: its type is of no known kind"},
+        Corruption{"LightType", [](Arena &a) { lights(a)[0].type = 6; }, "light 0: its type is of no known kind"},
+        Corruption{"LightDirection",
+                   [](Arena &a) {
+                       lights(a)[0].type = ARHOST_SPOT_LIGHT;
+                       lights(a)[0].direction[2] = 0.5f;
+                   },
+                   "its direction is not of length 1"},
+        Corruption{"LightFallsOffFromInfinity",
+                   [](Arena &a) {
+                       lights(a)[0].type = ARHOST_DIRECTIONAL_LIGHT;
+                       lights(a)[0].falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+                   },
+                   "can't fall off"},
+        Corruption{"LightCone", [](Arena &a) { lights(a)[0].cosine_outer = 0.5f; }, "cosine_inner is 0"},
+        Corruption{"LightRadius", [](Arena &a) { lights(a)[0].radius = -1; }, "radius is -1"},
         Corruption{"LightFalloff", [](Arena &a) { lights(a)[0].falloff = 0; },
                    "light 0: its falloff is of no known kind"},
         Corruption{"LightPosition", [](Arena &a) { lights(a)[0].position[0] = -nan_value; }, "light 0: position is"},

@@ -147,6 +147,75 @@ TEST(SceneFile, DescribesMaterials) {
     EXPECT_THAT(material(arena, 2).reflectivity, testing::Each(1.0f));
 }
 
+TEST(SceneFile, DescribesGlass) {
+    const Arena arena =
+        load("version: 1\naxes: z-up\nmaterials:\n"
+             "  plain: {model: glass}\n"
+             "  dragon: {model: glass, index: 1.4, fresnel: {exponent: 1, minimum: 0.1, maximum: 0.9},\n"
+             "    attenuation: {colour: [0.8, 0.89, 1], distance_mm: 110}, cutoff_colour: [0.34, 0.55, "
+             "0.85],\n"
+             "    shadow_attenuation: [0.4, 0.7, 0.4], reflection_depth: 50, refraction_depth: 20,\n"
+             "    importance_cutoff: 0.02, reflection: 0.5, refraction: 0.6}\n"
+             "  thick: {model: glass, extinction: [0.1, 0, 2]}\nobjects: []\n");
+    EXPECT_EQ(material(arena, 1).model, ARHOST_GLASS);
+    const arhost_material &plain = material(arena, 0), &dragon = material(arena, 1);
+    EXPECT_EQ(plain.index, 1.5f);
+    EXPECT_FLOAT_EQ(plain.fresnel_minimum, 0.04f) << "((n − 1)/(n + 1))²";
+    EXPECT_EQ(plain.fresnel_exponent, 5);
+    EXPECT_THAT(plain.extinction, testing::Each(0.0f));
+    EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
+    EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
+    // exp(−extinction · 110 mm) is the colour again.
+    EXPECT_THAT(dragon.extinction, ElementsAre(FloatNear(0.00202858f, 1e-7f), FloatNear(0.00105940f, 1e-7f), 0));
+    EXPECT_THAT(dragon.shadow_attenuation, ElementsAre(0.4f, 0.7f, 0.4f));
+    EXPECT_EQ(dragon.reflection_depth, 50u);
+    EXPECT_EQ(dragon.refraction_depth, 20u);
+    EXPECT_EQ(dragon.importance_cutoff, 0.02f);
+    EXPECT_EQ(dragon.reflectivity[0], 0.5f);
+    EXPECT_EQ(dragon.refraction[2], 0.6f);
+    EXPECT_THAT(material(arena, 2).extinction, ElementsAre(0.1f, 0, 2));
+}
+
+TEST(SceneFile, DescribesMetalAndMetallicRoughness) {
+    const Arena arena =
+        load("version: 1\naxes: z-up\nmaterials:\n"
+             "  a: {model: metal, diffuse: [0.6, 0.9, 0.6], specular: 0.9, exponent: 256, reflectivity: [0.5, 0.6, "
+             "0.5]}\n"
+             "  b: {model: metallic-roughness, colour: '#ff0000', roughness: 0.3, emission: 12}\nobjects: []\n");
+    EXPECT_EQ(material(arena, 0).model, ARHOST_METAL);
+    EXPECT_THAT(material(arena, 0).reflectivity, ElementsAre(0.5f, 0.6f, 0.5f));
+    EXPECT_EQ(material(arena, 0).exponent, 256);
+    EXPECT_EQ(material(arena, 1).model, ARHOST_METALLIC_ROUGHNESS);
+    EXPECT_THAT(material(arena, 1).diffuse, ElementsAre(1, 0, 0));
+    EXPECT_EQ(material(arena, 1).metallic, 1);
+    EXPECT_EQ(material(arena, 1).roughness, 0.3f);
+    EXPECT_EQ(material(arena, 1).emission[0], 12);
+}
+
+TEST(SceneFile, DescribesLightsOfEveryType) {
+    const Arena arena = load(start + "lights:\n"
+                                     "  - {type: directional, direction: [0, 0, -2], intensity: 1}\n"
+                                     "  - {type: spot, position: [0, 0, 9], direction: [0, 1, 0], inner_degrees: 30, "
+                                     "outer_degrees: 60, intensity: 1, falloff: inverse-square}\n"
+                                     "  - {type: rectangle, position: [0, 0, 9], direction: [0, 1, 0], size: [4, 6], "
+                                     "intensity: 1}\n"
+                                     "  - {type: sphere, position: [0, 0, 9], radius: 3, intensity: 1}\n"
+                                     "objects: []\n");
+    EXPECT_EQ(light(arena, 0).type, ARHOST_DIRECTIONAL_LIGHT);
+    EXPECT_THAT(light(arena, 0).direction, ElementsAre(0, 0, -1));
+    EXPECT_FLOAT_EQ(light(arena, 1).cosine_outer, 0.5f);
+    EXPECT_FLOAT_EQ(light(arena, 1).cosine_inner, std::sqrt(0.75f));
+    EXPECT_THAT(light(arena, 2).axis_u, ElementsAre(-2, 0, 0)); // the width is level
+    EXPECT_THAT(light(arena, 2).axis_v, ElementsAre(0, 0, 3));
+    EXPECT_EQ(light(arena, 3).radius, 3);
+    EXPECT_THAT(error_of(start + "lights:\n  - {type: spot, position: [0, 0, 9], direction: [0, 0, 0], "
+                                 "outer_degrees: 60, intensity: 1}\nobjects: []\n"),
+                testing::HasSubstr("direction: has no direction"));
+    EXPECT_THAT(error_of(start + "lights:\n  - {type: directional, position: [0, 0, 9], direction: [0, 0, 1], "
+                                 "intensity: 1}\nobjects: []\n"),
+                testing::HasSubstr("position: unknown key"));
+}
+
 TEST(SceneFile, DescribesLights) {
     const Arena arena = load(start + "lights:\n  - {position: [1, 2, 3], intensity: 0.8}\n"
                                      "  - {position: [0, 0, 9], intensity: [1e4, 2e4, 0], falloff: inverse-square}\n"
@@ -275,7 +344,8 @@ TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
               "s.yaml:5:9: materials.grey: the material stands here twice; keep one of them");
     EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
-              "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror; did you mean "
+              "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror, metal, glass, "
+              "metallic-roughness; did you mean "
               "'diffuse'?");
     EXPECT_EQ(error_of(start + "  red: {model: mirror, diffuse: 1}\n"),
               "s.yaml:5:33: materials.red.diffuse: unknown key; known here: model, reflectivity");

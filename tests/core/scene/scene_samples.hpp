@@ -10,16 +10,16 @@
 namespace arhost::scene::test {
 
 inline arhost_material grey() {
-    arhost_material material{};
-    material.model = ARHOST_DIFFUSE;
+    arhost_material material = make_material(ARHOST_DIFFUSE);
     for (float &value : material.diffuse)
         value = 0.5f;
-    material.exponent = 1;
     return material;
 }
 
 inline arhost_light lamp() {
-    return {ARHOST_POINT_LIGHT, ARHOST_FALLOFF_NONE, {0, 0, 300}, {1, 1, 1}};
+    arhost_light light = make_light(ARHOST_POINT_LIGHT);
+    light.position[2] = 300;
+    return light;
 }
 
 // A square of two triangles with normals and texcoords.

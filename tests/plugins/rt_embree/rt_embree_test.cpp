@@ -305,7 +305,7 @@ TEST(Light, APlaneIsAsBrightAsLambertSays) {
 
 TEST(Light, ASpecularPlaneAddsPhongsLobe) {
     ArenaBuilder builder;
-    const arhost_material material{ARHOST_SPECULAR, 0, {}, {0.2f, 0.2f, 0.2f}, {0.5f, 0.5f, 0.5f}, 20, {}, 0};
+    const arhost_material material = shiny(0.2f, 0.5f, 20);
     builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(material));
     builder.add_light(light(30, -20, 90, 0.9f));
     const Picture picture = Tracer(std::move(builder)).render(from_above);
@@ -494,12 +494,11 @@ ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     };
     const std::uint32_t box = builder.add_triangles(cube(1)), ball = builder.add_spheres({{0, 0, 0, 1}});
     const std::uint32_t grey = builder.add_material(diffuse(0.7f, 0.7f, 0.7f));
-    const std::uint32_t shiny = builder.add_material(
-        {ARHOST_SPECULAR, 0, {0.1f, 0.3f, 0.1f}, {0.1f, 0.5f, 0.1f}, {0.7f, 0.7f, 0.7f}, 40, {}, 0});
+    const std::uint32_t glossy = builder.add_material(shiny(0.4f, 0.7f, 40));
     const std::uint32_t glass = builder.add_material(mirror(0.9f));
     builder.add_object("floor", builder.add_triangles(square(100)), grey, ARHOST_CATCHER,
                        place({0, 0, 0}, 0, {1, 1, 1}));
-    builder.add_object("box", box, shiny, ARHOST_VIRTUAL, place({-30, 10, 20}, 30, {12, 15, 20}));
+    builder.add_object("box", box, glossy, ARHOST_VIRTUAL, place({-30, 10, 20}, 30, {12, 15, 20}));
     builder.add_object("ball", ball, glass, ARHOST_VIRTUAL, place({20, 0, 22}, 0, {20, 20, 20}));
     builder.add_object("egg", ball, grey, ARHOST_VIRTUAL, place({10, -45, 12}, 50, {6, 9, 12}));
     builder.add_object("post", box, grey, ARHOST_OCCLUDER, place({60, -20, 30}, 10, {4, 4, 30}));

@@ -16,7 +16,7 @@ TEST(ThreadPool, DoesEachPieceOfWorkOnceRoundAfterRound) {
         EXPECT_EQ(pool.thread_count(), threads);
         std::vector<int> done(997, 0); // each written by one thread, read after the round
         for (int round = 1; round <= 200; ++round) {
-            pool.for_each(done.size(), [&](std::size_t i) { ++done[i]; });
+            pool.for_each(done.size(), [&](std::size_t i, std::size_t) { ++done[i]; });
             for (int count : done)
                 ASSERT_EQ(count, round);
         }
@@ -28,13 +28,13 @@ TEST(ThreadPool, ZeroAsksForOneThreadAProcessor) {
 }
 
 TEST(ThreadPool, NoWorkIsDoneAtOnce) {
-    ThreadPool(3).for_each(0, [](std::size_t) { FAIL(); });
+    ThreadPool(3).for_each(0, [](std::size_t, std::size_t) { FAIL(); });
 }
 
 TEST(ThreadPool, FlushesDenormalsAtWorkAndLeavesTheCallersArithmeticAsItWas) {
     volatile float tiny = std::numeric_limits<float>::min();
     std::atomic<int> flushed{0};
-    ThreadPool(2).for_each(50, [&](std::size_t) { flushed += tiny * 0.5f == 0; });
+    ThreadPool(2).for_each(50, [&](std::size_t, std::size_t) { flushed += tiny * 0.5f == 0; });
 #if defined(__SSE2__)
     EXPECT_EQ(flushed, 50);
 #endif

@@ -112,7 +112,7 @@ public:
         return status;
     }
     arhost_status try_render(const arhost_camera &camera, Picture &picture) {
-        const arhost_render_request request{sizeof request, 0, 0, 0, camera};
+        const arhost_render_request request{sizeof request, 0, 0, 0, camera, nullptr};
         const arhost_image image = picture.image();
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }
@@ -142,17 +142,39 @@ private:
 };
 
 // Materials and meshes.
+inline void set3(float (&to)[3], float x, float y, float z) {
+    to[0] = x;
+    to[1] = y;
+    to[2] = z;
+}
 inline arhost_material flat(float r, float g, float b) { // its colour without any light; needs ambient 1
-    return {ARHOST_DIFFUSE, 0, {r, g, b}, {}, {}, 1, {}, 0};
+    arhost_material material = scene::make_material(ARHOST_DIFFUSE);
+    set3(material.ambient, r, g, b);
+    return material;
 }
 inline arhost_material diffuse(float r, float g, float b) {
-    return {ARHOST_DIFFUSE, 0, {r, g, b}, {r, g, b}, {}, 1, {}, 0};
+    arhost_material material = flat(r, g, b);
+    set3(material.diffuse, r, g, b);
+    return material;
+}
+inline arhost_material shiny(float diffuse_grey, float specular, float exponent) {
+    arhost_material material = scene::make_material(ARHOST_SPECULAR);
+    set3(material.diffuse, diffuse_grey, diffuse_grey, diffuse_grey);
+    set3(material.specular, specular, specular, specular);
+    material.exponent = exponent;
+    return material;
 }
 inline arhost_material mirror(float reflectivity) {
-    return {ARHOST_MIRROR, 0, {}, {}, {}, 1, {reflectivity, reflectivity, reflectivity}, 0};
+    arhost_material material = scene::make_material(ARHOST_MIRROR);
+    set3(material.reflectivity, reflectivity, reflectivity, reflectivity);
+    return material;
 }
 inline arhost_light light(float x, float y, float z, float intensity, arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
-    return {ARHOST_POINT_LIGHT, falloff, {x, y, z}, {intensity, intensity, intensity}};
+    arhost_light light = scene::make_light(ARHOST_POINT_LIGHT);
+    light.falloff = falloff;
+    set3(light.position, x, y, z);
+    set3(light.intensity, intensity, intensity, intensity);
+    return light;
 }
 // A square in the plane z = `z`, its front up.
 inline scene::TriangleMesh square(float half_side, float z = 0) {

@@ -6,6 +6,7 @@
 #define ARHOST_RAYTRACER_H
 
 #include "camera.h"
+#include "motion.h"
 #include "plugin.h"
 #include "scene.h"
 
@@ -27,6 +28,7 @@ typedef struct arhost_render_request {
     uint64_t sequence; /* of the video frame; the seed of anything random */
     double time_s;     /* scene time */
     arhost_camera camera;
+    const arhost_motion *motion; /* NULL where the scene's duration_s is 0 */
 } arhost_render_request;
 
 /* The image to write. RGBA8: R, G, B, A bytes; straight (not premultiplied) alpha; sRGB-encoded; first

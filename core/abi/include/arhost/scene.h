@@ -17,7 +17,7 @@ extern "C" {
 #endif
 
 #define ARHOST_SCENE_MAGIC 0x435354534f485241ull /* "ARHOSTSC" */
-#define ARHOST_SCENE_VERSION 1u
+#define ARHOST_SCENE_VERSION 2u
 #define ARHOST_NONE 0xffffffffu
 
 /* `count` elements, each `stride` bytes from the one before; count 0: absent. */
@@ -42,33 +42,88 @@ typedef struct arhost_geometry {
     uint32_t reserved;
     arhost_buffer positions; /* stride 12 (FLOAT3) or 16 (FLOAT4) */
     arhost_buffer normals;   /* one a vertex, unit length: smooth shading; absent: flat */
-    arhost_buffer texcoords;
-    arhost_buffer indices; /* stride 12; each < positions.count */
+    arhost_buffer texcoords; /* one a vertex; (0, 0) is a texture's left top corner, (1, 1) its right bottom one */
+    arhost_buffer indices;   /* stride 12; each < positions.count */
+    /* Of triangles that deform; else absent. Ray tracers need not look at them: arhost/motion.h. */
+    arhost_buffer joints;          /* a vertex: 4×uint16, places in the skin's list; stride 8 */
+    arhost_buffer weights;         /* a vertex: 4 floats, 0 to 1, sum 1; stride 16 */
+    arhost_buffer morph_positions; /* FLOAT3 displacements, vertices of target 0, of target 1, …; stride 12 */
+    arhost_buffer morph_normals;   /* likewise, or absent */
 } arhost_geometry;
+
+/* ---- textures ---- */
+
+typedef int32_t arhost_texel_format;
+enum {
+    ARHOST_TEXEL_SRGB8 = 1,  /* R, G, B, A bytes; colour sRGB-encoded, alpha linear */
+    ARHOST_TEXEL_RGBA8 = 2,  /* R, G, B, A bytes, linear: numbers rather than colours */
+    ARHOST_TEXEL_RGBA32F = 3 /* four floats, linear light, 0 to 1e6 */
+};
+typedef int32_t arhost_wrap;
+enum { ARHOST_WRAP_REPEAT = 1, ARHOST_WRAP_CLAMP = 2, ARHOST_WRAP_MIRROR = 3 };
+
+/* Sampled bilinearly; texel (i, j) has its centre at u = (i + ½)/width, v = (j + ½)/height. Bytes are
+ * linearised before they are mixed. */
+typedef struct arhost_texture {
+    arhost_texel_format format;
+    uint32_t width, height; /* 1 to 16384 */
+    arhost_wrap wrap_u, wrap_v;
+    uint32_t name;        /* byte offset into `names` */
+    arhost_buffer texels; /* width·height of them, first row at the top; stride 4 or 16 */
+} arhost_texture;
+
+/* ---- materials ---- */
 
 typedef int32_t arhost_material_model;
 enum {
-    ARHOST_DIFFUSE = 1,  /* Lambert */
-    ARHOST_SPECULAR = 2, /* Lambert + Phong */
-    ARHOST_MIRROR = 3    /* perfect reflection times `reflectivity` */
+    ARHOST_DIFFUSE = 1,           /* Lambert */
+    ARHOST_SPECULAR = 2,          /* Lambert + Phong */
+    ARHOST_MIRROR = 3,            /* perfect reflection times `reflectivity` */
+    ARHOST_METAL = 4,             /* Lambert + Phong + perfect reflection times Schlick's Fresnel term of
+                                     `reflectivity` */
+    ARHOST_GLASS = 5,             /* refraction and reflection by a Fresnel term, absorption inside */
+    ARHOST_METALLIC_ROUGHNESS = 6 /* glTF 2.0's: GGX over Lambert */
 };
 
-/* Colours are linear light, 0 to 1, Rec. 709 primaries. */
+/* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; what a
+ * texture gives is multiplied with the number beside it. Fields that a model does not name are ignored. */
 typedef struct arhost_material {
     arhost_material_model model;
-    uint32_t reserved;
-    float ambient[3];      /* Ka: times the scene's ambient light */
-    float diffuse[3];      /* Kd */
-    float specular[3];     /* Ks */
-    float exponent;        /* Phong's, >= 1 */
-    float reflectivity[3]; /* Kr */
-    uint32_t reserved_2;
+    uint32_t colour_texture; /* of ambient and diffuse; its alpha against alpha_cutoff */
+    float ambient[3];        /* Ka: times the scene's ambient light */
+    float diffuse[3];        /* Kd; metallic-roughness: the base colour */
+    float specular[3];       /* Ks */
+    float exponent;          /* Phong's, >= 1 */
+    float reflectivity[3];   /* Kr; glass: colour of what is reflected */
+    float emission[3];       /* given off, 0 to 1e6 */
+    float alpha_cutoff;      /* where the colour's alpha is below it there is nothing; 0: no holes */
+
+    /* Metallic-roughness. */
+    float metallic, roughness;           /* 0 to 1 */
+    uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
+    uint32_t normal_texture;             /* tangent space, u and v as the texture's */
+    uint32_t emission_texture;
+
+    /* Glass. Its reflectance at an angle of cosine c (on the outside, c of the refracted ray) is
+     * clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), 1 at total reflection. */
+    float index;                                 /* of refraction against what is outside, 1 to 4 */
+    float fresnel_exponent;                      /* 0.01 to 100 */
+    float fresnel_minimum, fresnel_maximum;      /* 0 to 1 */
+    float refraction[3];                         /* colour of what is refracted */
+    float extinction[3];                         /* per mm, >= 0: light loses exp(−extinction · way inside) */
+    float shadow_attenuation[3];                 /* of light that passes a surface at a right angle */
+    float cutoff_colour[3];                      /* stands for a ray that is not followed any more */
+    float importance_cutoff;                     /* a ray that would add less of itself is not followed; 0 to 1 */
+    uint32_t reflection_depth, refraction_depth; /* such rays start only from a depth below */
 } arhost_material;
+
+/* ---- objects ---- */
 
 typedef int32_t arhost_role;
 enum {
     ARHOST_VIRTUAL = 1, /* alpha 255 */
-    ARHOST_CATCHER = 2, /* stands for real geometry: alpha only where shadowed */
+    ARHOST_CATCHER = 2, /* stands for real geometry: alpha only where shadowed; seen by secondary rays.
+                           Primary rays pass through the sides that face away. */
     ARHOST_OCCLUDER = 3 /* stands for real geometry: hides what is behind it, alpha 0 */
 };
 
@@ -77,13 +132,63 @@ typedef struct arhost_object {
     arhost_role role;
     uint32_t name; /* byte offset into `names`, of a NUL-terminated string */
     /* Column-major 3×4: the columns are x, y, z axes and the origin. Invertible. The identity where
-     * the loader has put a static object's vertices into the world already. */
+     * the loader has put a static object's vertices into the world already. Of an object that moves: at
+     * time 0. */
     float world_from_object[12];
+    uint32_t moves;      /* non-zero: its place comes with each request (arhost/motion.h) */
+    uint32_t deforms;    /* non-zero: so do its geometry's vertices; no other object has that geometry */
+    uint32_t node, skin; /* for arhost/motion.h; ARHOST_NONE */
 } arhost_object;
+
+/* ---- what moves: evaluated for the ray tracer by its worker, for whom it may be opaque ---- */
+
+/* A place in a tree of places. */
+typedef struct arhost_node {
+    uint32_t parent;            /* an index below its own, or ARHOST_NONE: the world */
+    uint32_t animated;          /* non-zero: translation, rotation and scale are valid, and stand for: */
+    float parent_from_node[12]; /* column-major 3×4 */
+    float translation[3], rotation[4] /* a unit quaternion x, y, z, w */, scale[3];
+    arhost_buffer morph_weights; /* floats: of the targets of the geometry at this node */
+} arhost_node;
+
+typedef int32_t arhost_channel_target;
+enum {
+    ARHOST_CHANNEL_TRANSLATION = 1,
+    ARHOST_CHANNEL_ROTATION = 2,
+    ARHOST_CHANNEL_SCALE = 3,
+    ARHOST_CHANNEL_MORPH_WEIGHTS = 4
+};
+typedef int32_t arhost_interpolation;
+enum {
+    ARHOST_INTERPOLATION_STEP = 1,
+    ARHOST_INTERPOLATION_LINEAR = 2, /* rotations: spherically */
+    ARHOST_INTERPOLATION_CUBIC = 3   /* a key: in-tangent, value, out-tangent, as in glTF 2.0, appendix C */
+};
+
+typedef struct arhost_channel {
+    uint32_t node;
+    arhost_channel_target target;
+    arhost_interpolation interpolation;
+    uint32_t reserved;
+    arhost_buffer times;  /* s, floats, ascending */
+    arhost_buffer values; /* floats: a key's 3, 4 or as many as morph weights; CUBIC: three times that */
+} arhost_channel;
+
+typedef struct arhost_skin {
+    arhost_buffer joints;         /* uint32: nodes */
+    arhost_buffer node_from_mesh; /* a joint: column-major 3×4 floats, "inverse bind matrix"; stride 48 */
+} arhost_skin;
+
+/* ---- lights ---- */
 
 typedef int32_t arhost_light_type;
 enum {
-    ARHOST_POINT_LIGHT = 1 /* at `position` */
+    ARHOST_POINT_LIGHT = 1,       /* at `position` */
+    ARHOST_DIRECTIONAL_LIGHT = 2, /* from infinitely far, along `direction` */
+    ARHOST_SPOT_LIGHT = 3,        /* at `position`, along `direction`, in a cone */
+    ARHOST_RECTANGLE_LIGHT = 4,   /* about `position`, corners at ±axis_u ±axis_v, shining to the side of
+                                     `direction` with the cosine to it */
+    ARHOST_SPHERE_LIGHT = 5       /* about `position`, of `radius` */
 };
 typedef int32_t arhost_falloff;
 enum {
@@ -91,12 +196,31 @@ enum {
     ARHOST_FALLOFF_INVERSE_SQUARE = 2 /* irradiance = intensity · cosθ / d², d in mm */
 };
 
+/* The light of an extended one is the mean over points spread evenly over it (of a sphere: over the disc
+ * that it shows), each a light of `intensity`; so a small one is like a point light. */
 typedef struct arhost_light {
     arhost_light_type type;
-    arhost_falloff falloff;
-    float position[3]; /* mm */
+    arhost_falloff falloff; /* directional: NONE */
+    float position[3];      /* mm */
+    float direction[3];     /* unit length, away from the light */
     float intensity[3];
+    float axis_u[3], axis_v[3];       /* mm, half a side each, across each other and `direction` */
+    float radius;                     /* mm */
+    float cosine_inner, cosine_outer; /* of a spot's half angles: full light within, none without,
+                                         smoothly between; inner >= outer */
 } arhost_light;
+
+/* Light from all round, by an image in equirectangular projection: a direction (x, y, z) of the
+ * environment, y up, has u = ½ + atan2(x, −z)/2π, v = acos(y)/π. */
+typedef struct arhost_environment {
+    uint32_t texture;                /* RGBA32F; ARHOST_NONE: there is none */
+    float intensity;                 /* times the texels */
+    float environment_from_world[9]; /* a rotation, column-major */
+    /* For choosing directions with a density as the light's, luminance times sin(πv): cumulative sums,
+     * each ending with 1. Floats. */
+    arhost_buffer rows;    /* height: over whole rows */
+    arhost_buffer columns; /* height·width: along each row */
+} arhost_environment;
 
 /* The arena's first bytes. */
 typedef struct arhost_scene {
@@ -107,14 +231,22 @@ typedef struct arhost_scene {
     arhost_axes axes;
     uint32_t max_depth;  /* bounces after the primary ray */
     float ambient[3];    /* light from everywhere */
-    float background[3]; /* seen by reflected and refracted rays that hit nothing; primary rays: alpha 0 */
-    float bounds_min[3], bounds_max[3];                  /* of all objects, world */
+    float background[3]; /* seen by secondary rays that hit nothing where there is no environment; primary
+                            rays: alpha 0 */
+    float bounds_min[3], bounds_max[3];                  /* of all objects, world, at time 0 */
     float shadow_alpha_opaque, shadow_alpha_translucent; /* on catchers: 0.6 and 0.3 */
-    arhost_buffer geometries;                            /* arhost_geometry, stride sizeof */
-    arhost_buffer materials;                             /* arhost_material */
-    arhost_buffer objects;                               /* arhost_object; may be 0 */
-    arhost_buffer lights;                                /* arhost_light */
-    arhost_buffer names;                                 /* bytes, stride 1 */
+    uint32_t coloured_shadows;                           /* non-zero: shadows of glass on catchers take its colour */
+    float duration_s; /* of the motion, which then begins again; 0: nothing moves */
+    arhost_environment environment;
+    arhost_buffer geometries; /* arhost_geometry, stride sizeof */
+    arhost_buffer textures;   /* arhost_texture */
+    arhost_buffer materials;  /* arhost_material */
+    arhost_buffer objects;    /* arhost_object; may be 0 */
+    arhost_buffer lights;     /* arhost_light */
+    arhost_buffer nodes;      /* arhost_node */
+    arhost_buffer channels;   /* arhost_channel */
+    arhost_buffer skins;      /* arhost_skin */
+    arhost_buffer names;      /* bytes, stride 1 */
 } arhost_scene;
 
 #ifdef __cplusplus

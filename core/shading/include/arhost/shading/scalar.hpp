@@ -6,7 +6,8 @@
 // guard. Whoever includes it does so inside a namespace of his own that defines
 //   ARHOST_LEAF            what stands before a function: "inline", or nothing in GLSL
 //   Float, Bool, Vec3      a number, the result of comparing two, three numbers; one lane or many
-//   select(b, yes, no), min, max, floor, pow, dot
+//   vec3(x, y, z), select(b, yes, no), min, max, floor, pow, sqrt, dot
+//   cosine_of_turn(t), sine_of_turn(t)   of an angle of t full turns, 0 to 1
 // so that the same formulas serve scalars (here), SIMD packets (plugins/rt_embree/packet.hpp) and shaders.
 #pragma once
 
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace arhost::shading {
 
@@ -27,12 +29,23 @@ using std::floor;
 using std::max;
 using std::min;
 using std::pow;
+using std::sqrt;
+constexpr Vec3 vec3(Float x, Float y, Float z) {
+    return {x, y, z};
+}
+inline Float cosine_of_turn(Float t) {
+    return std::cos(2 * std::numbers::pi * t);
+}
+inline Float sine_of_turn(Float t) {
+    return std::sin(2 * std::numbers::pi * t);
+}
 
 #define ARHOST_LEAF inline
 #include "leaf/alpha.h"
 #include "leaf/bsdf.h"
 #include "leaf/colour.h"
 #include "leaf/light.h"
+#include "leaf/sampling.h"
 #undef ARHOST_LEAF
 
 } // namespace arhost::shading

@@ -21,3 +21,53 @@ ARHOST_LEAF Float phong(Vec3 normal, Vec3 to_light, Vec3 to_eye, Float exponent)
 ARHOST_LEAF Vec3 mirror_direction(Vec3 incident, Vec3 normal) {
     return incident - normal * (Float(2.0) * dot(normal, incident));
 }
+
+// Schlick: the reflectance of a metal, from that at a right angle to 1 at the rim
+// (Schlick, An Inexpensive BRDF Model for Physically-based Rendering, CGF 13(3), 1994, eq. 15).
+ARHOST_LEAF Vec3 schlick(Vec3 at_right_angle, Float cosine) {
+    Float c = Float(1.0) - min(max(cosine, Float(0.0)), Float(1.0));
+    Float c2 = c * c;
+    Float rim = c2 * c2 * c;
+    return at_right_angle * (Float(1.0) - rim) + vec3(rim, rim, rim);
+}
+
+// Glass: Schlick's term with an exponent and limits of its own (the dissertation's table 2).
+ARHOST_LEAF Float glass_reflectance(Float cosine, Float exponent, Float minimum, Float maximum) {
+    // The floor keeps pow away from 0.
+    Float c = max(Float(1.0) - min(max(cosine, Float(0.0)), Float(1.0)), Float(1e-6));
+    return min(max(minimum + (Float(1.0) - minimum) * pow(c, exponent), minimum), maximum);
+}
+
+// Snell: the squared cosine of the refracted ray; below 0 at total reflection. `ratio` is the index of
+// refraction where the ray comes from by that where it goes to.
+ARHOST_LEAF Float refracted_cosine_squared(Float cosine, Float ratio) {
+    return Float(1.0) - ratio * ratio * (Float(1.0) - cosine * cosine);
+}
+
+// The refracted ray's direction; both cosines are positive, `normal` faces the incident ray's origin.
+ARHOST_LEAF Vec3 refracted_direction(Vec3 incident, Vec3 normal, Float ratio, Float cosine, Float refracted_cosine) {
+    return incident * ratio + normal * (ratio * cosine - refracted_cosine);
+}
+
+// GGX, as glTF 2.0's appendix B has it, alpha being the roughness squared: the distribution of the
+// microfacets' normals (Walter et al., Microfacet Models for Refraction, EGSR 2007, eq. 33) …
+ARHOST_LEAF Float ggx_distribution(Float cosine_half, Float alpha) {
+    Float a2 = alpha * alpha;
+    Float d = cosine_half * cosine_half * (a2 - Float(1.0)) + Float(1.0);
+    return a2 / (Float(3.14159265358979) * d * d);
+}
+
+// … and the masking and shadowing of them, Smith's, correlated by height, by 4 (n·l) (n·v)
+// (Heitz, Understanding the Masking-Shadowing Function, JCGT 3(2), 2014, eq. 99).
+ARHOST_LEAF Float ggx_visibility(Float cosine_light, Float cosine_eye, Float alpha) {
+    Float a2 = alpha * alpha;
+    Float light = cosine_eye * sqrt(cosine_light * cosine_light * (Float(1.0) - a2) + a2);
+    Float eye = cosine_light * sqrt(cosine_eye * cosine_eye * (Float(1.0) - a2) + a2);
+    return Float(0.5) / max(light + eye, Float(1e-7));
+}
+
+// The share of light along a direction of cosine c that Smith's function leaves unmasked.
+ARHOST_LEAF Float ggx_unmasked(Float cosine, Float alpha) {
+    Float a2 = alpha * alpha;
+    return Float(2.0) * cosine / max(cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine), Float(1e-7));
+}

@@ -79,6 +79,7 @@ struct alignas(64) Int {
     ARHOST_INLINE friend Int operator-(Int a, Int b) { ARHOST_BINARY(Int, a_ - b_); }
     ARHOST_INLINE friend Int operator&(Int a, Int b) { ARHOST_BINARY(Int, a_ & b_); }
     ARHOST_INLINE friend Int operator|(Int a, Int b) { ARHOST_BINARY(Int, a_ | b_); }
+    ARHOST_INLINE friend Int operator^(Int a, Int b) { ARHOST_BINARY(Int, a_ ^ b_); }
     ARHOST_INLINE friend Int operator<<(Int a, Int b) { ARHOST_BINARY(Int, a_ << b_); }
     ARHOST_INLINE friend Int operator>>(Int a, Int b) { ARHOST_BINARY(Int, a_ >> b_); }
     ARHOST_INLINE friend Bool operator==(Int a, Int b) { ARHOST_BINARY(Bool, a_ == b_); }
@@ -155,6 +156,16 @@ ARHOST_INLINE Float float_of(Int a) {
 ARHOST_INLINE Float floor(Float a) {
     const Float whole = to_float(to_int(a));
     return whole - select(whole > a, Float(1.0f), Float(0.0f));
+}
+ARHOST_INLINE Float abs(Float a) {
+    return max(a, -a);
+}
+ARHOST_INLINE Vec3 vec3(Float x, Float y, Float z) {
+    return {x, y, z};
+}
+// Zeros come in from the left.
+ARHOST_INLINE Int shift_right_unsigned(Int a, int bits) {
+    return (a >> Int(bits)) & Int(static_cast<int>(~0u >> bits));
 }
 
 ARHOST_INLINE FloatPart sqrt_of(FloatPart a) {
@@ -278,11 +289,44 @@ ARHOST_INLINE Float pow(Float a, Float b) { // a > 0
     return exp2(b * log2(a));
 }
 
+// The Taylor series of the sine on a quarter turn to both sides, to 6e-8.
+ARHOST_INLINE Float sine_of_turn(Float t) {
+    const Float x = t - floor(t + Float(0.5f)); // −½ to ½
+    const Float folded = select(abs(x) > Float(0.25f), select(x < Float(0.0f), Float(-0.5f), Float(0.5f)) - x, x);
+    const Float a = folded * Float(6.28318531f), a2 = a * a;
+    return a * (Float(1.0f) + a2 * (Float(-0.166666667f) +
+                                    a2 * (Float(0.00833333333f) +
+                                          a2 * (Float(-0.000198412698f) +
+                                                a2 * (Float(2.75573192e-6f) + a2 * Float(-2.50521084e-8f))))));
+}
+ARHOST_INLINE Float cosine_of_turn(Float t) {
+    return sine_of_turn(t + Float(0.25f));
+}
+// The angle of (x, y) from the y axis to the x axis in turns, −½ to ½, to 2e-6
+// (Abramowitz and Stegun, 4.4.49).
+ARHOST_INLINE Float turn_of(Float x, Float y) {
+    const Float ax = abs(x), ay = abs(y);
+    const Float q = min(ax, ay) / max(max(ax, ay), Float(1e-30f)), q2 = q * q;
+    const Float angle =
+        q *
+        (Float(0.9998660f) +
+         q2 * (Float(-0.3302995f) + q2 * (Float(0.1801410f) + q2 * (Float(-0.0851330f) + q2 * Float(0.0208351f)))));
+    const Float turn = angle * Float(0.159154943f);
+    const Float folded = select(ax > ay, Float(0.25f) - turn, turn);
+    const Float half = select(y < Float(0.0f), Float(0.5f) - folded, folded);
+    return select(x < Float(0.0f), -half, half);
+}
+// The angle of a direction of height y, in half turns: 0 up, 1 down.
+ARHOST_INLINE Float angle_from_up(Float y) {
+    return Float(2.0f) * turn_of(sqrt(max(Float(1.0f) - y * y, Float(0.0f))), y);
+}
+
 #define ARHOST_LEAF ARHOST_INLINE
 #include <arhost/shading/leaf/alpha.h>
 #include <arhost/shading/leaf/bsdf.h>
 #include <arhost/shading/leaf/colour.h>
 #include <arhost/shading/leaf/light.h>
+#include <arhost/shading/leaf/sampling.h>
 #undef ARHOST_LEAF
 #undef ARHOST_UNARY
 #undef ARHOST_BINARY

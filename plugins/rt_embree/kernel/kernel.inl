@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The integrator: from a tile's primary rays, block by block of 4×4 pixels, to their colours and alphas.
+// Included by <isa>.cpp, which defines ARHOST_ISA.
+#include "kernel.hpp"
+#include "packet.hpp"
+
+namespace rt_embree::ARHOST_ISA {
+namespace {
+
+// The parts lie in this namespace, so that each instruction set has its own.
+#include "scatter.inl"
+
+constexpr int block = 4; // px a side
+
+// What a virtual object behind a catcher looks like does not depend on the catcher; an occluder in front
+// of anything hides it. Returns the alphas, and tells whether there is any colour to them.
+ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool active, bool &coloured) {
+    const Scene &scene = work.frame.scene;
+    const Vec3 eye = splat(work.frame.camera.eye);
+    alignas(64) int lane[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const Paths paths{load(lane) + Int(first_pixel), white(), 0};
+    RTCRayHit16 rays;
+    set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
+    const Bool hit = trace(scene, make_query(Coherence::coherent), rays, active);
+    Bool occluded = bool_of(false);
+    if (scene.has_occluders)
+        for_each_object(scene, rays.hit, hit, [&](const Object &object, Bool here) {
+            if (object.role == ARHOST_OCCLUDER)
+                occluded = occluded | here;
+        });
+    const Bool is_virtual = hit & ~occluded, rest = active & ~is_virtual;
+
+    Float alpha = select(is_virtual, Float(1.0f), Float(0.0f));
+    if (scene.has_catchers && any(rest)) {
+        RTCRayHit16 onwards;
+        set_ray(onwards.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
+        const Bool caught = trace(scene, make_query(Coherence::coherent, true), onwards, rest);
+        if (any(caught)) {
+            const CaughtShadow shadow = caught_shadow(work.frame, onwards, caught, random_of(work, paths));
+            alpha = select(caught, shadow.alpha, alpha);
+            if (scene.coloured_shadows) {
+                add_light(work, paths, shadow.colour, caught);
+                coloured = true;
+            }
+        }
+    }
+    if (any(is_virtual)) {
+        shade(work, rays, is_virtual, paths);
+        coloured = true;
+    }
+    return alpha;
+}
+
+// A block's directions, or one of their slopes.
+ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float z) {
+    return {load(arrays), load(arrays + lanes), dimensions == 3 ? load(arrays + 2 * lanes) : Float(z)};
+}
+
+ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, std::uint32_t sample) {
+    const std::int32_t dimensions = frame.rays.dimensions, step = lanes * dimensions;
+    Vec3 direction = load_rays(rays, dimensions, 1);
+    if (frame.rays.has_slopes)
+        direction = direction + load_rays(rays + step, dimensions, 0) * Float(frame.samples[sample].x) +
+                    load_rays(rays + 2 * step, dimensions, 0) * Float(frame.samples[sample].y);
+    return transform(frame.camera.world_from_camera, direction);
+}
+
+ARHOST_INLINE Int srgb8(const arhost::shading::Srgb8Table &table, Float linear) {
+    using Table = arhost::shading::Srgb8Table;
+    const Int bits = bits_of(min(max(linear, Float(Table::smallest)), Float(1.0f)));
+    const Int cell = gather(table.cells, (bits - Int(Table::first_bits)) >> Int(Table::shift));
+    const Bool above = (bits & Int(Table::low_mask)) >= (cell & Int(Table::threshold_mask));
+    return (cell >> Int(Table::code_shift)) + select(above, Int(1), Int(0));
+}
+
+ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
+    return r | (g << Int(8)) | (b << Int(16)) | (a << Int(24));
+}
+
+ARHOST_INLINE Vec3 light_of(const Scratch &scratch, int first_pixel) {
+    return {load(scratch.light[0] + first_pixel), load(scratch.light[1] + first_pixel),
+            load(scratch.light[2] + first_pixel)};
+}
+
+// One sample's pixels.
+ARHOST_INLINE Int encode(const Frame &frame, const Scratch &scratch, int first_pixel, bool coloured) {
+    const Int alpha = to_int(code_8bit(load(scratch.alpha + first_pixel)));
+    if (!coloured)
+        return alpha << Int(24);
+    const Vec3 light = light_of(scratch, first_pixel);
+    const auto &table = *frame.scene.srgb8;
+    return rgba8(srgb8(table, light.x), srgb8(table, light.y), srgb8(table, light.z), alpha);
+}
+
+// Several samples: premultiplied sums of what the composite will mix, encoded light.
+ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, bool first) {
+    const Float alpha = load(scratch.alpha + first_pixel);
+    Vec3 colour = black();
+    if (coloured) {
+        const Vec3 light = light_of(scratch, first_pixel);
+        colour = Vec3{srgb_encode(light.x), srgb_encode(light.y), srgb_encode(light.z)} * alpha;
+    }
+    const Float values[4] = {colour.x, colour.y, colour.z, alpha};
+    for (int i = 0; i < 4; ++i) {
+        float *to = scratch.sum[i] + first_pixel;
+        store(to, first ? values[i] : load(to) + values[i]);
+    }
+}
+
+ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::int32_t count) {
+    const Float alpha = load(scratch.sum[3] + first_pixel);
+    // Premultiplied means, then straight: the sums' common divisor cancels out.
+    const Float share = Float(1.0f) / max(alpha, Float(1e-6f));
+    const auto code = [&](int i) __attribute__((always_inline)) {
+        return to_int(code_8bit(load(scratch.sum[i] + first_pixel) * share));
+    };
+    return rgba8(code(0), code(1), code(2), to_int(code_8bit(alpha * Float(1.0f / static_cast<float>(count)))));
+}
+
+ARHOST_INLINE void write_block(const Frame &frame, int x, int y, int width, int height, Int pixels) {
+    const auto *from = reinterpret_cast<const std::uint8_t *>(&pixels);
+    for (int row = 0; row < height; ++row) {
+        std::uint8_t *to = frame.rgba + std::size_t{frame.stride} * (y + row) + std::size_t{4} * x;
+        if (width == block)
+            __builtin_memcpy(to, from + 4 * block * row, 4 * block);
+        else
+            __builtin_memcpy(to, from + 4 * block * row, 4 * width);
+    }
+}
+
+// The tile's blocks, row by row: use(number, x, y, width, height).
+template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use use) {
+    int number = 0;
+    for (int y = all.y0; y < all.y1; y += block)
+        for (int x = all.x0; x < all.x1; x += block, ++number)
+            use(number, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
+}
+
+} // namespace
+
+Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
+    alignas(64) const int lane[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const Int column = load(lane) & Int(3), row = load(lane) >> Int(2);
+    const Rectangle &all = tile.pixels;
+    Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
+    const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
+    Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
+    bool coloured[tile_pixels / lanes];
+
+    for (std::int32_t i = 0; i < frame.sample_count; ++i) {
+        work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
+        for_each_block(all, [&](int number, int, int, int width, int height) {
+            const int first_pixel = number * lanes;
+            for (float *light : scratch.light)
+                store(light + first_pixel, Float(0.0f));
+            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
+            const Bool inside =
+                (column < Int(width)) & (row < Int(height)) & (direction.x == direction.x); // NaN: the lens is blind
+            coloured[number] = false;
+            store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
+        });
+        follow_all(work);
+        if (frame.sample_count > 1)
+            for_each_block(all, [&](int number, int, int, int, int) {
+                accumulate(scratch, number * lanes, coloured[number], i == 0);
+            });
+    }
+    for_each_block(all, [&](int number, int x, int y, int width, int height) {
+        const Int pixels = frame.sample_count > 1 ? mean(scratch, number * lanes, frame.sample_count)
+                                                  : encode(frame, scratch, number * lanes, coloured[number]);
+        write_block(frame, x, y, width, height, pixels);
+        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside have alpha 0
+            drawn.x0 = x < drawn.x0 ? x : drawn.x0;
+            drawn.y0 = y < drawn.y0 ? y : drawn.y0;
+            drawn.x1 = x + width > drawn.x1 ? x + width : drawn.x1;
+            drawn.y1 = y + height > drawn.y1 ? y + height : drawn.y1;
+        }
+    });
+    return drawn;
+}
+
+} // namespace rt_embree::ARHOST_ISA

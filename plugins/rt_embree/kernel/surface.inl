@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where rays have hit, all that shading needs.
+#pragma once
+#include "texture.inl"
+
+struct Surface {
+    Vec3 position;
+    Vec3 geometric_normal, normal; // of the facet, and interpolated over it: length 1, to the ray's origin
+    Bool from_behind;              // the ray came from where the facet's own normal does not point
+    Float offset;                  // mm; how far above the facet secondary rays start
+    Float way;                     // mm, of the ray
+    Vec3 ambient, diffuse, specular, emission;
+    Float exponent;                // Phong's
+    Float alpha;                   // GGX's, where `is_rough`
+    Bool is_lit;                   // lamps make it bright: not a mirror, not glass
+    Bool is_rough;                 // metallic-roughness: `specular` is the reflectance at a right angle
+    Bool is_real;                  // a catcher or occluder
+    bool any_specular, any_rough, any_scattering; // of the packet; scattering: a ray goes on from there
+};
+
+// An attribute of the vertices, interpolated at the hits. Lanes elsewhere read triangle 0. Strides are
+// multiples of 4 bytes (arhost/scene.h).
+template <int components> struct Attribute { Float of[components]; };
+template <int components>
+ARHOST_INLINE Attribute<components> interpolated(const Object &object, const float *values, std::uint32_t stride,
+                                                 const RTCHit16 &hit, Bool here) {
+    const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
+    const Float u = load(hit.u), v = load(hit.v);
+    const Float share[3] = {Float(1.0f) - u - v, u, v};
+    Attribute<components> sum{};
+    for (int number = 0; number < 3; ++number) {
+        const Int at = gather(object.indices + number, corner) * Int(static_cast<int>(stride / 4));
+        for (int i = 0; i < components; ++i)
+            sum.of[i] = sum.of[i] + gather(values + i, at) * share[number];
+    }
+    return sum;
+}
+
+// The object's texture at the hits; `texture` is not ARHOST_NONE.
+ARHOST_INLINE Texel textured(const Scene &scene, const Object &object, std::uint32_t texture, const RTCHit16 &hit,
+                             Bool here) {
+    if (!object.texcoords)
+        return {white(), Float(1.0f)};
+    const Attribute<2> at = interpolated<2>(object, object.texcoords, object.texcoord_stride, hit, here);
+    return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
+}
+
+ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
+    const RTCHit16 &hit = rays.hit;
+    const Vec3 direction = direction_of(rays.ray);
+    const Vec3 facet{load(hit.Ng_x), load(hit.Ng_y), load(hit.Ng_z)};
+    const Vec3 step = direction * load(rays.ray.tfar);
+
+    Surface s{};
+    s.position = origin_of(rays.ray) + step;
+    s.way = length(step);
+    // A hit is as exact as the floats that it was computed from: 2^-24 of their size, a few times.
+    s.offset = (largest(s.position) + largest(step)) * Float(0x1p-19f);
+    s.geometric_normal = facet;
+    s.normal = facet;
+    for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
+        Vec3 geometric = facet, normal = facet;
+        if (object.normals) {
+            const auto n = interpolated<3>(object, object.normals, object.normal_stride, hit, here);
+            normal = {n.of[0], n.of[1], n.of[2]};
+        }
+        if (object.has_transform) {
+            geometric = transform(object.normal_transform, geometric);
+            normal = transform(object.normal_transform, normal);
+        }
+        s.geometric_normal = select(here, geometric, s.geometric_normal);
+        s.normal = select(here, normal, s.normal);
+        if (object.role != ARHOST_VIRTUAL)
+            s.is_real = s.is_real | here;
+
+        const arhost_material &material = *object.material;
+        s.any_scattering |= material.model >= ARHOST_MIRROR;
+        if (material.model == ARHOST_MIRROR || material.model == ARHOST_GLASS)
+            return;
+        s.is_lit = s.is_lit | here;
+        Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);
+        if (material.colour_texture != ARHOST_NONE) {
+            const Vec3 colour = textured(scene, object, material.colour_texture, hit, here).colour;
+            ambient = ambient * colour;
+            diffuse = diffuse * colour;
+        }
+        if (material.model == ARHOST_SPECULAR || material.model == ARHOST_METAL) {
+            s.specular = select(here, splat(material.specular), s.specular);
+            s.exponent = select(here, Float(material.exponent), s.exponent);
+            s.any_specular = true;
+        }
+        if (material.model == ARHOST_METALLIC_ROUGHNESS) {
+            Float metallic = material.metallic, roughness = material.roughness;
+            if (material.metallic_roughness_texture != ARHOST_NONE) {
+                const Vec3 factors =
+                    textured(scene, object, material.metallic_roughness_texture, hit, here).colour;
+                metallic = metallic * factors.z;
+                roughness = roughness * factors.y;
+            }
+            // glTF 2.0, appendix B.3: dielectrics reflect 4 %, metals their colour.
+            s.specular = select(here, white() * (Float(0.04f) * (Float(1.0f) - metallic)) + diffuse * metallic, s.specular);
+            s.alpha = select(here, max(roughness * roughness, Float(0.001f)), s.alpha);
+            s.is_rough = s.is_rough | here;
+            s.any_rough = true;
+            const Vec3 base = diffuse * (Float(1.0f) - metallic);
+            ambient = ambient * (Float(1.0f) - metallic);
+            diffuse = base;
+        }
+        s.ambient = select(here, ambient, s.ambient);
+        s.diffuse = select(here, diffuse, s.diffuse);
+        if (material.emission[0] + material.emission[1] + material.emission[2] > 0) {
+            Vec3 emission = splat(material.emission);
+            if (material.emission_texture != ARHOST_NONE)
+                emission = emission * textured(scene, object, material.emission_texture, hit, here).colour;
+            s.emission = select(here, emission, s.emission);
+        }
+    });
+
+    s.geometric_normal = normalize(s.geometric_normal);
+    s.from_behind = dot(s.geometric_normal, direction) > Float(0.0f);
+    s.geometric_normal = select(s.from_behind, -s.geometric_normal, s.geometric_normal);
+    // Vertex normals that cancel out leave the facet's.
+    s.normal = select(dot(s.normal, s.normal) > Float(1e-12f), normalize(s.normal), s.geometric_normal);
+    s.normal = select(dot(s.normal, s.geometric_normal) < Float(0.0f), -s.normal, s.normal);
+    return s;
+}

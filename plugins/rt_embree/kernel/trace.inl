@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Packets of rays, and what they hit.
+#pragma once
+
+constexpr float far_away = __builtin_inff();
+constexpr int no_hit = static_cast<int>(RTC_INVALID_GEOMETRY_ID);
+
+ARHOST_INLINE Vec3 splat(const float *xyz) {
+    return {Float(xyz[0]), Float(xyz[1]), Float(xyz[2])};
+}
+ARHOST_INLINE Vec3 black() {
+    return {Float(0.0f), Float(0.0f), Float(0.0f)};
+}
+ARHOST_INLINE Vec3 white() {
+    return {Float(1.0f), Float(1.0f), Float(1.0f)};
+}
+
+// A vector that has been taken through a column-major 3×3 matrix.
+ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
+    return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;
+}
+
+ARHOST_INLINE Float length(Vec3 a) {
+    return sqrt(dot(a, a));
+}
+ARHOST_INLINE Vec3 normalize(Vec3 a) {
+    return a * (Float(1.0f) / length(a));
+}
+ARHOST_INLINE Float largest(Vec3 a) {
+    return max(max(abs(a.x), abs(a.y)), abs(a.z));
+}
+ARHOST_INLINE Float luminance(Vec3 a) { // of Rec. 709's primaries
+    return a.x * Float(0.2126f) + a.y * Float(0.7152f) + a.z * Float(0.0722f);
+}
+
+template <class Ray> ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 direction, Float end, Int mask) {
+    store(ray.org_x, origin.x);
+    store(ray.org_y, origin.y);
+    store(ray.org_z, origin.z);
+    store(ray.tnear, Float(0.0f));
+    store(ray.dir_x, direction.x);
+    store(ray.dir_y, direction.y);
+    store(ray.dir_z, direction.z);
+    store(ray.time, Float(0.0f));
+    store(ray.tfar, end);
+    store(ray.mask, mask);
+    store(ray.id, Int(0));
+    store(ray.flags, Int(0));
+}
+ARHOST_INLINE Vec3 origin_of(const RTCRay16 &ray) {
+    return {load(ray.org_x), load(ray.org_y), load(ray.org_z)};
+}
+ARHOST_INLINE Vec3 direction_of(const RTCRay16 &ray) {
+    return {load(ray.dir_x), load(ray.dir_y), load(ray.dir_z)};
+}
+
+// The closest hits of the active lanes. Returns which of them hit.
+ARHOST_INLINE Bool trace(const Scene &scene, Query query, RTCRayHit16 &rays, Bool active) {
+    alignas(64) int valid[lanes];
+    store(valid, active);
+    store(rays.hit.geomID, Int(no_hit));
+    store(rays.hit.instID[0], Int(no_hit));
+    intersect16(valid, scene.root, scene.packet_width, query, rays);
+    return active & (load(rays.hit.geomID) != Int(no_hit));
+}
+
+// Whether anything lies on the active lanes' rays.
+ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
+    alignas(64) int valid[lanes];
+    store(valid, active);
+    // Embree 3.13.5 hangs in coherent occlusion queries through instances with AVX-512.
+    Query query = make_query(scene.has_instances ? Coherence::incoherent : Coherence::coherent);
+    occluded16(valid, scene.root, scene.packet_width, query, rays);
+    return active & (load(rays.tfar) < Float(0.0f)); // −∞ where something was hit
+}
+
+ARHOST_INLINE Int object_number(const RTCHit16 &hit) {
+    const Int instance = load(hit.instID[0]);
+    return select(instance != Int(no_hit), instance, load(hit.geomID));
+}
+
+// Calls use(object, lanes) for each object that lanes of `active` have hit: mostly one or two a packet.
+template <class Use>
+ARHOST_INLINE void for_each_object(const Scene &scene, const RTCHit16 &hit, Bool active, Use use) {
+    const Int numbers = object_number(hit);
+    alignas(64) int number_of[lanes];
+    store(number_of, numbers);
+    for (unsigned left = mask_of(active.lane); left;) {
+        const int number = number_of[__builtin_ctz(left)];
+        const Bool here = active & (numbers == Int(number));
+        left &= ~mask_of(here.lane);
+        use(scene.objects[number], here);
+    }
+}
