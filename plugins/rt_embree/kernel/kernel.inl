@@ -19,7 +19,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
     alignas(64) int lane[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const Paths paths{load(lane) + Int(first_pixel), white(), 0};
+    const Paths paths{load(lane) + Int(first_pixel), first_pixel, white(), 0};
     RTCRayHit16 rays;
     set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
     const Bool hit = trace(scene, make_query(Coherence::coherent), rays, active);
@@ -31,6 +31,10 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
         });
     const Bool is_virtual = hit & ~occluded, rest = active & ~is_virtual;
 
+    coloured = any(is_virtual) || (scene.has_catchers && scene.coloured_shadows);
+    if (coloured)
+        for (float *light : work.scratch.light)
+            store(light + first_pixel, Float(0.0f));
     Float alpha = select(is_virtual, Float(1.0f), Float(0.0f));
     if (scene.has_catchers && any(rest)) {
         RTCRayHit16 onwards;
@@ -39,16 +43,12 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
         if (any(caught)) {
             const CaughtShadow shadow = caught_shadow(work.frame, onwards, caught, random_of(work, paths));
             alpha = select(caught, shadow.alpha, alpha);
-            if (scene.coloured_shadows) {
+            if (scene.coloured_shadows)
                 add_light(work, paths, shadow.colour, caught);
-                coloured = true;
-            }
         }
     }
-    if (any(is_virtual)) {
+    if (any(is_virtual))
         shade(work, rays, is_virtual, paths);
-        coloured = true;
-    }
     return alpha;
 }
 
@@ -152,12 +152,9 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
         work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
         for_each_block(all, [&](int number, int, int, int width, int height) {
             const int first_pixel = number * lanes;
-            for (float *light : scratch.light)
-                store(light + first_pixel, Float(0.0f));
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
             const Bool inside =
                 (column < Int(width)) & (row < Int(height)) & (direction.x == direction.x); // NaN: the lens is blind
-            coloured[number] = false;
             store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
         });
         follow_all(work);

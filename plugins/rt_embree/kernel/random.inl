@@ -13,7 +13,7 @@ ARHOST_INLINE Int hash(Int x) {
 }
 
 struct Random {
-    Int pixel;            // a hash
+    Int pixel, seed;      // which sequence
     std::uint32_t sample; // which of the pixel's
 };
 
@@ -24,8 +24,8 @@ struct Pair {
 // The `count` pairs of one purpose are spread evenly over the square, those of a pixel's samples together, too
 // (M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018: R2).
 ARHOST_INLINE Pair pair(const Random &random, int purpose, int index, int count) {
-    const Int start = hash(random.pixel + Int(purpose * 2));
-    const Int start_2 = hash(random.pixel + Int(purpose * 2 + 1));
+    const Int own = hash(random.pixel ^ random.seed);
+    const Int start = hash(own + Int(purpose * 2)), start_2 = hash(own + Int(purpose * 2 + 1));
     const std::uint32_t i = random.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
     const auto unit = [](Int bits) __attribute__((always_inline)) {
         return to_float(shift_right_unsigned(bits, 8)) * Float(0x1p-24f);

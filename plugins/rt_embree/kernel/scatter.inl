@@ -8,6 +8,7 @@
 // Whose light sixteen rays bring: their pixels' numbers in the tile, and the share of it that arrives.
 struct Paths {
     Int pixel;
+    std::int32_t first_pixel; // of primary rays, whose pixels follow one another
     Vec3 throughput;
     std::uint32_t depth; // bounces so far
 };
@@ -22,18 +23,28 @@ struct Work {
 };
 
 ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
-    return {hash(paths.pixel ^ work.seed ^ Int(static_cast<int>(paths.depth << 12))), work.sample};
+    return {paths.pixel ^ Int(static_cast<int>(paths.depth << 12)), work.seed, work.sample};
 }
 
 ARHOST_INLINE void add_light(Work &work, const Paths &paths, Vec3 light, Bool active) {
     const Vec3 arriving = paths.throughput * light;
+    float *const *to = work.scratch.light;
+    if (paths.depth == 0) {
+        const auto add = [&](int i, Float more) __attribute__((always_inline)) {
+            float *at = to[i] + paths.first_pixel;
+            store(at, load(at) + select(active, more, Float(0.0f)));
+        };
+        add(0, arriving.x);
+        add(1, arriving.y);
+        add(2, arriving.z);
+        return;
+    }
     alignas(64) float x[lanes], y[lanes], z[lanes];
     alignas(64) int pixel[lanes];
     store(x, arriving.x);
     store(y, arriving.y);
     store(z, arriving.z);
     store(pixel, paths.pixel);
-    float *const *to = work.scratch.light;
     for (unsigned left = mask_of(active.lane); left; left &= left - 1) {
         const int i = __builtin_ctz(left);
         to[0][pixel[i]] += x[i];
@@ -195,7 +206,7 @@ ARHOST_INLINE void follow_packet(Work &work, std::uint32_t depth) {
     const auto row = [&](int i) __attribute__((always_inline)) {
         return load(waiting.numbers + i * waiting.capacity + first);
     };
-    Paths paths{select(active, bits_of(row(9)), Int(0)), {row(6), row(7), row(8)}, depth + 1};
+    const Paths paths{select(active, bits_of(row(9)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1};
     RTCRayHit16 rays;
     set_ray(rays.ray, {row(0), row(1), row(2)}, {row(3), row(4), row(5)}, Float(far_away), Int(all_masks));
     waiting.count = first;
