@@ -9,8 +9,8 @@ enum Purpose : int { environment_purpose = 1, glass_purpose, rough_purpose, firs
 
 // One point of a light, as the lanes' surface points see it.
 struct Incidence {
-    Vec3 way;         // to the light, as far as it is; of length 1 to what is infinitely far
-    float end;        // of the way: 1, or infinity
+    Vec3 way;  // to the light, as far as it is; of length 1 to what is infinitely far
+    float end; // of the way: 1, or infinity
     bool from_environment;
     Vec3 direction;   // length 1
     Float cosine;     // of the surface's inclination; 0 where the light is behind it
@@ -60,13 +60,14 @@ ARHOST_INLINE Incidence incidence(const arhost_light &light, const Surface &s, P
 
 // What comes to the surface points from a light.
 struct Passage {
-    Bool open;       // nothing opaque lies between
-    Bool is_tinted;  // but glass does
-    Vec3 tint;       // what it lets through
+    Bool open;      // nothing opaque lies between
+    Bool is_tinted; // but glass does
+    Vec3 tint;      // what it lets through
 };
 
 // The tint of the glass between surface points and a light.
-ARHOST_INLINE Vec3 tint_on_the_way(const Scene &scene, Vec3 origin, const Incidence &in, Bool active, Bool &is_tinted) {
+ARHOST_INLINE Vec3 tint_on_the_way(const Scene &scene, Vec3 origin, const Incidence &in, Bool active,
+                                   Bool &is_tinted) {
     constexpr int most_surfaces = 64;
     Vec3 tint = white(), start = origin, left = in.way;
     for (int i = 0; i < most_surfaces && any(active); ++i) {
@@ -141,16 +142,19 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     const Texture &image = *environment.image;
     const Int row = search(environment.rows, Int(0), image.height, where.v);
     const auto step = [](const float *sums, Int first, Int i) __attribute__((always_inline)) {
-        const Float before = select(Int(0) < i, gather(sums, first + select(Int(0) < i, i - Int(1), Int(0))), Float(0.0f));
+        const Float before =
+            select(Int(0) < i, gather(sums, first + select(Int(0) < i, i - Int(1), Int(0))), Float(0.0f));
         return Pair{before, gather(sums, first + i) - before};
     };
     const Pair row_step = step(environment.rows, Int(0), row);
     const Int first = row * Int(image.width);
     const Int column = search(environment.columns, first, image.width, where.u);
     const Pair column_step = step(environment.columns, first, column);
-    const Float x = to_float(column) + min((where.u - column_step.u) / max(column_step.v, Float(1e-12f)), Float(1.0f));
+    const Float x =
+        to_float(column) + min((where.u - column_step.u) / max(column_step.v, Float(1e-12f)), Float(1.0f));
     const Float y = to_float(row) + min((where.v - row_step.u) / max(row_step.v, Float(1e-12f)), Float(1.0f));
-    const Float u = x * Float(1.0f / static_cast<float>(image.width)), v = y * Float(1.0f / static_cast<float>(image.height));
+    const Float u = x * Float(1.0f / static_cast<float>(image.width)),
+                v = y * Float(1.0f / static_cast<float>(image.height));
     const Float sine = max(sine_of_turn(v * Float(0.5f)), Float(1e-4f)), around = u - Float(0.5f);
     const Vec3 d{sine * sine_of_turn(around), cosine_of_turn(v * Float(0.5f)), -(sine * cosine_of_turn(around))};
     // The rotation's transpose is its inverse.
@@ -190,7 +194,8 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
 }
 
 // Light that surfaces other than mirrors and glass send back along the rays.
-ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_eye, Bool active, const Random &random) {
+ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_eye, Bool active,
+                                const Random &random) {
     Vec3 sum = s.ambient * splat(frame.scene.ambient) + s.emission;
     for_each_light(frame, s, random, [&](const Incidence &in, Vec3 intensity, float share) {
         const Bool facing = active & (in.cosine > Float(0.0f)) & (in.irradiance > Float(0.0f));
@@ -201,7 +206,8 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
             return;
         Vec3 reflected = s.diffuse * in.cosine;
         if (s.any_specular)
-            reflected = reflected + select(s.is_rough, black(), s.specular * phong(s.normal, in.direction, to_eye, s.exponent));
+            reflected = reflected +
+                        select(s.is_rough, black(), s.specular * phong(s.normal, in.direction, to_eye, s.exponent));
         if (s.any_rough) {
             const Vec3 half_way = normalize(in.direction + to_eye);
             const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_way));
@@ -224,7 +230,8 @@ struct CaughtShadow {
 };
 
 // How much of the light that catchers would receive is hidden by virtual objects.
-ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &rays, Bool active, const Random &random) {
+ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &rays, Bool active,
+                                         const Random &random) {
     const Scene &scene = frame.scene;
     const Surface s = surface_at(scene, rays, active);
     Float irradiance = 0.0f, weighted = 0.0f;
@@ -251,7 +258,8 @@ ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &
     if (scene.coloured_shadows) {
         // Each channel's own alpha; the colour makes up for what the common one takes too much, over a video
         // of middle grey.
-        const Vec3 own{mean_shadow_alpha(weighted_colour.x, irradiance), mean_shadow_alpha(weighted_colour.y, irradiance),
+        const Vec3 own{mean_shadow_alpha(weighted_colour.x, irradiance),
+                       mean_shadow_alpha(weighted_colour.y, irradiance),
                        mean_shadow_alpha(weighted_colour.z, irradiance)};
         shadow.alpha = select(active, largest(own), Float(0.0f));
         const Vec3 encoded = (white() * shadow.alpha - own) * (Float(0.5f) / max(shadow.alpha, Float(1e-6f)));

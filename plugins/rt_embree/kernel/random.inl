@@ -30,5 +30,6 @@ ARHOST_INLINE Pair pair(const Random &random, int purpose, int index, int count)
     const auto unit = [](Int bits) __attribute__((always_inline)) {
         return to_float(shift_right_unsigned(bits, 8)) * Float(0x1p-24f);
     };
-    return {unit(start + Int(static_cast<int>(i * 3242174889u))), unit(start_2 + Int(static_cast<int>(i * 2447445414u)))};
+    return {unit(start + Int(static_cast<int>(i * 3242174889u))),
+            unit(start_2 + Int(static_cast<int>(i * 2447445414u)))};
 }

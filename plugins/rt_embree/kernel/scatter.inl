@@ -17,9 +17,9 @@ struct Paths {
 struct Work {
     const Frame &frame;
     Scratch &scratch;
-    std::uint32_t deepest;    // depth at which rays wait, at most
-    Int seed;                 // the tile's, of random numbers
-    std::uint32_t sample;     // of all that are averaged
+    std::uint32_t deepest; // depth at which rays wait, at most
+    Int seed;              // the tile's, of random numbers
+    std::uint32_t sample;  // of all that are averaged
 };
 
 ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
@@ -56,8 +56,8 @@ ARHOST_INLINE void add_light(Work &work, const Paths &paths, Vec3 light, Bool ac
 // A ray of the next depth for each of the lanes.
 ARHOST_INLINE void send_on(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
     alignas(64) float numbers[WaitingRays::rows][lanes];
-    const Float values[] = {origin.x,     origin.y,     origin.z,     direction.x, direction.y,
-                            direction.z,  throughput.x, throughput.y, throughput.z, float_of(from.pixel)};
+    const Float values[] = {origin.x,    origin.y,     origin.z,     direction.x,  direction.y,
+                            direction.z, throughput.x, throughput.y, throughput.z, float_of(from.pixel)};
     for (int row = 0; row < WaitingRays::rows; ++row)
         store(numbers[row], values[row]);
     WaitingRays &waiting = work.scratch.waiting[from.depth];
@@ -81,7 +81,8 @@ ARHOST_INLINE Vec3 reflected(const Surface &s, Vec3 direction) {
                   mirror_direction(direction, s.geometric_normal));
 }
 
-ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 share, Bool active) {
+ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 share,
+                           Bool active) {
     const Vec3 throughput = paths.throughput * share;
     active = active & (largest(throughput) > Float(faint));
     if (any(active))
@@ -129,8 +130,7 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
         reflected_share = throughput * splat(glass.reflectivity);
     }
     const auto follow = [&](Vec3 share, Bool lanes, bool too_deep) __attribute__((always_inline)) {
-        const Bool important =
-            lanes & bool_of(!too_deep) & (luminance(share) > Float(glass.importance_cutoff));
+        const Bool important = lanes & bool_of(!too_deep) & (luminance(share) > Float(glass.importance_cutoff));
         const Bool cut = lanes & ~important;
         if (any(cut)) {
             Paths ended = paths;
@@ -189,7 +189,8 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
         if (material.model == ARHOST_MIRROR)
             reflect(work, paths, s, direction, splat(material.reflectivity), here);
         else if (material.model == ARHOST_METAL)
-            reflect(work, paths, s, direction, schlick(splat(material.reflectivity), -dot(direction, s.normal)), here);
+            reflect(work, paths, s, direction, schlick(splat(material.reflectivity), -dot(direction, s.normal)),
+                    here);
         else if (material.model == ARHOST_GLASS)
             scatter_in_glass(work, paths, s, direction, material, here);
         else if (material.model == ARHOST_METALLIC_ROUGHNESS)

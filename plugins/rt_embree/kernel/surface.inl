@@ -11,11 +11,11 @@ struct Surface {
     Float offset;                  // mm; how far above the facet secondary rays start
     Float way;                     // mm, of the ray
     Vec3 ambient, diffuse, specular, emission;
-    Float exponent;                // Phong's
-    Float alpha;                   // GGX's, where `is_rough`
-    Bool is_lit;                   // lamps make it bright: not a mirror, not glass
-    Bool is_rough;                 // metallic-roughness: `specular` is the reflectance at a right angle
-    Bool is_real;                  // a catcher or occluder
+    Float exponent; // Phong's
+    Float alpha;    // GGX's, where `is_rough`
+    Bool is_lit;    // lamps make it bright: not a mirror, not glass
+    Bool is_rough;  // metallic-roughness: `specular` is the reflectance at a right angle
+    Bool is_real;   // a catcher or occluder
     bool any_specular, any_rough, any_scattering; // of the packet; scattering: a ray goes on from there
 };
 
@@ -93,13 +93,13 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (material.model == ARHOST_METALLIC_ROUGHNESS) {
             Float metallic = material.metallic, roughness = material.roughness;
             if (material.metallic_roughness_texture != ARHOST_NONE) {
-                const Vec3 factors =
-                    textured(scene, object, material.metallic_roughness_texture, hit, here).colour;
+                const Vec3 factors = textured(scene, object, material.metallic_roughness_texture, hit, here).colour;
                 metallic = metallic * factors.z;
                 roughness = roughness * factors.y;
             }
             // glTF 2.0, appendix B.3: dielectrics reflect 4 %, metals their colour.
-            s.specular = select(here, white() * (Float(0.04f) * (Float(1.0f) - metallic)) + diffuse * metallic, s.specular);
+            s.specular =
+                select(here, white() * (Float(0.04f) * (Float(1.0f) - metallic)) + diffuse * metallic, s.specular);
             s.alpha = select(here, max(roughness * roughness, Float(0.001f)), s.alpha);
             s.is_rough = s.is_rough | here;
             s.any_rough = true;

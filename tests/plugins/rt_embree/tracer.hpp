@@ -6,6 +6,9 @@
 #include "plugin_under_test.hpp"
 #include "scene/arena.hpp"
 
+#include <arhost/shading/srgb8.hpp>
+
+#include <glm/vec3.hpp>
 #include <sys/mman.h>
 
 #include <array>
@@ -189,6 +192,27 @@ inline scene::TriangleMesh cube(float half_side) {
     mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
     return mesh;
+}
+
+// From above at an angle, looking at the origin.
+inline arhost_camera from_the_side(const arhost_intrinsics &in = pinhole()) {
+    return camera({0, -150, 110}, {0, 0, 0}, {0, 0, 1}, in);
+}
+// Straight down on the plane z = 0 from 200 mm, and where a pixel's ray arrives there.
+inline arhost_camera from_above() {
+    return camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0});
+}
+inline glm::dvec3 on_the_floor(int x, int y) {
+    return {x - 99.5, -(y - 74.5), 0};
+}
+
+// The code of a value that single precision has blurred.
+inline ::testing::AssertionResult is_code_of(int code, double linear, double tolerance = 2e-5) {
+    const int low = shading::srgb8_exact(linear * (1 - tolerance)),
+              high = shading::srgb8_exact(linear * (1 + tolerance));
+    if (code >= low && code <= high)
+        return ::testing::AssertionSuccess();
+    return ::testing::AssertionFailure() << code << " is not the code of " << linear << ", " << low;
 }
 
 } // namespace arhost::test

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Lamps of every kind over a white plane, against what the formulas say.
+#include "tracer.hpp"
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+namespace arhost::test {
+namespace {
+
+using scene::ArenaBuilder;
+
+Picture over_a_plane(const arhost_light &lamp, const Options &options = {}) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(diffuse(1, 1, 1)));
+    builder.add_light(lamp);
+    return Tracer(std::move(builder), options).render(from_above());
+}
+
+void expect_irradiance(const Picture &picture, const std::function<double(glm::dvec3)> &expected, double tolerance = 1e-4) {
+    for (int y = 0; y < 150; y += 5)
+        for (int x = 0; x < 200; x += 5)
+            ASSERT_TRUE(is_code_of(picture.at(x, y)[0], expected(on_the_floor(x, y)), tolerance)) << x << " " << y;
+}
+
+arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity) {
+    arhost_light lamp = scene::make_light(type);
+    set3(lamp.position, position.x, position.y, position.z);
+    set3(lamp.intensity, intensity, intensity, intensity);
+    return lamp;
+}
+
+// A ball over a catcher: how many pixels have which alpha.
+std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
+    ArenaBuilder builder;
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
+                       ARHOST_CATCHER);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
+    builder.add_light(lamp);
+    return Tracer(std::move(builder), {{"light_samples", "64"}}).render(from_the_side()).alphas();
+}
+
+} // namespace
+
+TEST(DirectionalLight, IsTheSameEverywhere) {
+    arhost_light sun = placed(ARHOST_DIRECTIONAL_LIGHT, {0, 0, 0}, 0.8f);
+    set3(sun.direction, 0.6f, 0, -0.8f);
+    expect_irradiance(over_a_plane(sun), [](glm::dvec3) { return 0.8 * 0.8; });
+}
+
+TEST(DirectionalLight, CastsShadowsOfOneSize) {
+    const auto near = shadow_of_a_ball(placed(ARHOST_DIRECTIONAL_LIGHT, {0, 0, 0}, 1));
+    EXPECT_EQ(near.size(), 3u);
+    EXPECT_GT(near.at(153), 100);
+}
+
+TEST(SpotLight, ShinesInItsConeOnly) {
+    arhost_light spot = placed(ARHOST_SPOT_LIGHT, {30, -20, 90}, 5000);
+    spot.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+    const glm::dvec3 axis = glm::normalize(glm::dvec3(-0.3, 0.2, -0.9));
+    set3(spot.direction, static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z));
+    spot.cosine_inner = 0.9f;
+    spot.cosine_outer = 0.8f;
+    expect_irradiance(
+        over_a_plane(spot),
+        [&](glm::dvec3 p) {
+            const glm::dvec3 way = p - glm::dvec3(30, -20, 90);
+            const double d = glm::length(way), cosine = glm::dot(way / d, axis);
+            const double t = std::clamp((cosine - double{0.8f}) / (double{0.9f} - double{0.8f}), 0.0, 1.0);
+            return 5000 * -way.z / (d * d * d) * t * t * (3 - 2 * t);
+        },
+        2e-3);
+}
+
+TEST(RectangleLight, IsTheMeanOverItsPoints) {
+    arhost_light panel = placed(ARHOST_RECTANGLE_LIGHT, {10, 0, 80}, 4000);
+    panel.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+    set3(panel.axis_u, 40, 0, 0);
+    set3(panel.axis_v, 0, 25, 0);
+    expect_irradiance(
+        over_a_plane(panel, {{"samples", "64"}, {"light_samples", "16"}}),
+        [](glm::dvec3 p) {
+            double sum = 0;
+            constexpr int n = 40;
+            for (int i = 0; i < n * n; ++i) {
+                const glm::dvec3 from(10 + 40 * ((i % n + 0.5) / n * 2 - 1), 25 * ((i / n + 0.5) / n * 2 - 1), 80);
+                const double d = glm::length(from - p);
+                sum += 4000 * 80 * 80 / (d * d * d * d);
+            }
+            return sum / (n * n);
+        },
+        0.02);
+}
+
+TEST(RectangleLight, ShinesToOneSide) {
+    arhost_light panel = placed(ARHOST_RECTANGLE_LIGHT, {10, 0, 80}, 4000);
+    set3(panel.direction, 0, 0, 1);
+    expect_irradiance(over_a_plane(panel), [](glm::dvec3) { return 0; });
+}
+
+TEST(SphereLight, OfNoSizeIsAPointLight) {
+    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {30, -20, 90}, 0.7f);
+    bulb.radius = 1e-3f;
+    expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {
+        const glm::dvec3 way = glm::dvec3(30, -20, 90) - p;
+        return 0.7 * way.z / glm::length(way);
+    });
+}
+
+TEST(SphereLight, CastsSoftShadowsWithAFullCoreAndNoOthersThanThat) {
+    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {0, -20, 200}, 1);
+    bulb.radius = 20;
+    const auto alphas = shadow_of_a_ball(bulb);
+    EXPECT_GT(alphas.at(153), 50);
+    int between = 0;
+    for (const auto &[alpha, count] : alphas) {
+        EXPECT_TRUE(alpha <= 153 || alpha == 255) << alpha;
+        between += alpha > 0 && alpha < 153 ? count : 0;
+    }
+    EXPECT_GT(between, 200);
+}
+
+TEST(ExtendedLights, AreTheSameOnEachRunAndThreadCount) {
+    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {0, -20, 200}, 1);
+    bulb.radius = 30;
+    const auto pixels = [&](const char *threads) { return over_a_plane(bulb, {{"threads", threads}}).pixels(); };
+    EXPECT_EQ(pixels("1"), pixels("3"));
+}
+
+} // namespace arhost::test

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Metals, glass and rough surfaces, against what the formulas say.
+#include "tracer.hpp"
+
+#include <arhost/shading/scalar.hpp>
+
+#include <glm/geometric.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace arhost::test {
+namespace {
+
+using scene::ArenaBuilder;
+
+arhost_material clear_glass(float index = 1.5f) {
+    arhost_material glass = scene::make_material(ARHOST_GLASS);
+    glass.index = index;
+    glass.importance_cutoff = 0;
+    return glass;
+}
+// It refracts only.
+arhost_material without_reflection(arhost_material glass) {
+    glass.fresnel_minimum = glass.fresnel_maximum = 0;
+    return glass;
+}
+
+scene::TriangleMesh box(glm::vec3 low, glm::vec3 high) {
+    scene::TriangleMesh mesh = cube(1);
+    for (glm::vec3 &p : mesh.positions)
+        p = (low + high) * 0.5f + p * (high - low) * 0.5f;
+    return mesh;
+}
+
+ArenaBuilder in_a_room_of_light(float light) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.settings.background = glm::vec3(light);
+    builder.settings.max_depth = 60;
+    return builder;
+}
+
+void add_ball(ArenaBuilder &builder, const arhost_material &material) {
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(material));
+}
+
+} // namespace
+
+TEST(Metal, ReflectsBySchlicksTerm) {
+    arhost_material metal = scene::make_material(ARHOST_METAL);
+    set3(metal.reflectivity, 0.5f, 0.3f, 0.1f);
+    ArenaBuilder builder = in_a_room_of_light(0.6f);
+    add_ball(builder, metal);
+    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    for (int x = 100; x < 155; x += 2) {
+        // The ball at the pixel's ray: a² + 2 b t + c = 0 from 200 mm above.
+        const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, 74) - eye);
+        const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 60 * 60);
+        if (root < 0)
+            continue;
+        const double cosine = -glm::dot(d, (eye + d * (-b - std::sqrt(root))) / 60.0);
+        for (int i = 0; i < 3; ++i) {
+            const double r0 = metal.reflectivity[i], r = r0 + (1 - r0) * std::pow(1 - cosine, 5);
+            ASSERT_TRUE(is_code_of(picture.at(x, 74)[i], 0.6 * r, 1e-3)) << x;
+        }
+    }
+}
+
+TEST(Glass, LosesNoLight) {
+    for (const char *way : {"tree", "path"}) {
+        arhost_material glass = clear_glass();
+        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // as bright as all else, for what is still inside in the end
+        ArenaBuilder builder = in_a_room_of_light(0.5f);
+        builder.settings.max_depth = std::string(way) == "tree" ? 12 : 60;
+        add_ball(builder, glass);
+        builder.add_object("box", builder.add_triangles(box({50, -60, -20}, {90, 60, 30})), builder.add_material(glass));
+        const Picture picture = Tracer(std::move(builder), {{"glass", way}}).render(from_the_side());
+        int covered = 0;
+        for (const Pixel &pixel : picture.pixels())
+            if (pixel[3] == 255) {
+                ++covered;
+                ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << way;
+            }
+        EXPECT_GT(covered, 5000);
+    }
+}
+
+TEST(Glass, BendsRaysAsSnellSays) {
+    // A slab over a floor that is black to the left of y = 7 and white to the right.
+    constexpr double top = 40, bottom = 10, index = 1.5;
+    ArenaBuilder builder = in_a_room_of_light(0);
+    builder.settings.ambient = glm::vec3(1);
+    builder.add_object("slab", builder.add_triangles(box({-300, -300, bottom}, {300, 300, top})),
+                       builder.add_material(without_reflection(clear_glass(index))));
+    scene::TriangleMesh left = square(400), right = square(400);
+    for (glm::vec3 &p : left.positions)
+        p.y -= 393;
+    for (glm::vec3 &p : right.positions)
+        p.y += 407;
+    builder.add_object("left", builder.add_triangles(left), builder.add_material(flat(0, 0, 0)));
+    builder.add_object("right", builder.add_triangles(right), builder.add_material(flat(1, 1, 1)));
+    const arhost_camera view = from_the_side();
+    const Picture picture = Tracer(std::move(builder)).render(view);
+
+    const glm::dvec3 eye(0, -150, 110), w = glm::normalize(eye), u(1, 0, 0), v = glm::cross(w, u);
+    int sure = 0;
+    for (int y = 0; y < 150; ++y)
+        for (int x = 0; x < 200; ++x) {
+            const glm::dvec3 d = glm::normalize(u * ((x - 99.5) / 200) - v * ((y - 74.5) / 200) - w);
+            const glm::dvec3 in = eye + d * ((eye.z - top) / -d.z);
+            glm::dvec3 refracted = d / index;
+            refracted.z = -std::sqrt(1 - (refracted.x * refracted.x + refracted.y * refracted.y));
+            const glm::dvec3 out = in + refracted * ((top - bottom) / -refracted.z);
+            const glm::dvec3 on_floor = out + d * (bottom / -d.z);
+            if (std::abs(on_floor.y - 7) < 0.01 || std::abs(on_floor.x) > 300)
+                continue;
+            ++sure;
+            ASSERT_EQ(picture.at(x, y)[0], on_floor.y < 7 ? 0 : 255) << x << " " << y;
+        }
+    EXPECT_GT(sure, 20000);
+}
+
+TEST(Glass, AbsorbsByBouguersLaw) {
+    arhost_material glass = without_reflection(clear_glass(1)); // index 1: straight on
+    set3(glass.extinction, 0.01f, 0.02f, 0);
+    ArenaBuilder builder = in_a_room_of_light(1);
+    builder.add_object("slab", builder.add_triangles(box({-300, -300, -30}, {300, 300, 0})),
+                       builder.add_material(glass));
+    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    for (int x = 0; x < 200; x += 7) {
+        const double way = 30 * glm::length(on_the_floor(x, 60) - glm::dvec3(0, 0, 200)) / 200;
+        ASSERT_TRUE(is_code_of(picture.at(x, 60)[0], std::exp(-0.01 * way), 1e-4));
+        ASSERT_TRUE(is_code_of(picture.at(x, 60)[1], std::exp(-0.02 * way), 1e-4));
+        ASSERT_EQ(picture.at(x, 60)[2], 255);
+    }
+}
+
+TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
+    const auto with = [](auto change) {
+        arhost_material glass = clear_glass();
+        set3(glass.cutoff_colour, 0.34f, 0.55f, 0.85f);
+        ArenaBuilder builder = in_a_room_of_light(0);
+        change(glass, builder);
+        add_ball(builder, glass);
+        return Tracer(std::move(builder)).render(from_above()).at(100, 74);
+    };
+    const Pixel cutoff{shading::srgb8_exact(0.34f), shading::srgb8_exact(0.55f), shading::srgb8_exact(0.85f), 255};
+    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = glass.refraction_depth = 0; }),
+              cutoff);
+    EXPECT_EQ(with([](arhost_material &, ArenaBuilder &builder) { builder.settings.max_depth = 0; }), cutoff);
+    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 1; }), cutoff);
+    // Straight on, 4 % are reflected on entering, and 4 % of the rest on leaving: only these stand in for rays.
+    const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
+    EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
+}
+
+TEST(Glass, TheChosenPathsMeanIsTheTree) {
+    const auto scene = [] {
+        ArenaBuilder builder = in_a_room_of_light(0.9f);
+        builder.settings.ambient = glm::vec3(0.5f);
+        builder.settings.max_depth = 10;
+        arhost_material glass = clear_glass();
+        glass.fresnel_minimum = 0.3f;
+        set3(glass.extinction, 0.01f, 0, 0.02f);
+        builder.add_object("floor", builder.add_triangles(square(200, -70)), builder.add_material(flat(0.8f, 0.2f, 0.1f)));
+        add_ball(builder, glass);
+        return builder;
+    };
+    // One sample a pixel, in linear light: several are averaged encoded, where noise darkens.
+    const auto mean = [&](const char *way) {
+        double sum = 0;
+        for (const Pixel &pixel : Tracer(scene(), {{"glass", way}}).render(from_the_side()).pixels())
+            for (int i = 0; i < 3; ++i)
+                sum += shading::srgb_decode(pixel[i] / 255.0);
+        return sum / (3 * 200 * 150);
+    };
+    EXPECT_NEAR(mean("path") / mean("tree"), 1, 0.03) << "3000 pixels of noise";
+}
+
+TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
+    ArenaBuilder builder;
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                       ARHOST_CATCHER);
+    builder.add_object("glass", builder.add_spheres({{-20, 0, 25, 12}}), builder.add_material(clear_glass()));
+    builder.add_object("ball", builder.add_spheres({{20, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
+    builder.add_object("over both", builder.add_triangles(box({-40, -3, 60}, {40, 3, 62})),
+                       builder.add_material(clear_glass()));
+    builder.add_light(light(0, -20, 300, 1));
+    const auto counts = Tracer(std::move(builder)).render(from_the_side()).alphas();
+    EXPECT_EQ(counts.size(), 4u);
+    EXPECT_GT(counts.at(77), 100);
+    EXPECT_GT(counts.at(153), 100);
+}
+
+TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
+    const auto shadow = [](bool coloured) {
+        ArenaBuilder builder;
+        builder.settings.coloured_shadows = coloured;
+        arhost_material glass = clear_glass();
+        set3(glass.shadow_attenuation, 0.4f, 0.8f, 0.4f);
+        builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                           ARHOST_CATCHER);
+        builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
+        builder.add_light(light(0, 150, 300, 1));
+        return Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -30, 0}, {0, 0, 1})).at(100, 74);
+    };
+    EXPECT_EQ(shadow(false), (Pixel{0, 0, 0, 77}));
+    const Pixel green = shadow(true);
+    EXPECT_GT(green[1], green[0] + 50);
+    EXPECT_EQ(green[0], 0) << "its strongest channel decides the alpha";
+    // Two surfaces let 0.16 of the red through, so that 0.84 · 153 is left of the opaque alpha.
+    EXPECT_NEAR(green[3], 0.84 * 153, 2);
+}
+
+TEST(Glass, ItsShadowTintsTheLightOnObjects) {
+    ArenaBuilder builder = in_a_room_of_light(0);
+    arhost_material glass = clear_glass();
+    set3(glass.shadow_attenuation, 0.5f, 0.8f, 0.2f);
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)));
+    builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
+    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    builder.add_light(sun);
+    const Pixel pixel =
+        Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
+    for (int i = 0; i < 3; ++i)
+        EXPECT_TRUE(is_code_of(pixel[i], glass.shadow_attenuation[i] * glass.shadow_attenuation[i], 1e-4));
+}
+
+TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
+    for (const float roughness : {0.0f, 0.3f, 0.6f, 1.0f}) {
+        arhost_material metal = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+        set3(metal.diffuse, 1, 1, 1);
+        metal.roughness = roughness;
+        ArenaBuilder builder = in_a_room_of_light(0.5f);
+        add_ball(builder, metal);
+        const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
+        double mean = 0; // of pixels round the middle
+        for (std::uint32_t i = 0; i < 25; ++i)
+            mean += picture.at(98 + i % 5, 72 + i / 5)[0] / 25.0;
+        // Seen straight on, a facet's normal has tan² θ = α² v/(1 − v) for even v, and the ray leaves at 2θ.
+        double sum = 0;
+        constexpr int n = 10000;
+        for (int i = 0; i < n; ++i) {
+            const double alpha2 = std::pow(std::max(double{roughness}, 0.0316), 4), v = (i + 0.5) / n;
+            const double tan2 = alpha2 * v / (1 - v), cosine = (1 - tan2) / (1 + tan2);
+            if (cosine > 0)
+                sum += shading::srgb_encode(0.5 * 2 * cosine / (cosine + std::sqrt(alpha2 + (1 - alpha2) * cosine * cosine)));
+        }
+        EXPECT_NEAR(mean, 255 * sum / n, 3) << roughness;
+    }
+}
+
+TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
+    arhost_material plastic = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
+    plastic.metallic = 0.25f;
+    plastic.roughness = 0.5f;
+    set3(plastic.emission, 0, 0, 0.05f);
+    ArenaBuilder builder = in_a_room_of_light(0);
+    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(plastic));
+    builder.add_light(light(30, -20, 90, 0.9f));
+    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    for (int y = 0; y < 150; y += 5)
+        for (int x = 0; x < 200; x += 5) {
+            const glm::dvec3 p = on_the_floor(x, y), l = glm::normalize(glm::dvec3(30, -20, 90) - p);
+            const glm::dvec3 v = glm::normalize(glm::dvec3(0, 0, 200) - p), h = glm::normalize(l + v);
+            const double a2 = std::pow(0.5, 4), d = h.z * h.z * (a2 - 1) + 1;
+            const double visibility = 0.5 / (l.z * std::sqrt(v.z * v.z * (1 - a2) + a2) + v.z * std::sqrt(l.z * l.z * (1 - a2) + a2));
+            for (int i = 0; i < 3; ++i) {
+                const double base = plastic.diffuse[i], f0 = 0.04 * 0.75 + base * 0.25;
+                const double fresnel = f0 + (1 - f0) * std::pow(1 - glm::dot(v, h), 5);
+                // A lamp's intensity has Lambert's π in it.
+                const double value = 0.9 * l.z * ((1 - fresnel) * base * 0.75 + fresnel * visibility * a2 / (d * d)) + plastic.emission[i];
+                ASSERT_TRUE(is_code_of(picture.at(x, y)[i], value, 1e-3)) << x << " " << y;
+            }
+        }
+}
+
+} // namespace arhost::test
