@@ -75,23 +75,35 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     return object;
 }
 
-Box box_of(const arhost_scene &arena, const arhost_object &object) {
-    const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[object.geometry];
+Box empty_box() {
     const double infinity = std::numeric_limits<double>::infinity();
-    Box local{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-    const std::byte *position = bytes(arena) + geometry.positions.offset;
-    for (std::uint32_t i = 0; i < geometry.positions.count; ++i, position += geometry.positions.stride) {
+    return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+}
+
+// Round points of `stride` bytes, which have a radius where they are spheres.
+Box box_of(const std::byte *points, std::uint32_t count, std::uint32_t stride, bool spheres) {
+    Box box = empty_box();
+    for (std::uint32_t i = 0; i < count; ++i, points += stride) {
         float p[4] = {};
-        std::memcpy(p, position, geometry.type == ARHOST_SPHERES ? 16 : 12);
+        std::memcpy(p, points, spheres ? 16 : 12);
         for (int axis = 0; axis < 3; ++axis) {
-            local.min[axis] = std::min(local.min[axis], double{p[axis]} - p[3]);
-            local.max[axis] = std::max(local.max[axis], double{p[axis]} + p[3]);
+            box.min[axis] = std::min(box.min[axis], double{p[axis]} - p[3]);
+            box.max[axis] = std::max(box.max[axis], double{p[axis]} + p[3]);
         }
     }
-    if (geometry.positions.count == 0)
+    return box;
+}
+
+Box local_box(const arhost_scene &arena, const arhost_object &object) {
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[object.geometry];
+    return box_of(bytes(arena) + geometry.positions.offset, geometry.positions.count, geometry.positions.stride,
+                  geometry.type == ARHOST_SPHERES);
+}
+
+// The box round the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
+Box transformed(const Box &local, const float *m) {
+    if (local.min[0] > local.max[0])
         return local;
-    // The box round the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
-    const float *m = object.world_from_object;
     Box world;
     for (int row = 0; row < 3; ++row) {
         world.min[row] = world.max[row] = m[9 + row];
@@ -143,30 +155,44 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
                           "this build of Embree lacks ray masks, filter functions, triangles "
                           "or points; install one with its default options");
 
-    root_ = new_scene();
     const auto from = elements<arhost_object>(arena, arena.objects);
+    const bool anything_moves =
+        std::any_of(from.begin(), from.end(), [](const arhost_object &o) { return o.moves || o.deforms; });
+    // What stays must not be built again whenever the rest moves: it lies in a scene of its own.
+    root_ = new_scene(anything_moves ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
+    if (anything_moves)
+        static_ = new_scene(RTC_SCENE_FLAG_NONE);
+    view_.has_instances = anything_moves;
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
-        if (object.role != ARHOST_OCCLUDER)
-            visible_boxes_.push_back(box_of(arena, object));
+        local_boxes_.push_back(local_box(arena, object));
+        visible_boxes_.push_back(object.role == ARHOST_OCCLUDER ? empty_box()
+                                                                : transformed(local_boxes_.back(),
+                                                                              object.world_from_object));
         view_.has_catchers |= object.role == ARHOST_CATCHER;
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
-
-        GeometryHandle geometry;
-        if (objects_.back().has_transform) {
-            view_.has_instances = true;
-            geometry.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-            rtcSetGeometryInstancedScene(geometry.get(), instanced_scene(object.geometry, object.role));
-            rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, object.world_from_object);
-        } else {
-            geometry = new_geometry(object.geometry, object.role);
-        }
-        rtcSetGeometryMask(geometry.get(), mask_of(objects_.back()));
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
-        rtcCommitGeometry(geometry.get());
-        rtcAttachGeometryByID(root_.get(), geometry.get(), number);
-        check();
+
+        if (object.deforms) {
+            attach(root_.get(), new_instance(deforming_scene(number), object.world_from_object), number);
+        } else if (object.moves || objects_.back().has_transform) {
+            view_.has_instances = true;
+            attach(root_.get(), new_instance(instanced_scene(object.geometry, object.role), object.world_from_object),
+                   number);
+        } else {
+            attach(static_ ? static_.get() : root_.get(), new_geometry(object.geometry, object.role), number);
+        }
+    }
+    view_.static_instance = -2;
+    if (static_) {
+        commit(static_.get());
+        constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+        const GeometryHandle instance = new_instance(static_.get(), identity);
+        rtcSetGeometryMask(instance.get(), all_masks);
+        rtcCommitGeometry(instance.get());
+        view_.static_instance = static_cast<std::int32_t>(from.size());
+        rtcAttachGeometryByID(root_.get(), instance.get(), static_cast<unsigned>(from.size()));
     }
     commit(root_.get());
 
@@ -201,12 +227,92 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.srgb8 = srgb8_.get();
 }
 
-SceneHandle EmbreeScene::new_scene() const {
+void EmbreeScene::move(const arhost_motion &motion) {
+    for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
+        const arhost_moved_object &moved = motion.moved[i];
+        Object &object = objects_[moved.object];
+        object.has_transform = true;
+        make_normal_transform(moved.world_from_object, object.normal_transform);
+        if (object.role != ARHOST_OCCLUDER)
+            visible_boxes_[moved.object] = transformed(local_boxes_[moved.object], moved.world_from_object);
+        const RTCGeometry instance = rtcGetGeometry(root_.get(), moved.object);
+        rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, moved.world_from_object);
+        rtcCommitGeometry(instance);
+    }
+    for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
+        deform(motion.deformed[i]);
+    commit(root_.get());
+}
+
+void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
+    // From here a tree costs rays more than building a new one does, by trial (docs/performance.md).
+    constexpr double tolerable_decay = 1.5;
+    Object &object = objects_[deformed.object];
+    object.normals = deformed.normals;
+    object.normal_stride = 3 * sizeof(float);
+    const arhost_object &from = elements<arhost_object>(arena_, arena_.objects)[deformed.object];
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[from.geometry];
+    const auto *positions = reinterpret_cast<const std::byte *>(deformed.positions);
+    const MeshView mesh{positions, bytes(arena_) + geometry.indices.offset, 3 * sizeof(float), geometry.indices.stride,
+                        geometry.indices.count};
+
+    Deforming &own = deforming_.at(deformed.object);
+    rtcSetSharedGeometryBuffer(own.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0,
+                               3 * sizeof(float), deformed.vertex_count);
+    const bool rebuild = own.quality.decay(mesh) > tolerable_decay;
+    rtcSetGeometryBuildQuality(own.geometry.get(), rebuild ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_REFIT);
+    rtcUpdateGeometryBuffer(own.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
+    rtcCommitGeometry(own.geometry.get());
+    commit(own.scene.get());
+    if (rebuild) {
+        own.quality.built(mesh);
+        ++rebuilds_;
+    }
+    const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
+    rtcCommitGeometry(instance); // its bounds have changed
+    local_boxes_[deformed.object] = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
+    if (object.role != ARHOST_OCCLUDER)
+        visible_boxes_[deformed.object] = local_boxes_[deformed.object];
+}
+
+SceneHandle EmbreeScene::new_scene(RTCSceneFlags flags) const {
     SceneHandle scene(rtcNewScene(device_.get()));
     check();
-    rtcSetSceneFlags(scene.get(), robust_ ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneFlags(scene.get(),
+                     static_cast<RTCSceneFlags>(flags | (robust_ ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE)));
+    rtcSetSceneBuildQuality(scene.get(),
+                            flags & RTC_SCENE_FLAG_DYNAMIC ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
     return scene;
+}
+
+GeometryHandle EmbreeScene::new_instance(RTCScene of, const float *world_from_object) const {
+    GeometryHandle instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(instance.get(), of);
+    rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_object);
+    return instance;
+}
+
+void EmbreeScene::attach(RTCScene to, const GeometryHandle &geometry, std::uint32_t number) const {
+    rtcSetGeometryMask(geometry.get(), mask_of(objects_[number]));
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(to, geometry.get(), number);
+    check();
+}
+
+RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
+    const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
+    const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
+    Deforming &own = deforming_[number];
+    own.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
+    own.geometry = new_geometry(object.geometry, object.role);
+    rtcSetGeometryMask(own.geometry.get(), all_masks);
+    rtcSetGeometryBuildQuality(own.geometry.get(), RTC_BUILD_QUALITY_MEDIUM);
+    rtcCommitGeometry(own.geometry.get());
+    rtcAttachGeometry(own.scene.get(), own.geometry.get());
+    commit(own.scene.get());
+    own.quality.built({bytes(arena_) + from.positions.offset, bytes(arena_) + from.indices.offset,
+                       from.positions.stride, from.indices.stride, from.indices.count});
+    return own.scene.get();
 }
 
 GeometryHandle EmbreeScene::new_geometry(std::uint32_t number, arhost_role role) const {
@@ -231,7 +337,7 @@ RTCScene EmbreeScene::instanced_scene(std::uint32_t number, arhost_role role) {
     for (const Instanced &known : instanced_)
         if (known.geometry == number && known.of_catchers == of_catchers)
             return known.scene.get();
-    SceneHandle scene = new_scene();
+    SceneHandle scene = new_scene(RTC_SCENE_FLAG_NONE);
     const GeometryHandle geometry = new_geometry(number, role);
     rtcSetGeometryMask(geometry.get(), all_masks);
     rtcCommitGeometry(geometry.get());

@@ -4,9 +4,12 @@
 #pragma once
 
 #include "kernel.hpp"
+#include "tree_quality.hpp"
 
 #include <arhost-cpp/plugin.hpp>
+#include <arhost/motion.h>
 
+#include <map>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -34,10 +37,24 @@ public:
     // In the world, of the objects that can give a pixel alpha: virtual ones and catchers.
     const std::vector<Box> &visible_boxes() const { return visible_boxes_; }
 
+    // Brings what moves to its places; `motion` is valid until the next call or the end of tracing.
+    void move(const arhost_motion &motion);
+    std::uint64_t rebuilds() const { return rebuilds_; } // of deforming objects, for which a refit would not do
+
 private:
-    SceneHandle new_scene() const;
+    // An object whose vertices change, in a scene of its own.
+    struct Deforming {
+        SceneHandle scene;
+        GeometryHandle geometry;
+        TreeQuality quality;
+    };
+    SceneHandle new_scene(RTCSceneFlags flags) const;
     GeometryHandle new_geometry(std::uint32_t geometry, arhost_role role) const;
     RTCScene instanced_scene(std::uint32_t geometry, arhost_role role);
+    RTCScene deforming_scene(std::uint32_t object);
+    GeometryHandle new_instance(RTCScene of, const float *world_from_object) const;
+    void attach(RTCScene to, const GeometryHandle &geometry, std::uint32_t number) const;
+    void deform(const arhost_deformed_geometry &deformed);
     void commit(RTCScene scene) const;
     void check() const;
 
@@ -51,9 +68,11 @@ private:
         SceneHandle scene;
     };
     std::vector<Instanced> instanced_;
-    SceneHandle root_;
+    std::map<std::uint32_t, Deforming> deforming_; // by object
+    SceneHandle static_, root_;                    // the former only where something moves
     std::vector<Object> objects_;
-    std::vector<Box> visible_boxes_;
+    std::vector<Box> local_boxes_, visible_boxes_;
+    std::uint64_t rebuilds_ = 0;
     std::vector<Texture> textures_;
     std::unique_ptr<const arhost::shading::Srgb8Table> srgb8_;
     std::vector<float> linear_of_srgb8_;

@@ -54,6 +54,9 @@ struct Environment {
 struct Scene {
     RTCScene root;
     std::int32_t packet_width; // Embree's
+    // The instance that holds all objects that do not move, or −2: there is none. They have the numbers of
+    // their geometries, others those of their instances.
+    std::int32_t static_instance;
     const Object *objects;
     const Texture *textures;
     const arhost_light *lights;

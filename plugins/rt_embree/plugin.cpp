@@ -31,7 +31,7 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        const Rectangle drawn = renderer_->render(request.camera, image);
+        const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);

@@ -174,13 +174,15 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         scratch_.emplace_back(setup.scene->max_depth);
 }
 
-Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image) {
+Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!same(camera.intrinsics, intrinsics_))
         refuse("the camera's intrinsics are not those of start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width)
         refuse("the image to write is not of the size of start");
     const Pose pose(camera);
+    if (motion)
+        scene_.move(*motion);
 
     std::vector<Window> windows;
     for (const Box &box : scene_.visible_boxes())

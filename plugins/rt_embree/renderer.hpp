@@ -39,8 +39,10 @@ class Renderer {
 public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host);
 
-    // Returns the part of the image that holds all alpha above 0; empty: x1 <= x0.
-    Rectangle render(const arhost_camera &camera, const arhost_image &image);
+    // Returns the part of the image that holds all alpha above 0; empty: x1 <= x0. `motion` may be NULL:
+    // everything is where it was.
+    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
+    const EmbreeScene &scene() const { return scene_; }
 
     const char *kernel_name() const { return kernel_.name; }
     unsigned thread_count() const { return threads_.thread_count(); }

@@ -75,15 +75,16 @@ ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     return active & (load(rays.tfar) < Float(0.0f)); // −∞ where something was hit
 }
 
-ARHOST_INLINE Int object_number(const RTCHit16 &hit) {
+ARHOST_INLINE Int object_number(const Scene &scene, const RTCHit16 &hit) {
     const Int instance = load(hit.instID[0]);
-    return select(instance != Int(no_hit), instance, load(hit.geomID));
+    const Bool by_geometry = (instance == Int(no_hit)) | (instance == Int(scene.static_instance));
+    return select(by_geometry, load(hit.geomID), instance);
 }
 
 // Calls use(object, lanes) for each object that lanes of `active` have hit: mostly one or two a packet.
 template <class Use>
 ARHOST_INLINE void for_each_object(const Scene &scene, const RTCHit16 &hit, Bool active, Use use) {
-    const Int numbers = object_number(hit);
+    const Int numbers = object_number(scene, hit);
     alignas(64) int number_of[lanes];
     store(number_of, numbers);
     for (unsigned left = mask_of(active.lane); left;) {

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tree_quality.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+namespace rt_embree {
+namespace {
+
+constexpr std::size_t group = 32; // triangles
+
+struct Bounds {
+    float low[3], high[3];
+
+    Bounds() {
+        std::fill_n(low, 3, std::numeric_limits<float>::max());
+        std::fill_n(high, 3, std::numeric_limits<float>::lowest());
+    }
+    void include(const float *p) {
+        for (int i = 0; i < 3; ++i) {
+            low[i] = std::min(low[i], p[i]);
+            high[i] = std::max(high[i], p[i]);
+        }
+    }
+    void include(const Bounds &box) {
+        include(box.low);
+        include(box.high);
+    }
+    double half_area() const {
+        const double x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
+        return x * y + y * z + z * x;
+    }
+};
+
+Bounds bounds_of(const MeshView &mesh, std::uint32_t triangle) {
+    std::uint32_t corners[3];
+    std::memcpy(corners, mesh.triangles + std::size_t{mesh.triangle_stride} * triangle, sizeof corners);
+    Bounds bounds;
+    for (const std::uint32_t corner : corners) {
+        float p[3];
+        std::memcpy(p, mesh.positions + std::size_t{mesh.position_stride} * corner, sizeof p);
+        bounds.include(p);
+    }
+    return bounds;
+}
+
+// Ten bits, each followed by two zeros.
+std::uint32_t spread(std::uint32_t bits) {
+    bits = (bits | bits << 16) & 0x030000ff;
+    bits = (bits | bits << 8) & 0x0300f00f;
+    bits = (bits | bits << 4) & 0x030c30c3;
+    return (bits | bits << 2) & 0x09249249;
+}
+
+} // namespace
+
+void TreeQuality::built(const MeshView &mesh) {
+    std::vector<Bounds> boxes;
+    boxes.reserve(mesh.triangle_count);
+    Bounds all;
+    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+        boxes.push_back(bounds_of(mesh, i));
+        all.include(boxes.back());
+    }
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed;
+    keyed.reserve(boxes.size());
+    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+        std::uint32_t key = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float extent = all.high[axis] - all.low[axis];
+            const float middle = (boxes[i].low[axis] + boxes[i].high[axis]) / 2 - all.low[axis];
+            key |= spread(extent > 0 ? static_cast<std::uint32_t>(middle / extent * 1023) : 0) << axis;
+        }
+        keyed.emplace_back(key, i);
+    }
+    std::sort(keyed.begin(), keyed.end());
+    order_.clear();
+    for (const auto &[key, triangle] : keyed)
+        order_.push_back(triangle);
+    area_when_built_ = relative_area(mesh);
+}
+
+double TreeQuality::decay(const MeshView &mesh) const {
+    return relative_area(mesh) / area_when_built_;
+}
+
+double TreeQuality::relative_area(const MeshView &mesh) const {
+    double sum = 0;
+    Bounds all;
+    for (std::size_t first = 0; first < order_.size(); first += group) {
+        Bounds box;
+        for (std::size_t i = first; i < std::min(first + group, order_.size()); ++i)
+            box.include(bounds_of(mesh, order_[i]));
+        sum += box.half_area();
+        all.include(box);
+    }
+    const double whole = all.half_area();
+    return whole > 0 ? std::max(sum / whole, 1e-12) : 1;
+}
+
+} // namespace rt_embree
