@@ -100,6 +100,7 @@ struct Frame {
     const Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // of all that are averaged: where in their random sequences these begin
+    float *history[4];          // NULL, or the sums of the samples before, of all tiles' pixels (Scratch::sum)
     std::int32_t light_samples; // shadow rays to an extended light
     bool one_path;              // glass sends one ray on, chosen at random, in place of two
     std::uint8_t *rgba;

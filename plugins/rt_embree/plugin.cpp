@@ -17,6 +17,7 @@ public:
         settings_.threads = static_cast<unsigned>(options.integer("threads"));
         settings_.robust = options.boolean("robust");
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
+        settings_.accumulate = options.boolean("accumulate");
         settings_.one_path = options.text("glass") == "path";
         settings_.instruction_set = options.text("instruction_set");
         choose_kernel(settings_.instruction_set); // refuses now what can't run
@@ -56,6 +57,9 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 64),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
+    arhost::option(ARHOST_OPTION_BOOL, "accumulate", "false",
+                   "Average over frames while the camera and the scene stand still: an image then depends on the ones "
+                   "before."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
                    "Rays that glass sends on: 'tree' follows both, 'path' one that is chosen at random.", 0, 0,
                    glass),

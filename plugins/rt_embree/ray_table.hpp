@@ -51,4 +51,8 @@ private:
 // and frame.
 std::vector<Sample> sample_positions(std::int32_t count);
 
+// `count` of a sequence without end that is even over the pixel however far it goes, from its number `first`;
+// number 0 lies at the centre (R2, as in kernel/random.inl).
+std::vector<Sample> sample_positions(std::uint32_t first, std::int32_t count);
+
 } // namespace rt_embree

@@ -2,6 +2,7 @@
 #include "renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -43,6 +44,11 @@ const arhost_intrinsics &checked(const arhost_raytracer_setup &setup) {
     if (setup.scene->magic != ARHOST_SCENE_MAGIC || setup.scene->version != ARHOST_SCENE_VERSION)
         refuse("the scene is not an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
     return in;
+}
+
+bool same_view(const arhost_camera &a, const arhost_camera &b) {
+    return std::equal(a.eye, a.eye + 3, b.eye) && std::equal(a.look_at, a.look_at + 3, b.look_at) &&
+           std::equal(a.up, a.up + 3, b.up);
 }
 
 bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
@@ -166,12 +172,14 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) 
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), intrinsics_(checked(setup)), kernel_(choose_kernel(settings.instruction_set)),
-      threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1, threads_),
+      threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
       samples_(sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       one_path_(settings.one_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
+    if (settings.accumulate)
+        history_.resize(4 * ray_table_.tiles().size() * tile_pixels);
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
@@ -188,12 +196,23 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     for (const Box &box : scene_.visible_boxes())
         windows.push_back(pose.window_of(box));
 
+    std::array<float *, 4> history{};
+    if (!history_.empty()) {
+        constexpr std::uint32_t enough = 1u << 20; // samples, which floats still sum up well
+        if (motion || !still_camera_ || !same_view(*still_camera_, camera) || history_samples_ > enough)
+            history_samples_ = 0;
+        still_camera_ = camera;
+        samples_ = sample_positions(history_samples_, static_cast<std::int32_t>(samples_.size()));
+        for (std::size_t i = 0; i < 4; ++i)
+            history[i] = history_.data() + i * (history_.size() / 4);
+    }
     const Frame frame{scene_.view(),
                       ray_table_.rays(),
                       camera_of(pose),
                       samples_.data(),
                       static_cast<std::int32_t>(samples_.size()),
-                      0,
+                      history_samples_,
+                      {history[0], history[1], history[2], history[3]},
                       light_samples_,
                       one_path_,
                       image.rgba,
@@ -213,8 +232,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             drawn = united(drawn, part);
         }
     });
-    if (host_.cancelled())
+    if (host_.cancelled()) {
+        still_camera_.reset(); // what has been summed up has holes
         throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
+    }
+    history_samples_ += static_cast<std::uint32_t>(samples_.size());
     return drawn;
 }
 

@@ -9,6 +9,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct Settings {
     unsigned threads = 0;     // 0: one a processor
     bool robust = false;
     std::int32_t light_samples = 4; // shadow rays to an extended light, from each sample
+    bool accumulate = false;        // average over frames while the camera stands still
     bool one_path = false;          // glass sends one ray on, chosen at random, in place of two
     std::string instruction_set = "auto";
 };
@@ -58,6 +60,11 @@ private:
     std::vector<ScratchMemory> scratch_; // one a thread
     std::int32_t light_samples_;
     bool one_path_;
+
+    // Of accumulation: what has been summed up so far, and for which camera.
+    std::vector<float> history_; // empty where frames stand alone
+    std::uint32_t history_samples_ = 0;
+    std::optional<arhost_camera> still_camera_;
 };
 
 // The kernel of that name, or with "auto" the widest that this processor can run.

@@ -108,7 +108,17 @@ ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, 
     }
 }
 
-ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::int32_t count) {
+// Adds the sums of the frames before to those of this one, and keeps them.
+ARHOST_INLINE void remember(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
+    for (int i = 0; i < 4; ++i) {
+        float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
+        if (frame.first_sample > 0)
+            store(sum, load(kept) + load(sum));
+        store(kept, load(sum));
+    }
+}
+
+ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::uint32_t count) {
     const Float alpha = load(scratch.sum[3] + first_pixel);
     // Premultiplied means, then straight: the sums' common divisor cancels out.
     const Float share = Float(1.0f) / max(alpha, Float(1e-6f));
@@ -147,6 +157,7 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
     Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
     bool coloured[tile_pixels / lanes];
+    const bool averages = frame.sample_count > 1 || frame.history[0];
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
         work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
@@ -158,14 +169,18 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
             store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
         });
         follow_all(work);
-        if (frame.sample_count > 1)
+        if (averages)
             for_each_block(all, [&](int number, int, int, int, int) {
                 accumulate(scratch, number * lanes, coloured[number], i == 0);
             });
     }
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
-        const Int pixels = frame.sample_count > 1 ? mean(scratch, number * lanes, frame.sample_count)
-                                                  : encode(frame, scratch, number * lanes, coloured[number]);
+        const int first_pixel = number * lanes;
+        if (frame.history[0])
+            remember(frame, scratch, tile.first_block * lanes, first_pixel);
+        const Int pixels =
+            averages ? mean(scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count))
+                     : encode(frame, scratch, first_pixel, coloured[number]);
         write_block(frame, x, y, width, height, pixels);
         if (any((pixels >> Int(24)) != Int(0))) { // lanes outside have alpha 0
             drawn.x0 = x < drawn.x0 ? x : drawn.x0;

@@ -438,6 +438,40 @@ double over(const Pixel &pixel, int channel, double background) {
     return background * (1 - alpha) + pixel[channel] * alpha;
 }
 
+TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
+    const auto scene = [] {
+        ArenaBuilder builder = sphere_over_catcher();
+        arhost_light bulb = arhost::scene::make_light(ARHOST_SPHERE_LIGHT);
+        set3(bulb.position, -60, -20, 200);
+        bulb.radius = 40;
+        builder.add_light(bulb);
+        return builder;
+    };
+    Tracer tracer(scene(), {{"accumulate", "true"}});
+    const arhost_camera still = from_the_side(), other = camera({0, -150, 112}, {0, 0, 0}, {0, 0, 1});
+    ASSERT_EQ(tracer.start(still.intrinsics), ARHOST_OK);
+    const auto render = [&](const arhost_camera &view) {
+        Picture picture(view.intrinsics);
+        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_OK);
+        return picture.pixels();
+    };
+    const auto first = render(still);
+    auto last = first;
+    for (int i = 0; i < 255; ++i)
+        last = render(still);
+    const auto truth = Tracer(scene(), {{"samples", "64"}, {"light_samples", "16"}}).render(still).pixels();
+    const auto distance = [&](const std::vector<Pixel> &a) {
+        double sum = 0;
+        for (std::size_t i = 0; i < a.size(); ++i)
+            sum += std::abs(a[i][3] - truth[i][3]);
+        return sum / static_cast<double>(a.size());
+    };
+    EXPECT_LT(distance(last), 0.1);
+    EXPECT_GT(distance(first), 5 * distance(last));
+    EXPECT_NE(render(other), last);
+    EXPECT_EQ(render(still), first) << "it begins anew";
+}
+
 TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
     constexpr int count = 8;
     const arhost_intrinsics in = pinhole();
