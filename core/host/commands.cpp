@@ -137,13 +137,24 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
     });
 
     const bool whole = pipeline.run();
+    // From here on signals end the process at once, should the terminal be halted while the last lines wait.
+    const auto let_signals_end_us = [&] {
+        signalfd_siginfo info;
+        while (::read(signal_fd.get(), &info, sizeof info) > 0) {
+        }
+        ::sigprocmask(SIG_UNBLOCK, &signals, nullptr);
+    };
     if (!whole)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
-    if (configuration.stats && pipeline.statistics().frames_in > 0 &&
-        !write_statistics(*configuration.stats, console,
-                          report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host())
-                                  .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                              "\n"))
+    const bool has_stats = configuration.stats && pipeline.statistics().frames_in > 0;
+    const bool written =
+        !has_stats ||
+        write_statistics(*configuration.stats, console,
+                         report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host())
+                                 .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                             "\n");
+    let_signals_end_us();
+    if (!written)
         return run_failed;
     if (!whole)
         return pipeline.failed_by_configuration() ? bad_configuration : run_failed;

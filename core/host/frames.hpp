@@ -3,6 +3,7 @@
 // A video frame on its way through the pipeline.
 #pragma once
 
+#include "compositor/lens_warp.hpp"
 #include "host/slots.hpp"
 
 #include <arhost/sink.h>
@@ -32,6 +33,7 @@ struct Frame {
     Lease result;            // in the tracker's, while it has the frame
     Lease overlay;           // in the ray tracer's
     arhost_render_info render{};
+    std::shared_ptr<LensWarp> warp; // what the overlay is yet to be bent by; NULL: nothing
     arhost_record record{};
     Clock::time_point received;
 

@@ -3,7 +3,6 @@
 
 #include "camera/calibration.hpp"
 #include "camera/mapping.hpp"
-#include "compositor/compositor.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -150,14 +149,17 @@ void Pipeline::make_raytracer() {
     Component::Hooks hooks = hooks_for("raytracer", raytracer.node);
     hooks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
         const Json options = to_json(config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate));
-        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS))
+        warp_.reset();
+        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS)) {
+            warp_ = std::make_shared<LensWarp>(intrinsics_);
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
-                         plugin.id +
-                             " can't trace through a distorted lens; the overlay will be off towards the corners");
+                         plugin.id + " can't trace through a distorted lens: its images are bent afterwards, which "
+                                     "costs sharpness and the host's time");
+        }
+        const arhost_intrinsics &traced = warp_ ? warp_->pinhole() : intrinsics_;
         return Component::Create{
             {{"options", options},
-             {"setup",
-              {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(intrinsics_)}}}},
+             {"setup", {{"width", format_->width}, {"height", format_->height}, {"intrinsics", to_json(traced)}}}},
             {arena_.fd()}};
     };
     hooks.ready = [this](const Json &) {
@@ -455,6 +457,9 @@ bool Pipeline::render() {
     command.sequence = frame->record.sequence;
     command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
     command.camera = frame->record.camera;
+    if (warp_)
+        command.camera.intrinsics = warp_->pinhole();
+    frame->warp = warp_;
     raytracer_->submit(command);
     return true;
 }
@@ -578,6 +583,10 @@ void Pipeline::compose(const Frame &frame, std::span<std::byte> slot) {
         overlay = {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
                    overlay_stride(format_->width)};
         region = region_of(frame.render, format_->width, format_->height);
+        if (frame.warp) {
+            overlay = frame.warp->bend(overlay, region);
+            region = {0, 0, format_->width, format_->height};
+        }
     }
     // The markers past marker_count are left as they are: they carry no meaning.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);

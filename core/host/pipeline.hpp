@@ -99,6 +99,7 @@ private:
     std::optional<arhost_frame_format> format_;
     std::uint64_t frame_count_ = 0;
     arhost_intrinsics intrinsics_{};
+    std::shared_ptr<LensWarp> warp_; // NULL where the ray tracer traces through the lens
     std::set<std::int32_t> marker_ids_;
 
     std::deque<Lease> reads_; // the slots of the reads under way, oldest first

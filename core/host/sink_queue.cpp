@@ -29,7 +29,8 @@ void SinkQueue::pump() {
 }
 
 void SinkQueue::on_result(const Command &command, const Result &result) {
-    next_sequence_ = command.sequence + 1;
+    if (result.status > 0) // a failed one was not written
+        next_sequence_ = command.sequence + 1;
     if (!unconfirmed_.empty())
         unconfirmed_.pop_front();
     statistics_.stages[component->name()].add(std::chrono::nanoseconds(result.busy_ns));

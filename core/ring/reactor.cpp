@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <sys/epoll.h>
+#include <utility>
 
 namespace arhost::ring {
 
@@ -42,31 +43,33 @@ void Reactor::remove(std::uint64_t id) {
 }
 
 void Reactor::run_once() {
-    int timeout_ms = -1;
+    using std::chrono::milliseconds;
+    // Short, so that a halt of this process shows as time beyond what was asked for.
+    constexpr milliseconds slice{100};
+    std::optional<milliseconds> patience;
     if (!deadlines_.empty()) {
-        const auto left = deadlines_.begin()->first - Clock::now();
         // Rounded up: waking just before a deadline would spin.
-        timeout_ms = static_cast<int>(
-            std::clamp<std::int64_t>(std::chrono::ceil<std::chrono::milliseconds>(left).count(), 0, 60'000));
+        const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - Clock::now());
+        patience = std::clamp(left, milliseconds(0), slice);
     }
-    take_events(timeout_ms);
+    take_events(patience);
     if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
-        take_events(0); // what came while this process was stopped came in time
-    if (overslept(Clock::now()))
-        return;
+        take_events(milliseconds(0)); // what came while this process was halted came in time
     while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
         auto due = deadlines_.extract(deadlines_.begin());
         due.mapped().callback();
     }
 }
 
-void Reactor::take_events(int timeout_ms) {
+void Reactor::take_events(std::optional<std::chrono::milliseconds> patience) {
     std::array<epoll_event, 32> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), timeout_ms);
+    const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
+                                   patience ? static_cast<int>(patience->count()) : -1);
     if (count < 0 && errno != EINTR)
         throw_errno("epoll_wait");
+    postpone_by_halt(patience);
     for (int i = 0; i < count; ++i) {
-        // A callback may end any watch, its own too: look it up anew, and keep it alive while it runs.
+        // A callback may have removed this one; its id is never given out again.
         const auto found = watches_.find(events[static_cast<std::size_t>(i)].data.u64);
         if (found == watches_.end())
             continue;
@@ -75,17 +78,19 @@ void Reactor::take_events(int timeout_ms) {
     }
 }
 
-// A deadline that is seen much too late tells that this process did not run; others may not have run either.
-// Postpones all deadlines by the time since the last look: at worst a hang is found that much later.
-bool Reactor::overslept(Clock::time_point now) {
-    const Clock::time_point before = std::exchange(looked_at_deadlines_, now);
-    if (deadlines_.empty() || now - std::max(deadlines_.begin()->first, before) < std::chrono::milliseconds(250))
-        return false;
+// Time that this process did not run counts for no deadline: others may not have run either.
+void Reactor::postpone_by_halt(std::optional<std::chrono::milliseconds> patience) {
+    constexpr std::chrono::milliseconds noticeable{50}; // above what a busy machine delays
+    const Clock::time_point now = Clock::now(), before = std::exchange(looked_, now);
+    if (!patience) // nothing was due, and any time is well spent
+        return;
+    const auto halt = now - before - *patience;
+    if (halt < noticeable)
+        return;
     std::multimap<Clock::time_point, Deadline> postponed;
     for (auto &[when, deadline] : deadlines_)
-        postponed.emplace_hint(postponed.end(), when + (now - before), std::move(deadline));
+        postponed.emplace_hint(postponed.end(), when + halt, std::move(deadline));
     deadlines_ = std::move(postponed);
-    return true;
 }
 
 } // namespace arhost::ring

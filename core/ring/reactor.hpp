@@ -11,6 +11,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 
 namespace arhost::ring {
 
@@ -61,14 +62,14 @@ private:
         Callback callback;
     };
     void remove(std::uint64_t id);
-    void take_events(int timeout_ms);
-    bool overslept(Clock::time_point now);
+    void take_events(std::optional<std::chrono::milliseconds> patience);
+    void postpone_by_halt(std::optional<std::chrono::milliseconds> patience);
 
     UniqueFd epoll_;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
-    Clock::time_point looked_at_deadlines_ = Clock::now();
+    Clock::time_point looked_ = Clock::now(); // when the last wait for events ended
 };
 
 } // namespace arhost::ring

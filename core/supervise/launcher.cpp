@@ -106,9 +106,12 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
 // and what that has left behind with the next call.
 void kill_orphans(const std::set<pid_t> &workers) {
     std::ifstream children("/proc/thread-self/children");
-    for (pid_t child; children >> child;)
-        if (!workers.contains(child))
+    for (pid_t child; children >> child;) {
+        siginfo_t info{}; // a number of another pid namespace's /proc is no child of ours
+        if (!workers.contains(child) &&
+            ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0)
             ::kill(child, SIGKILL);
+    }
 }
 
 // The host is gone: so are the workers in a moment, and so must be what they have started.
@@ -145,6 +148,7 @@ void reap(int socket, std::set<pid_t> &spawned) {
 
 [[noreturn]] void launcher_main(int socket) {
     ::prctl(PR_SET_NAME, "arhost-launcher");
+    ::setpgid(0, 0); // who kills the host's whole group leaves this to end the rest
     ::prctl(PR_SET_CHILD_SUBREAPER, 1);
     std::set<pid_t> spawned;
     // No PR_SET_PDEATHSIG: the socket tells when the host is gone, and then there is something left to do.

@@ -6,6 +6,7 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
+#include <utility>
 
 namespace arhost::supervise {
 namespace {
@@ -141,22 +142,28 @@ void Process::take_messages(int most) {
     }
 }
 
-// What the plugin says; it must not drown what others say.
+// What the plugin says; it must not drown what others say, nor its chatter its own warnings.
 void Process::log(arhost_severity severity, const std::string &text) {
     constexpr int most_a_second = 100;
     remember(text);
     if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
-        if (lines_in_second_ > most_a_second)
-            context_.log(worst_left_out_, name_,
-                         std::to_string(lines_in_second_ - most_a_second) + " more lines within a second left out");
+        tell_of_lines_left_out();
         log_second_ends_ = now + std::chrono::seconds(1);
-        lines_in_second_ = 0;
-        worst_left_out_ = ARHOST_SEVERITY_DEBUG;
     }
-    if (++lines_in_second_ <= most_a_second)
+    Lines &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : chatter_;
+    if (lines.said++ < most_a_second)
         context_.log(severity, name_, text);
     else
-        worst_left_out_ = std::max(worst_left_out_, severity);
+        ++lines.left_out;
+}
+
+void Process::tell_of_lines_left_out() {
+    for (const auto &[lines, severity] :
+         {std::pair{&chatter_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
+        if (lines->left_out > 0)
+            context_.log(severity, name_, std::to_string(lines->left_out) + " more lines within a second left out");
+        *lines = {};
+    }
 }
 
 void Process::on_doorbell() {
@@ -222,6 +229,7 @@ void Process::on_death() {
         take_output(1 << 20);
     if (!partial_line_.empty())
         remember(partial_line_);
+    tell_of_lines_left_out();
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;
     death.cpu_seconds = exit.cpu_seconds;

@@ -75,6 +75,7 @@ private:
     void on_death();
     void take_results();
     void log(arhost_severity severity, const std::string &text);
+    void tell_of_lines_left_out();
     void remember(const std::string &line);
 
     Context &context_;
@@ -88,8 +89,10 @@ private:
     std::string end_reason_, partial_line_;
     std::deque<std::string> tail_;
     ring::Reactor::Clock::time_point log_second_ends_{};
-    int lines_in_second_ = 0;
-    arhost_severity worst_left_out_ = ARHOST_SEVERITY_DEBUG;
+    struct Lines { // within the second
+        int said = 0, left_out = 0;
+    };
+    Lines chatter_, warnings_;
     std::uint64_t rings_ = 0, results_taken_ = 0;
     ring::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
 };

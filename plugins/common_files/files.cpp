@@ -48,11 +48,22 @@ void make_parent_folders(const std::filesystem::path &file) {
 }
 
 void check_can_write(const std::filesystem::path &file) {
-    std::error_code ignored;
-    const bool is_new = !std::filesystem::exists(file, ignored);
-    const File trial(file, O_WRONLY | O_CREAT);
-    if (is_new)
-        remove_file(file);
+    if (const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK); fd >= 0) {
+        ::close(fd);
+        return;
+    }
+    if (errno != ENOENT)
+        throw io_failure("can't open", file, errno);
+    std::error_code error;
+    if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))) { // to nothing yet: try there
+        std::filesystem::path target = std::filesystem::read_symlink(file, error);
+        return check_can_write(target.is_absolute() ? target : file.parent_path() / target);
+    }
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0)
+        throw io_failure("can't open", file, errno);
+    ::close(fd);
+    remove_file(file); // made a moment ago, by this process
 }
 
 void remove_file(const std::filesystem::path &file) {

@@ -167,9 +167,9 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
         local_boxes_.push_back(local_box(arena, object));
-        visible_boxes_.push_back(object.role == ARHOST_OCCLUDER ? empty_box()
-                                                                : transformed(local_boxes_.back(),
-                                                                              object.world_from_object));
+        visible_boxes_.push_back(object.role == ARHOST_OCCLUDER
+                                     ? empty_box()
+                                     : transformed(local_boxes_.back(), object.world_from_object));
         view_.has_catchers |= object.role == ARHOST_CATCHER;
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
@@ -253,8 +253,8 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     const arhost_object &from = elements<arhost_object>(arena_, arena_.objects)[deformed.object];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[from.geometry];
     const auto *positions = reinterpret_cast<const std::byte *>(deformed.positions);
-    const MeshView mesh{positions, bytes(arena_) + geometry.indices.offset, 3 * sizeof(float), geometry.indices.stride,
-                        geometry.indices.count};
+    const MeshView mesh{positions, bytes(arena_) + geometry.indices.offset, 3 * sizeof(float),
+                        geometry.indices.stride, geometry.indices.count};
 
     Deforming &own = deforming_.at(deformed.object);
     rtcSetSharedGeometryBuffer(own.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0,

@@ -57,9 +57,10 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 64),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
-    arhost::option(ARHOST_OPTION_BOOL, "accumulate", "false",
-                   "Average over frames while the camera and the scene stand still: an image then depends on the ones "
-                   "before."),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "accumulate", "false",
+        "Average over frames while the camera and the scene stand still: an image then depends on the ones "
+        "before."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
                    "Rays that glass sends on: 'tree' follows both, 'path' one that is chosen at random.", 0, 0,
                    glass),

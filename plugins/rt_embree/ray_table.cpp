@@ -118,7 +118,8 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::int32_t count) {
     std::vector<Sample> samples;
     for (std::int32_t i = 0; i < count; ++i) {
         const auto place = [&](std::uint32_t step) { // of turns of 2³², about 0
-            return static_cast<float>(static_cast<std::int32_t>((first + static_cast<std::uint32_t>(i)) * step)) * 0x1p-32f;
+            return static_cast<float>(static_cast<std::int32_t>((first + static_cast<std::uint32_t>(i)) * step)) *
+                   0x1p-32f;
         };
         samples.push_back({place(3242174889u), place(2447445414u)});
     }

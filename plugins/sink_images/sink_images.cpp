@@ -61,8 +61,9 @@ public:
         if (fs::is_directory(path_, ignored))
             throw Failure(ARHOST_ERROR_CONFIGURATION,
                           "path: '" + path_.string() + "' is a folder: add a file's name");
-        if (frame_ < 0)
-            kept_.emplace(kept_path_, setup.width, setup.height, setup.first_sequence);
+        setup_ = setup;
+        if (frame_ < 0 && setup.first_sequence > 0)
+            begin_keeping();
         may_be_older_ = frame_ < 0 ? setup.first_sequence == 0 : setup.first_sequence <= wanted();
     }
 
@@ -78,6 +79,8 @@ public:
             if (sequence % every_ == 0)
                 replace(pattern_->file(sequence), image);
         } else if (frame_ < 0) {
+            if (!kept_)
+                begin_keeping();
             kept_->keep(image, sequence);
         } else if (sequence >= wanted() && !fs::exists(path_)) {
             replace(path_, image);
@@ -98,6 +101,8 @@ public:
     }
 
 private:
+    void begin_keeping() { kept_.emplace(kept_path_, setup_.width, setup_.height, setup_.first_sequence); }
+
     std::uint64_t wanted() const { return static_cast<std::uint64_t>(frame_); }
 
     void replace(const fs::path &target, const Image &image) {
@@ -121,6 +126,7 @@ private:
     std::unique_ptr<images::Encoder> encoder_;
     std::int64_t frame_;  // of a plain path: which one, or -1, the last
     std::uint64_t every_; // of a pattern
+    arhost_sink_setup setup_{};
     std::optional<images::LastFrame> kept_;
     bool may_be_older_ = false; // than this run: what lies at `path_`
 };

@@ -77,8 +77,13 @@ public:
     arhost_status write(const arhost_output &output) {
         if (static_cast<int>(output.width) != settings_.width || static_cast<int>(output.height) != settings_.height)
             throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "a frame's size is not that of the start");
-        if (!writer_)
+        if (failed_)
+            return ARHOST_ERROR_IO; // said already
+        if (!writer_) {
+            failed_ = true; // unless the next lines succeed
             begin();
+            failed_ = false;
+        }
         const auto number = static_cast<std::int64_t>(output.record->sequence);
         writer_->append(encoder_->encode(output.bgr, output.stride, number));
         finished_ = false;
@@ -86,6 +91,8 @@ public:
     }
 
     void stop() {
+        if (failed_)
+            return files::remove_file(segment_of(path_, first_).path);
         if (!writer_)
             return host_.warn("no frame came: '" + path_.string() + "' was not written");
         writer_.reset();
@@ -140,6 +147,7 @@ private:
     std::optional<Encoder> encoder_;
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the frame to begin with
+    bool failed_ = false;    // it could not even begin
     bool finished_ = false;  // by a process that died before it could say so
 };
 

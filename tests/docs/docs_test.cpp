@@ -50,6 +50,12 @@ TEST(Documentation, ShowsConfigurationsThatArhostAccepts) {
     EXPECT_EQ(checked, 2);
 }
 
+TEST(Documentation, DemonstrationTakesTheOtherTrackerByOneLine) {
+    ArhostRun run;
+    const std::string demo = (root / "config/demo.yaml").string();
+    EXPECT_EQ(run.run({"check", demo, "--set", "tracker.plugin=tracker_apriltag"}), 0) << run.output();
+}
+
 TEST(Documentation, ShipsConfigurationsThatArhostAccepts) {
     for (const auto &entry : fs::directory_iterator(root / "config"))
         if (entry.path().extension() == ".yaml") {

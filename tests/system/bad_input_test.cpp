@@ -208,6 +208,8 @@ TEST(BadInput, LeavesTheOutputsOfAnEarlierRunAsTheyWere) {
     EXPECT_THAT(run.output(), HasSubstr("film.avi"));
     for (const char *name : {"poses.jsonl", "last.png", "film.mp4"})
         EXPECT_EQ(run.read(name), "old") << name;
+    for (const auto &entry : std::filesystem::directory_iterator(run.path("")))
+        EXPECT_NE(entry.path().filename().string()[0], '.') << entry.path() << " was left behind";
 }
 
 TEST(BadCommandLine, IsRefused) {

@@ -233,6 +233,11 @@ TEST(Run, GoesOnWhileTheTerminalIsHalted) {
     EXPECT_TRUE(run.exists("stats.json"));
     EXPECT_TRUE(run.exists("counted.txt.done"));
     expect_every_frame_augmented(run, 200);
+    for (int i = 0; i < 1000 && run.running(); ++i) { // its last lines wait; a signal ends that
+        ::kill(run.pid(), SIGTERM);
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    EXPECT_FALSE(run.running());
 }
 
 TEST(Run, ShowsItsProgressInPlainLinesWhereThereIsNoTerminal) {
@@ -267,4 +272,16 @@ TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("run.yaml: fine"));
     EXPECT_FALSE(run.exists("counted.txt"));
+}
+
+TEST(Run, BendsTheImagesOfARayTracerThatKnowsNoLens) {
+    // rt_counter fills its image, and is told of a camera without distortion.
+    ArhostRun run(
+        counting("lockstep", "frames: 5", "", "",
+                 "camera: {width: 64, height: 48, fx: 60, distortion: {model: brown, coefficients: [-0.2, 0.05, "
+                 "0, 0]}}\n"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("rt_counter can't trace through a distorted lens: its images are bent"));
+    expect_every_frame_augmented(run, 5);
 }

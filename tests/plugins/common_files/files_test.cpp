@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
+#include <filesystem>
+#include <fstream>
 
 using namespace arhost;
 using namespace arhost::files;
@@ -115,4 +117,21 @@ TEST(Files, RemovingWhatIsNotThereIsNoError) {
     const auto [status, message] = failure_of([&] { remove_file(folder.path()); });
     EXPECT_EQ(status, ARHOST_ERROR_IO);
     EXPECT_THAT(message, HasSubstr("can't delete"));
+}
+
+TEST(Files, CheckingThatOneCanBeWrittenChangesNothing) {
+    const test::ScratchFolder folder;
+    const auto file = folder.path() / "log.txt", link = folder.path() / "link.txt",
+               target = folder.path() / "far.txt";
+    check_can_write(file);
+    EXPECT_FALSE(std::filesystem::exists(file));
+    std::ofstream(file) << "old";
+    check_can_write(file);
+    EXPECT_EQ(std::filesystem::file_size(file), 3u);
+    std::filesystem::create_symlink("far.txt", link); // to what is not there yet
+    check_can_write(link);
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_FALSE(std::filesystem::exists(target));
+    EXPECT_EQ(failure_of([&] { check_can_write(folder.path()); }).first, ARHOST_ERROR_IO);
+    EXPECT_EQ(failure_of([&] { check_can_write(folder.path() / "none/log.txt"); }).first, ARHOST_ERROR_IO);
 }

@@ -22,7 +22,8 @@ Picture over_a_plane(const arhost_light &lamp, const Options &options = {}) {
     return Tracer(std::move(builder), options).render(from_above());
 }
 
-void expect_irradiance(const Picture &picture, const std::function<double(glm::dvec3)> &expected, double tolerance = 1e-4) {
+void expect_irradiance(const Picture &picture, const std::function<double(glm::dvec3)> &expected,
+                       double tolerance = 1e-4) {
     for (int y = 0; y < 150; y += 5)
         for (int x = 0; x < 200; x += 5)
             ASSERT_TRUE(is_code_of(picture.at(x, y)[0], expected(on_the_floor(x, y)), tolerance)) << x << " " << y;

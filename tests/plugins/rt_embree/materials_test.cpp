@@ -76,7 +76,8 @@ TEST(Glass, LosesNoLight) {
         ArenaBuilder builder = in_a_room_of_light(0.5f);
         builder.settings.max_depth = std::string(way) == "tree" ? 12 : 60;
         add_ball(builder, glass);
-        builder.add_object("box", builder.add_triangles(box({50, -60, -20}, {90, 60, 30})), builder.add_material(glass));
+        builder.add_object("box", builder.add_triangles(box({50, -60, -20}, {90, 60, 30})),
+                           builder.add_material(glass));
         const Picture picture = Tracer(std::move(builder), {{"glass", way}}).render(from_the_side());
         int covered = 0;
         for (const Pixel &pixel : picture.pixels())
@@ -148,8 +149,9 @@ TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
         return Tracer(std::move(builder)).render(from_above()).at(100, 74);
     };
     const Pixel cutoff{shading::srgb8_exact(0.34f), shading::srgb8_exact(0.55f), shading::srgb8_exact(0.85f), 255};
-    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = glass.refraction_depth = 0; }),
-              cutoff);
+    EXPECT_EQ(
+        with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = glass.refraction_depth = 0; }),
+        cutoff);
     EXPECT_EQ(with([](arhost_material &, ArenaBuilder &builder) { builder.settings.max_depth = 0; }), cutoff);
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 1; }), cutoff);
     // Straight on, 4 % are reflected on entering, and 4 % of the rest on leaving: only these stand in for rays.
@@ -165,7 +167,8 @@ TEST(Glass, TheChosenPathsMeanIsTheTree) {
         arhost_material glass = clear_glass();
         glass.fresnel_minimum = 0.3f;
         set3(glass.extinction, 0.01f, 0, 0.02f);
-        builder.add_object("floor", builder.add_triangles(square(200, -70)), builder.add_material(flat(0.8f, 0.2f, 0.1f)));
+        builder.add_object("floor", builder.add_triangles(square(200, -70)),
+                           builder.add_material(flat(0.8f, 0.2f, 0.1f)));
         add_ball(builder, glass);
         return builder;
     };
@@ -201,9 +204,10 @@ TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
         builder.settings.coloured_shadows = coloured;
         arhost_material glass = clear_glass();
         set3(glass.shadow_attenuation, 0.4f, 0.8f, 0.4f);
-        builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                           ARHOST_CATCHER);
-        builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
+        builder.add_object("floor", builder.add_triangles(square(80)),
+                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_CATCHER);
+        builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})),
+                           builder.add_material(glass));
         builder.add_light(light(0, 150, 300, 1));
         return Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -30, 0}, {0, 0, 1})).at(100, 74);
     };
@@ -223,8 +227,7 @@ TEST(Glass, ItsShadowTintsTheLightOnObjects) {
     builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
     arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
     builder.add_light(sun);
-    const Pixel pixel =
-        Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
+    const Pixel pixel = Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
     for (int i = 0; i < 3; ++i)
         EXPECT_TRUE(is_code_of(pixel[i], glass.shadow_attenuation[i] * glass.shadow_attenuation[i], 1e-4));
 }
@@ -247,7 +250,8 @@ TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
             const double alpha2 = std::pow(std::max(double{roughness}, 0.0316), 4), v = (i + 0.5) / n;
             const double tan2 = alpha2 * v / (1 - v), cosine = (1 - tan2) / (1 + tan2);
             if (cosine > 0)
-                sum += shading::srgb_encode(0.5 * 2 * cosine / (cosine + std::sqrt(alpha2 + (1 - alpha2) * cosine * cosine)));
+                sum += shading::srgb_encode(0.5 * 2 * cosine /
+                                            (cosine + std::sqrt(alpha2 + (1 - alpha2) * cosine * cosine)));
         }
         EXPECT_NEAR(mean, 255 * sum / n, 3) << roughness;
     }
@@ -268,12 +272,14 @@ TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
             const glm::dvec3 p = on_the_floor(x, y), l = glm::normalize(glm::dvec3(30, -20, 90) - p);
             const glm::dvec3 v = glm::normalize(glm::dvec3(0, 0, 200) - p), h = glm::normalize(l + v);
             const double a2 = std::pow(0.5, 4), d = h.z * h.z * (a2 - 1) + 1;
-            const double visibility = 0.5 / (l.z * std::sqrt(v.z * v.z * (1 - a2) + a2) + v.z * std::sqrt(l.z * l.z * (1 - a2) + a2));
+            const double visibility =
+                0.5 / (l.z * std::sqrt(v.z * v.z * (1 - a2) + a2) + v.z * std::sqrt(l.z * l.z * (1 - a2) + a2));
             for (int i = 0; i < 3; ++i) {
                 const double base = plastic.diffuse[i], f0 = 0.04 * 0.75 + base * 0.25;
                 const double fresnel = f0 + (1 - f0) * std::pow(1 - glm::dot(v, h), 5);
                 // A lamp's intensity has Lambert's π in it.
-                const double value = 0.9 * l.z * ((1 - fresnel) * base * 0.75 + fresnel * visibility * a2 / (d * d)) + plastic.emission[i];
+                const double value = 0.9 * l.z * ((1 - fresnel) * base * 0.75 + fresnel * visibility * a2 / (d * d)) +
+                                     plastic.emission[i];
                 ASSERT_TRUE(is_code_of(picture.at(x, y)[i], value, 1e-3)) << x << " " << y;
             }
         }

@@ -112,7 +112,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              "arhost",
                                              "Apache-2.0",
                                              "Draws a frame's number, for tests.",
-                                             ARHOST_TRACES_LENS,
+                                             0,
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};

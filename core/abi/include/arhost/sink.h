@@ -62,8 +62,9 @@ typedef struct arhost_sink {
     uint32_t struct_size;
 
     /* [worker] Once after create. Fails where nothing can be written, but harms no earlier file: that waits
-     * for the first frame, since another component may yet refuse the run. What goes to a file goes to it at once or can be finished after a
-     * kill; a file appears under its own name only when it is whole, or is whole at every moment. */
+     * for the first frame, since another component may yet refuse the run. What goes to a file goes to it at once or
+     * can be finished after a kill; a file appears under its own name only when it is whole, or is whole at every
+     * moment. */
     arhost_status (*start)(arhost_instance *instance, const arhost_sink_setup *setup);
 
     /* [worker] One frame, sequence numbers ascending. Once it has returned ARHOST_OK the frame is not
