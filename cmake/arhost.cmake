@@ -22,6 +22,9 @@ if(ARHOST_SANITIZE)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
 endif()
 
+# Where programs find arhost-images.so (core/scene/image_reader.hpp).
+set(CMAKE_BUILD_RPATH "$ORIGIN/../lib")
+
 set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost)
 add_custom_target(plugins COMMENT "All plugins")
 

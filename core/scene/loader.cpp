@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/loader.hpp"
 
+#include "scene/gltf.hpp"
 #include "scene/mesh_text.hpp"
 #include "scene/shapes.hpp"
+#include "scene/textures.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
@@ -93,6 +95,8 @@ Settings settings_of(const Node &root) {
         settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
     if (const auto node = root.find("ambient"))
         settings.ambient = colour_of(*node, light_limit);
+    else if (root.find("environment")) // which lights from everywhere already
+        settings.ambient = glm::vec3(0);
     if (const auto node = root.find("background"))
         settings.background = colour_of(*node, light_limit);
     if (const auto node = root.find("coloured_shadows"))
@@ -165,7 +169,58 @@ arhost_material glass_of(const Node &node) {
     return glass;
 }
 
-arhost_material material_of(const Node &node) {
+glm::dvec3 up_of(arhost_axes axes) {
+    return axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+}
+
+// A file, or a map that says how it is to be taken.
+std::uint32_t texture_or_none(const Node &material, std::string_view key, bool is_colour, Textures &textures) {
+    const auto node = material.find(key);
+    if (!node)
+        return ARHOST_NONE;
+    TextureUse use{is_colour};
+    Node image = *node;
+    if (node->is_map()) {
+        node->allow_keys({"image", "wrap", "encoding"});
+        image = node->require("image");
+        if (const auto wrap = node->find("wrap")) {
+            const std::string text = wrap->choice({"repeat", "clamp", "mirror"});
+            use.wrap_u = use.wrap_v = text == "repeat"  ? ARHOST_WRAP_REPEAT
+                                      : text == "clamp" ? ARHOST_WRAP_CLAMP
+                                                        : ARHOST_WRAP_MIRROR;
+        }
+        if (const auto encoding = node->find("encoding"))
+            use.is_colour = encoding->choice({"srgb", "linear"}) == "srgb";
+    }
+    try {
+        return textures.add(image.input_path(), use);
+    } catch (const ImageError &error) {
+        image.fail(error.what());
+    }
+}
+
+Environment environment_of(const Node &node, arhost_axes axes, Textures &textures) {
+    if (!node.is_map())
+        node.fail("must be a map with the key 'image'");
+    node.allow_keys({"image", "intensity", "rotate_degrees"});
+    const float intensity = real_or(node, "intensity", 0, light_limit, 1);
+    const auto turn = node.find("rotate_degrees");
+    const Node image = node.require("image");
+    Environment environment;
+    try {
+        environment = textures.add_environment(image.input_path());
+    } catch (const ImageError &error) {
+        image.fail(error.what());
+    }
+    environment.intensity = intensity;
+    // The environment turns with its image: a direction is turned back before it is looked up.
+    const Transform y_up = axes == ARHOST_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
+    environment.environment_from_world =
+        glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), turn ? -turn->real() : 0)).matrix()));
+    return environment;
+}
+
+arhost_material material_of(const Node &node, Textures &textures) {
     if (!node.is_map())
         node.fail("must be a map with the key 'model'");
     const std::string model =
@@ -179,8 +234,16 @@ arhost_material material_of(const Node &node) {
         return mirror;
     }
     if (model == "metallic-roughness") {
-        node.allow_keys({"model", "colour", "metallic", "roughness", "emission"});
+        node.allow_keys({"model", "colour", "metallic", "roughness", "emission", "texture", "alpha_cutoff",
+                         "metallic_roughness_texture", "normal_texture", "emission_texture"});
         arhost_material material = make_material(ARHOST_METALLIC_ROUGHNESS);
+        material.colour_texture = texture_or_none(node, "texture", true, textures);
+        material.alpha_cutoff = real_or(node, "alpha_cutoff", 0, 1, 0);
+        material.metallic_roughness_texture = texture_or_none(node, "metallic_roughness_texture", false, textures);
+        material.normal_texture = texture_or_none(node, "normal_texture", false, textures);
+        material.emission_texture = texture_or_none(node, "emission_texture", true, textures);
+        if (material.emission_texture != ARHOST_NONE) // multiplied with the number
+            set(material.emission, glm::vec3(1));
         const glm::vec3 colour = colour_or(node, "colour", glm::vec3(1));
         set(material.diffuse, colour);
         set(material.ambient, colour);
@@ -190,23 +253,29 @@ arhost_material material_of(const Node &node) {
             set(material.emission, colour_of(*emission, light_limit));
         return material;
     }
+    // Keys are looked at before any texture is loaded.
+    if (model == "diffuse")
+        node.allow_keys({"model", "ambient", "diffuse", "texture", "alpha_cutoff"});
+    else if (model == "specular")
+        node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent", "texture", "alpha_cutoff"});
+    else
+        node.allow_keys(
+            {"model", "ambient", "diffuse", "specular", "exponent", "reflectivity", "texture", "alpha_cutoff"});
     arhost_material material = make_material(model == "diffuse"    ? ARHOST_DIFFUSE
                                              : model == "specular" ? ARHOST_SPECULAR
                                                                    : ARHOST_METAL);
-    const glm::vec3 diffuse = colour_of(node.require("diffuse"));
+    material.colour_texture = texture_or_none(node, "texture", true, textures);
+    material.alpha_cutoff = real_or(node, "alpha_cutoff", 0, 1, 0);
+    const glm::vec3 diffuse = material.colour_texture == ARHOST_NONE ? colour_of(node.require("diffuse"))
+                                                                     : colour_or(node, "diffuse", glm::vec3(1));
     set(material.diffuse, diffuse);
     set(material.ambient, colour_or(node, "ambient", diffuse));
-    if (model == "diffuse") {
-        node.allow_keys({"model", "ambient", "diffuse"});
+    if (model == "diffuse")
         return material;
-    }
     set(material.specular, colour_of(node.require("specular")));
     material.exponent = static_cast<float>(node.require("exponent").real(1, 1e6));
-    if (model == "specular") {
-        node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent"});
+    if (model == "specular")
         return material;
-    }
-    node.allow_keys({"model", "ambient", "diffuse", "specular", "exponent", "reflectivity"});
     set(material.reflectivity, colour_of(node.require("reflectivity")));
     return material;
 }
@@ -274,8 +343,7 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
         node.allow_keys({"type", "position", "intensity", "falloff", "direction", "size"});
         const glm::dvec3 direction = direction_of(node.require("direction"));
         set(light.direction, direction);
-        set_sides(light, direction, axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0),
-                  node.require("size"));
+        set_sides(light, direction, up_of(axes), node.require("size"));
     }
     return light;
 }
@@ -295,12 +363,7 @@ Transform step_of(const Node &node) {
     }
     const Node rotate = node.require("rotate");
     rotate.allow_keys({"axis", "degrees"});
-    const Node axis_node = rotate.require("axis");
-    const glm::dvec3 axis = vector_of(axis_node);
-    const double length = glm::length(axis);
-    if (!(length > 1e-9 && length < 1e9))
-        axis_node.fail("has no direction");
-    return Transform::rotation(axis / length, rotate.require("degrees").real());
+    return Transform::rotation(direction_of(rotate.require("axis")), rotate.require("degrees").real());
 }
 
 Transform transform_of(const Node &object) {
@@ -311,19 +374,82 @@ Transform transform_of(const Node &object) {
     return world_from_object;
 }
 
+// An object's way through the keys of its `motion`: a node, and a channel for each part that a key names.
+struct Way {
+    MotionNode node;
+    std::vector<Channel> channels;
+};
+
+Way way_of(const Node &motion, bool is_sphere) {
+    motion.allow_keys({"keys"});
+    const Node keys_node = motion.require("keys");
+    const std::vector<Node> keys = keys_node.items();
+    if (keys.size() < 2)
+        keys_node.fail("needs two keys at least");
+    Way way;
+    way.node.animated = true;
+    const auto channel = [&](const char *part, arhost_channel_target target, const auto &read) {
+        if (std::ranges::none_of(keys, [&](const Node &key) { return key.find(part).has_value(); }))
+            return;
+        Channel channel;
+        channel.target = target;
+        for (const Node &key : keys) {
+            channel.times.push_back(static_cast<float>(key.require("at_s").real()));
+            read(key.find(part), channel.values);
+        }
+        way.channels.push_back(std::move(channel));
+    };
+    float before = -1;
+    for (const Node &key : keys) {
+        key.allow_keys({"at_s", "translate", "rotate", "scale"});
+        const Node at = key.require("at_s");
+        const auto time = static_cast<float>(at.real(0, duration_limit_s));
+        if (!(time > before))
+            at.fail("must be later than the key before");
+        before = time;
+    }
+    channel("translate", ARHOST_CHANNEL_TRANSLATION, [](const auto &node, std::vector<float> &values) {
+        const glm::dvec3 by = node ? position_of(*node) : glm::dvec3(0);
+        values.insert(values.end(), {float(by.x), float(by.y), float(by.z)});
+    });
+    channel("rotate", ARHOST_CHANNEL_ROTATION, [](const auto &node, std::vector<float> &values) {
+        glm::dvec3 axis(0, 0, 1);
+        double half = 0;
+        if (node) {
+            node->allow_keys({"axis", "degrees"});
+            axis = direction_of(node->require("axis"));
+            half = std::fmod(node->require("degrees").real(), 720) * std::numbers::pi / 360;
+        }
+        axis *= std::sin(half);
+        values.insert(values.end(), {float(axis.x), float(axis.y), float(axis.z), float(std::cos(half))});
+    });
+    channel("scale", ARHOST_CHANNEL_SCALE, [&](const auto &node, std::vector<float> &values) {
+        const glm::dvec3 by = node ? number_or_vector(*node) : glm::dvec3(1);
+        for (int i = 0; i < 3; ++i)
+            if (!(by[i] >= 1e-6 && by[i] <= 1e6))
+                node->fail("each factor must be 1e-6 to 1e6");
+        if (is_sphere && (by.x != by.y || by.x != by.z))
+            node->fail("scales a sphere unevenly, which would make it an ellipsoid; scale it by one number");
+        values.insert(values.end(), {float(by.x), float(by.y), float(by.z)});
+    });
+    if (way.channels.empty())
+        keys_node.fail("name neither translate, rotate nor scale");
+    return way;
+}
+
 glm::dvec3 centre_of(const Node &shape) {
     const auto centre = shape.find("centre");
     return centre ? position_of(*centre) : glm::dvec3(0);
 }
 
-TriangleMesh cuboid_of(const Node &shape) {
+TriangleMesh cuboid_of(const Node &shape, arhost_axes axes) {
     shape.allow_keys({"size", "centre"});
     const Node size_node = shape.require("size");
     const glm::dvec3 size = number_or_vector(size_node);
     for (int i = 0; i < 3; ++i)
         if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
             size_node.fail("each side must be 1e-6 to 1e9 mm");
-    return cuboid(centre_of(shape), size);
+    return cuboid(centre_of(shape), up_of(axes), size);
 }
 
 TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
@@ -333,7 +459,7 @@ TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
     for (const double side : size)
         if (!(side >= 1e-6 && side <= coordinate_limit_mm))
             size_node.fail("each side must be 1e-6 to 1e9 mm");
-    const glm::dvec3 up = axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+    const glm::dvec3 up = up_of(axes);
     glm::dvec3 normal = up;
     if (const auto node = shape.find("normal")) {
         normal = vector_of(*node);
@@ -398,15 +524,18 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
 
 class SceneLoader {
 public:
-    SceneLoader(const Node &root, const LoadCallbacks &callbacks) : root_(root), callbacks_(callbacks) {}
+    SceneLoader(const Node &root, const LoadCallbacks &callbacks)
+        : root_(root), callbacks_(callbacks), textures_(builder_, callbacks) {}
 
     ArenaBuilder load() {
         root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
-                          "materials", "lights", "objects"});
+                          "environment", "materials", "lights", "objects"});
         builder_.settings = settings_of(root_);
+        if (const auto environment = root_.find("environment"))
+            builder_.environment = environment_of(*environment, builder_.settings.axes, textures_);
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
-            if (!materials_.emplace(name, builder_.add_material(material_of(node))).second)
+            if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_))).second)
                 node.fail("the material stands here twice; keep one of them");
         }
         if (const auto lights = root_.find("lights"))
@@ -420,15 +549,22 @@ public:
 
 private:
     void add_object(const Node &node, std::size_t index, std::size_t count) {
-        node.allow_keys({"name", "mesh", "smooth", "sphere", "cuboid", "plane", "transform", "material", "role"});
+        node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "sphere", "cuboid", "plane", "transform",
+                         "motion", "material", "role"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
         if (const auto smooth = node.find("smooth"); smooth && shape_key != "mesh")
             smooth->fail("belongs to a mesh only");
+        if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
+            animation->fail("belongs to a gltf only; other objects may have a 'motion'");
         const std::string name = name_of(node, shape_key + " " + std::to_string(index));
-        const std::uint32_t material = material_index(node.require("material"));
+        const auto material_node = shape_key == "gltf" ? node.find("material") : node.require("material");
+        std::optional<std::uint32_t> material;
+        if (material_node)
+            material = material_index(*material_node);
         const arhost_role role = role_of(node);
         const Transform world_from_object = transform_of(node);
+        const std::uint32_t carrier = carrier_of(node, shape_key == "sphere");
 
         LoadCallbacks part = callbacks_; // its progress is a part of the whole scene's
         if (callbacks_.progress)
@@ -436,20 +572,72 @@ private:
                 callbacks_.progress(
                     (static_cast<double>(index) + std::max(fraction, 0.0)) / static_cast<double>(count), what);
             };
-        builder_.add_object(name, add_geometry(node, shape_key, shape, world_from_object, part), material, role);
+        if (shape_key == "gltf") {
+            // A glTF file is y-up by its definition, so it is put upright first.
+            const Transform upright =
+                builder_.settings.axes == ARHOST_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
+            add_gltf_file(node, shape, {name, world_from_object * upright, carrier, role, material, {}}, part);
+        } else {
+            const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
+            const bool moves = carrier != ARHOST_NONE;
+            builder_.add_object(name, geometry, *material, role, glm::mat4x3(1),
+                                {moves, false, carrier, ARHOST_NONE});
+        }
         Watch(part, name).report(1);
+    }
+
+    // The node of an object's motion.
+    std::uint32_t carrier_of(const Node &object, bool is_sphere) {
+        const auto motion = object.find("motion");
+        if (!motion)
+            return ARHOST_NONE;
+        Way way = way_of(*motion, is_sphere);
+        const std::uint32_t node = builder_.add_node(std::move(way.node));
+        for (Channel &channel : way.channels) {
+            channel.node = node;
+            builder_.settings.duration_s = std::max(builder_.settings.duration_s, channel.times.back());
+            builder_.add_channel(std::move(channel));
+        }
+        return node;
+    }
+
+    void add_gltf_file(const Node &object, const Node &path, GltfPlacement placement,
+                       const LoadCallbacks &callbacks) {
+        const auto animation = object.find("animation");
+        if (animation)
+            placement.animation = animation->text();
+        try {
+            const float duration = add_gltf(builder_, textures_, path.input_path(), placement, callbacks);
+            builder_.settings.duration_s = std::max(builder_.settings.duration_s, duration);
+        } catch (const AnimationError &error) {
+            animation->fail(error.what());
+        } catch (const MeshError &error) {
+            path.fail(error.what());
+        } catch (const ImageError &error) {
+            path.fail(error.what());
+        }
+    }
+
+    // Textures lie on texture coordinates.
+    void check_texcoords(const Node &shape, std::uint32_t material_index, bool has_texcoords) const {
+        const arhost_material &material = builder_.material(material_index);
+        for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
+                                            material.normal_texture, material.emission_texture})
+            if (texture != ARHOST_NONE && !has_texcoords)
+                shape.fail("has no texture coordinates, so its material can't have textures; give it another "
+                           "material, or a mesh with texture coordinates");
     }
 
     static std::string shape_key_of(const Node &node) {
         std::string found;
-        for (const char *key : {"mesh", "sphere", "cuboid", "plane"})
+        for (const char *key : {"mesh", "gltf", "sphere", "cuboid", "plane"})
             if (const auto shape = node.find(key)) {
                 if (!found.empty())
                     shape->fail("the object has a " + found + " already; make two objects of them");
                 found = key;
             }
         if (found.empty())
-            node.fail("needs one of mesh, sphere, cuboid and plane");
+            node.fail("needs one of mesh, gltf, sphere, cuboid and plane");
         return found;
     }
 
@@ -477,17 +665,23 @@ private:
     }
 
     std::uint32_t add_geometry(const Node &node, const std::string &key, const Node &shape,
-                               const Transform &world_from_object, const LoadCallbacks &callbacks) {
-        if (key == "mesh")
-            return builder_.add_triangles(mesh_of(node, shape, world_from_object, callbacks));
+                               const Transform &world_from_object, std::uint32_t material,
+                               const LoadCallbacks &callbacks) {
+        if (key == "mesh") {
+            TriangleMesh mesh = mesh_of(node, shape, world_from_object, callbacks);
+            check_texcoords(shape, material, !mesh.texcoords.empty());
+            return builder_.add_triangles(std::move(mesh));
+        }
         if (key == "sphere") {
+            check_texcoords(shape, material, false);
             const Spheres spheres = {sphere_of(node, shape, world_from_object)};
             check_extent(shape, spheres);
             if (!(spheres[0].w > 0))
                 shape.fail("its radius vanishes after its transform");
             return builder_.add_spheres(spheres);
         }
-        TriangleMesh mesh = key == "cuboid" ? cuboid_of(shape) : plane_of(shape, builder_.settings.axes);
+        TriangleMesh mesh =
+            key == "cuboid" ? cuboid_of(shape, builder_.settings.axes) : plane_of(shape, builder_.settings.axes);
         world_from_object.apply(mesh);
         check_extent(shape, mesh.positions);
         return builder_.add_triangles(std::move(mesh));
@@ -496,6 +690,7 @@ private:
     const Node &root_;
     const LoadCallbacks &callbacks_;
     ArenaBuilder builder_;
+    Textures textures_;
     std::map<std::string, std::uint32_t> materials_;
 };
 

@@ -74,26 +74,6 @@ glm::vec3 unit(const glm::dvec3 &v) {
     return length > 0 && std::isfinite(length) ? glm::vec3(v / length) : glm::vec3(0);
 }
 
-void settle_normals(TriangleMesh &mesh, std::optional<bool> smooth) {
-    if (smooth == false)
-        mesh.normals.clear();
-    if (mesh.normals.empty() && smooth != true)
-        return;
-    bool all_there = !mesh.normals.empty();
-    for (glm::vec3 &normal : mesh.normals) {
-        normal = unit(normal);
-        all_there &= normal != glm::vec3(0);
-    }
-    if (all_there)
-        return;
-    // None, or some of length 0.
-    std::vector<glm::vec3> computed = smooth_normals(mesh);
-    for (std::size_t i = 0; i < mesh.normals.size(); ++i)
-        if (mesh.normals[i] != glm::vec3(0))
-            computed[i] = mesh.normals[i];
-    mesh.normals = std::move(computed);
-}
-
 } // namespace
 
 std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh) {
@@ -114,6 +94,26 @@ std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh) {
     return normals;
 }
 
+void settle_normals(TriangleMesh &mesh, std::optional<bool> smooth) {
+    if (smooth == false)
+        mesh.normals.clear();
+    if (mesh.normals.empty() && smooth != true)
+        return;
+    bool all_there = !mesh.normals.empty();
+    for (glm::vec3 &normal : mesh.normals) {
+        normal = unit(normal);
+        all_there &= normal != glm::vec3(0);
+    }
+    if (all_there)
+        return;
+    // None, or some of length 0.
+    std::vector<glm::vec3> computed = smooth_normals(mesh);
+    for (std::size_t i = 0; i < mesh.normals.size(); ++i)
+        if (mesh.normals[i] != glm::vec3(0))
+            computed[i] = mesh.normals[i];
+    mesh.normals = std::move(computed);
+}
+
 TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &options,
                        const LoadCallbacks &callbacks) {
     const Kind kind = kind_of(file);
@@ -124,6 +124,8 @@ TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &opt
         refuse_foreign_content(text, kind);
         mesh = kind == Kind::Obj ? parse_obj(text, watch) : parse_ply(text, watch);
     }
+    for (glm::vec2 &texcoord : mesh.texcoords) // these files count from the texture's bottom
+        texcoord.y = 1 - texcoord.y;
     settle_normals(mesh, options.smooth);
     return mesh;
 }

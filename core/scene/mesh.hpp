@@ -28,7 +28,8 @@ struct MeshOptions {
     std::uint64_t byte_limit = std::uint64_t(4) << 30;
 };
 
-// Vertices are as in the file, normals of unit length, polygons cut into triangles. At least one triangle.
+// Vertices are as in the file, texcoords those of arhost/scene.h, normals of unit length, polygons cut into
+// triangles. At least one triangle.
 TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &options = {},
                        const LoadCallbacks &callbacks = {});
 

@@ -110,6 +110,9 @@ inline bool read_integer(const char *&p, const char *end, std::int64_t &value) {
     return true;
 }
 
+// Makes normals as MeshOptions::smooth says, each of unit length.
+void settle_normals(TriangleMesh &mesh, std::optional<bool> smooth);
+
 TriangleMesh parse_obj(MeshText &text, const Watch &watch);
 TriangleMesh parse_ply(MeshText &text, const Watch &watch);
 

@@ -39,6 +39,12 @@ std::optional<double> Transform::uniform_scale() const {
     return std::sqrt(scale_squared);
 }
 
+glm::dmat4 Transform::matrix() const {
+    glm::dmat4 matrix(linear_);
+    matrix[3] = glm::dvec4(offset_, 1);
+    return matrix;
+}
+
 void Transform::apply(TriangleMesh &mesh) const {
     for (glm::vec3 &position : mesh.positions)
         position = (*this)(position);
@@ -50,16 +56,6 @@ void Transform::apply(TriangleMesh &mesh) const {
             std::swap(triangle.y, triangle.z);
 }
 
-TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &size) {
-    TriangleMesh mesh;
-    for (int corner = 0; corner < 8; ++corner)
-        mesh.positions.emplace_back(
-            centre + size * glm::dvec3(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5));
-    mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                      {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
-    return mesh;
-}
-
 TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &normal, const glm::dvec3 &up,
                        const glm::dvec2 &size) {
     glm::dvec3 across = glm::cross(up, normal);
@@ -68,7 +64,29 @@ TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &normal, const
     const glm::dvec3 u = across * (size.x / 2), v = along * (size.y / 2);
     TriangleMesh mesh;
     mesh.positions = {centre - u - v, centre + u - v, centre + u + v, centre - u + v};
+    mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return mesh;
+}
+
+TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::dvec3 &size) {
+    TriangleMesh mesh;
+    for (int axis = 0; axis < 3; ++axis)
+        for (const double side : {-0.5, 0.5}) {
+            glm::dvec3 normal(0), middle(centre);
+            normal[axis] = side * 2;
+            middle[axis] += side * size[axis];
+            // The face's own width and height, by the axes that they go along.
+            const bool level = glm::dot(up, normal) != 0;
+            const int along = level ? 3 - axis : up.z != 0 ? 2 : 1, across = 3 - axis - along;
+            const glm::dvec2 extent = level ? glm::dvec2(size.x, size[along]) : glm::dvec2(size[across], size[along]);
+            const TriangleMesh face = rectangle(middle, normal, up, extent);
+            const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+            mesh.positions.insert(mesh.positions.end(), face.positions.begin(), face.positions.end());
+            mesh.texcoords.insert(mesh.texcoords.end(), face.texcoords.begin(), face.texcoords.end());
+            for (const glm::uvec3 &triangle : face.triangles)
+                mesh.triangles.push_back(triangle + first);
+        }
     return mesh;
 }
 

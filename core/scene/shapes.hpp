@@ -7,6 +7,7 @@
 #include "scene/arena.hpp"
 
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
 #include <optional>
@@ -20,10 +21,12 @@ public:
     static Transform translation(const glm::dvec3 &by) { return {glm::dmat3(1), by}; }
     static Transform scaling(const glm::dvec3 &factors);
     static Transform rotation(const glm::dvec3 &unit_axis, double degrees); // right-handed
+    static Transform of(const glm::dmat4 &matrix) { return {glm::dmat3(matrix), glm::dvec3(matrix[3])}; }
 
     friend Transform operator*(const Transform &b, const Transform &a) {
         return {b.linear_ * a.linear_, b.linear_ * a.offset_ + b.offset_};
     }
+    glm::dmat4 matrix() const;
     glm::dvec3 operator()(const glm::dvec3 &point) const { return linear_ * point + offset_; }
 
     // The factor of all lengths, or nothing where it differs by direction.
@@ -39,13 +42,13 @@ private:
     glm::dvec3 offset_{0};
 };
 
-// 12 triangles, counter-clockwise seen from outside.
-TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &size);
-
 // 2 triangles, counter-clockwise seen from where `normal` points to. The first side is level, the second
 // goes as far `up` as the rectangle allows. Where it lies flat, they go along x and along y (z-up) or −z
 // (y-up).
 TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &unit_normal, const glm::dvec3 &up,
                        const glm::dvec2 &size);
+
+// Six such rectangles that look outwards. A texture is seen whole and upright on each.
+TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::dvec3 &size);
 
 } // namespace arhost::scene

@@ -2,8 +2,10 @@
 #include "worker/services.hpp"
 
 #include "pixels/grey.hpp"
+#include "scene/motion.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace arhost::worker {
 namespace {
@@ -148,6 +150,8 @@ public:
         setup.height = height_ = json.at("height").get<std::uint32_t>();
         setup.scene = &arena_.as<arhost_scene>();
         setup.intrinsics = &intrinsics;
+        if (setup.scene->duration_s > 0)
+            motion_.emplace(*setup.scene);
         return raytracer_.start(instance_, &setup);
     }
 
@@ -166,6 +170,11 @@ public:
         request.sequence = command.sequence;
         request.time_s = command.time_s;
         request.camera = command.camera;
+        arhost_motion motion{};
+        if (motion_) {
+            motion = motion_->at(command.time_s);
+            request.motion = &motion;
+        }
         result.render.struct_size = sizeof result.render;
         return raytracer_.render(instance_, &request, &image, &result.render);
     }
@@ -176,6 +185,7 @@ private:
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
     Mapping arena_;
+    std::optional<scene::MotionEvaluator> motion_; // where things move
     std::uint32_t width_ = 0, height_ = 0;
 };
 

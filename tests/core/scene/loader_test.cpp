@@ -282,6 +282,32 @@ TEST(Shapes, PlanesLieFlatWhereverUpIs) {
     EXPECT_THAT(arena.scene().bounds_min, ElementsAre(-2, 0, -1));
 }
 
+// Seen from outside, a face's texture stands upright: right is where u grows, up where v falls.
+TEST(Shapes, FacesShowTheirTextureWholeAndUpright) {
+    for (const std::string axes : {"z-up", "y-up"}) {
+        const Arena arena = load("version: 1\naxes: " + axes + "\nmaterials: {a: {model: mirror}}\nobjects:\n" +
+                                 "  - {cuboid: {size: [2, 4, 6]}, material: a}\n");
+        const glm::vec3 up = axes == "z-up" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
+        const auto *texcoords = at<glm::vec2>(arena, geometry(arena).texcoords);
+        for (std::size_t i = 0; i < 12; ++i) {
+            const glm::uvec3 t = at<glm::uvec3>(arena, geometry(arena).indices)[i];
+            // p = u · across + v · down, of the triangle's sides
+            const glm::vec3 a = position(arena, t.y) - position(arena, t.x),
+                            b = position(arena, t.z) - position(arena, t.x);
+            const glm::vec2 ta = texcoords[t.y] - texcoords[t.x], tb = texcoords[t.z] - texcoords[t.x];
+            const float area = ta.x * tb.y - ta.y * tb.x;
+            EXPECT_FLOAT_EQ(std::abs(area), 1);
+            const glm::vec3 across = (a * tb.y - b * ta.y) / area, down = (b * ta.x - a * tb.x) / area;
+            const glm::vec3 outside = facing(arena, i);
+            expect_near(glm::normalize(glm::cross(across, -down)), outside);
+            if (std::abs(glm::dot(outside, up)) < 0.5f)
+                expect_near(glm::normalize(-down), up);
+            else
+                expect_near(glm::normalize(across), {1, 0, 0});
+        }
+    }
+}
+
 TEST(Transforms, AreAppliedOneAfterTheOther) {
     // The seed's T·S·R: (1, 0, 0) → rotated (0, 1, 0) → scaled (0, 3, 0) → moved (10, 3, 0)
     const Arena arena = load_with_mesh(triangle_with_normals,
@@ -366,7 +392,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2], intensity: -1}\n"),
               "s.yaml:6:38: lights[0].intensity: must be 0 to 1e12");
     EXPECT_EQ(error_of(start + "objects:\n  - {material: grey}\n"),
-              "s.yaml:6:5: objects[0]: needs one of mesh, sphere, cuboid and plane");
+              "s.yaml:6:5: objects[0]: needs one of mesh, gltf, sphere, cuboid and plane");
     EXPECT_EQ(error_of(ball + ", cuboid: {size: 1}}\n"),
               "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; make two objects of them");
     EXPECT_EQ(error_of(ball + "y}\n"),

@@ -150,9 +150,10 @@ TEST(Obj, KeepsTexcoordsAndGivesZeroToCornersWithout) {
     const TriangleMesh mesh =
         load_text("a.obj", three_vertices + "vt 0.25 0.5\nvt 1\nf 1 2 3\nf 1/1 2/2 3/-1\n").mesh;
     ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
-    EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0));
+    // v counts from the texture's top in the arena, from its bottom in these files.
+    EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0, 1));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].x], glm::vec2(0.25f, 0.5f));
-    EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 0));
+    EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 1));
 }
 
 TEST(Obj, PassesOverNormalsThatOnlySomeFacesHave) {
@@ -254,7 +255,7 @@ TEST(Ply, ReadsAscii) {
     EXPECT_THAT(mesh.positions,
                 ElementsAre(glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(1, 1, 0), glm::vec3(0, 1, 0)));
     EXPECT_THAT(mesh.normals, testing::Each(glm::vec3(0, 0, 1)));
-    EXPECT_THAT(mesh.texcoords, ElementsAre(glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1), glm::vec2(0, 1)));
+    EXPECT_THAT(mesh.texcoords, ElementsAre(glm::vec2(0, 1), glm::vec2(1, 1), glm::vec2(1, 0), glm::vec2(0, 0)));
     EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(0, 2, 3)));
 }
 

@@ -3,6 +3,7 @@
 
 #include "scene/arena.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -36,6 +37,64 @@ inline ArenaBuilder small_scene() {
     const std::uint32_t material = builder.add_material(grey());
     builder.add_object("square", builder.add_triangles(square()), material);
     builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), material, ARHOST_CATCHER);
+    builder.add_light(lamp());
+    return builder;
+}
+
+// A texture of one colour.
+inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, std::uint32_t height) {
+    Texture texture{format, width, height, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, {}};
+    if (format == ARHOST_TEXEL_RGBA32F) {
+        texture.texels = Texels::of_size(std::size_t(width) * height * 16);
+        std::ranges::fill(std::span(reinterpret_cast<float *>(texture.texels.bytes.get()), 4 * width * height), 0.5f);
+    } else {
+        texture.texels = Texels::of_size(std::size_t(width) * height * 4);
+        std::ranges::fill(texture.texels.span(), std::byte(200));
+    }
+    return texture;
+}
+
+// The square of two joints, the left side with joint 0, the right one with joint 1, and a morph target that
+// lifts it by 1.
+inline TriangleMesh bending_square() {
+    TriangleMesh mesh = square();
+    mesh.joints = {{0, 0, 0, 0}, {1, 0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0}};
+    mesh.weights.assign(4, glm::vec4(1, 0, 0, 0));
+    mesh.morph_positions.assign(4, glm::vec3(0, 0, 1));
+    mesh.morph_normals.assign(4, glm::vec3(0));
+    return mesh;
+}
+
+// Everything that an arena can hold. Objects: 0 'square', textured; 1 'ball', moves with node 0; 2 'bend',
+// deforms by skin 0 of the nodes 0 and 1. Textures: 0 bytes, 1 floats, of the environment. Channels: a
+// translation, a rotation and a scale of node 0, weights of node 2.
+inline ArenaBuilder full_scene() {
+    ArenaBuilder builder;
+    builder.settings.duration_s = 2;
+    arhost_material textured = make_material(ARHOST_METALLIC_ROUGHNESS);
+    textured.colour_texture = builder.add_texture("wood.png", plain_texture(ARHOST_TEXEL_SRGB8, 2, 3));
+    builder.environment.texture = builder.add_texture("sky.hdr", plain_texture(ARHOST_TEXEL_RGBA32F, 2, 2));
+    builder.environment.rows = {0.5f, 1};
+    builder.environment.columns = {0.5f, 1, 0.25f, 1};
+    const std::uint32_t material = builder.add_material(textured), plain = builder.add_material(grey());
+    MotionNode moving;
+    moving.animated = true;
+    MotionNode child;
+    child.parent = builder.add_node(moving);
+    MotionNode weighed;
+    weighed.morph_weights = {0};
+    builder.add_node(child);
+    builder.add_node(weighed);
+    builder.add_channel({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 2}, {0, 0, 0, 10, 0, 0}});
+    builder.add_channel({0, ARHOST_CHANNEL_ROTATION, ARHOST_INTERPOLATION_STEP, {0, 1}, {0, 0, 0, 1, 0, 0, 1, 0}});
+    builder.add_channel({0, ARHOST_CHANNEL_SCALE, ARHOST_INTERPOLATION_LINEAR, {0}, {1, 1, 1}});
+    builder.add_channel({2, ARHOST_CHANNEL_MORPH_WEIGHTS, ARHOST_INTERPOLATION_CUBIC, {0, 2}, {0, 0, 0, 0, 1, 0}});
+    const std::uint32_t skin = builder.add_skin({{0, 1}, {glm::mat4x3(1), glm::mat4x3(1)}});
+    builder.add_object("square", builder.add_triangles(square()), material);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), plain, ARHOST_CATCHER, glm::mat4x3(1),
+                       {true, false, 0, ARHOST_NONE});
+    builder.add_object("bend", builder.add_triangles(bending_square()), plain, ARHOST_VIRTUAL, glm::mat4x3(1),
+                       {false, true, 2, skin});
     builder.add_light(lamp());
     return builder;
 }

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Boxes round geometries. Private to core/scene.
+#pragma once
+
+#include "scene/arena.hpp"
+
+#include <glm/common.hpp>
+
+#include <array>
+#include <limits>
+#include <span>
+
+namespace arhost::scene {
+
+struct Box {
+    glm::vec3 min{std::numeric_limits<float>::max()}, max{-std::numeric_limits<float>::max()};
+
+    void include(const glm::vec3 &point) {
+        for (int i = 0; i < 3; ++i) {
+            min[i] = point[i] < min[i] ? point[i] : min[i];
+            max[i] = point[i] > max[i] ? point[i] : max[i];
+        }
+    }
+    void include(const Box &box) {
+        include(box.min);
+        include(box.max);
+    }
+};
+
+// Lane by lane over blocks of four points, which compilers turn into SIMD; one minimum after the other
+// would wait for itself.
+inline Box box_of(std::span<const glm::vec3> points) {
+    constexpr std::size_t lanes = 12;
+    std::array<float, lanes> low, high;
+    low.fill(Box{}.min.x);
+    high.fill(Box{}.max.x);
+    std::size_t i = 0;
+    for (; i + 4 <= points.size(); i += 4) {
+        const float *values = &points[i].x;
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            low[lane] = values[lane] < low[lane] ? values[lane] : low[lane];
+            high[lane] = values[lane] > high[lane] ? values[lane] : high[lane];
+        }
+    }
+    Box box;
+    for (std::size_t lane = 0; lane < lanes; lane += 3) {
+        box.min = glm::min(box.min, glm::vec3(low[lane], low[lane + 1], low[lane + 2]));
+        box.max = glm::max(box.max, glm::vec3(high[lane], high[lane + 1], high[lane + 2]));
+    }
+    for (; i < points.size(); ++i)
+        box.include(points[i]);
+    return box;
+}
+
+inline Box box_of(std::span<const glm::vec4> spheres) {
+    Box box;
+    for (const glm::vec4 &sphere : spheres) {
+        box.include(glm::vec3(sphere) - sphere.w);
+        box.include(glm::vec3(sphere) + sphere.w);
+    }
+    return box;
+}
+
+// The box round a transformed box: exact for the identity, a little wide for rotations.
+inline Box transformed(const float *world_from_object, const Box &box) {
+    const float *m = world_from_object;
+    Box world;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::vec3 p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                          corner & 4 ? box.max.z : box.min.z);
+        world.include(glm::vec3(m[0] * p.x + m[3] * p.y + m[6] * p.z + m[9],
+                                m[1] * p.x + m[4] * p.y + m[7] * p.z + m[10],
+                                m[2] * p.x + m[5] * p.y + m[8] * p.z + m[11]));
+    }
+    return world;
+}
+
+} // namespace arhost::scene

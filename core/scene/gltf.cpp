@@ -1,0 +1,886 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/gltf.hpp"
+
+#include "scene/box.hpp"
+#include "scene/mesh_text.hpp"
+#include "scene/motion.hpp"
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <map>
+
+namespace arhost::scene {
+namespace {
+
+constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // of a .gltf, a .glb, and each buffer beside it
+constexpr std::size_t empty_accessor_limit = 10'000'000;     // elements that stand in no buffer: zeros
+constexpr double least_scale = 1e-6;                         // scales of 0 hide things, but have no inverse
+// Extensions that a file may require though we pass over them, or that need nothing of us.
+constexpr std::string_view harmless_extensions[] = {"KHR_mesh_quantization", "KHR_texture_transform",
+                                                    "KHR_lights_punctual"};
+
+// Images are decoded when a material asks for them.
+bool keep_image_bytes(tinygltf::Image *image, int, std::string *, std::string *, int, int, const unsigned char *bytes,
+                      int size, void *) {
+    image->image.assign(bytes, bytes + size);
+    return true;
+}
+
+bool is_file(const std::string &file, void *) { // a FIFO would be waited for
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(file, ignored);
+}
+
+bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *) {
+    std::error_code ignored;
+    if (is_file(file, nullptr) && std::filesystem::file_size(file, ignored) <= file_limit)
+        return tinygltf::ReadWholeFile(content, error, file, nullptr);
+    *error += file + ": is not a regular file, or has more than 4 GiB";
+    return false;
+}
+
+tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
+    const MeshText text = MeshText::read(file, file_limit - 1, watch);
+    tinygltf::TinyGLTF parser;
+    parser.SetImageLoader(keep_image_bytes, nullptr);
+    parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, nullptr});
+    tinygltf::Model model;
+    std::string error, warning;
+    const std::string folder = file.parent_path().string();
+    const auto size = static_cast<unsigned int>(text.view().size());
+    const bool good =
+        text.view().starts_with("glTF")
+            ? parser.LoadBinaryFromMemory(&model, &error, &warning,
+                                          reinterpret_cast<const unsigned char *>(text.begin()), size, folder)
+            : parser.LoadASCIIFromString(&model, &error, &warning, text.begin(), size, folder);
+    const auto in_a_line = [](std::string lines) {
+        while (!lines.empty() && lines.back() == '\n')
+            lines.pop_back();
+        for (char &c : lines)
+            if (static_cast<unsigned char>(c) < 0x20)
+                c = ' ';
+        return lines.substr(0, 500);
+    };
+    if (!good)
+        text.fail("is not a glTF 2.0 file that can be loaded: " + in_a_line(error));
+    if (!warning.empty())
+        watch.info(text.name() + ": " + in_a_line(warning));
+    return model;
+}
+
+template <class T> T component(const unsigned char *from) {
+    T value;
+    std::memcpy(&value, from, sizeof value);
+    return value;
+}
+
+// What accessors of the file point to, each byte of it looked for before it is read.
+class Accessors {
+public:
+    Accessors(const tinygltf::Model &model, const std::string &name) : model_(model), name_(name) {}
+
+    [[noreturn]] void fail(const std::string &message) const { throw MeshError(name_ + ": " + message); }
+
+    template <class T> const T &at(const std::vector<T> &table, int index, const char *what) const {
+        if (index < 0 || static_cast<std::size_t>(index) >= table.size())
+            fail("names " + std::string(what) + " " + std::to_string(index) + ", but there are " +
+                 std::to_string(table.size()));
+        return table[static_cast<std::size_t>(index)];
+    }
+
+    std::size_t count(int index) const { return at(model_.accessors, index, "accessor").count; }
+
+    // All components in a row, as numbers; integers that are marked so are made 0 to 1 or −1 to 1.
+    template <class T> std::vector<T> read(int index, int type, const char *what) const {
+        const tinygltf::Accessor &accessor = at(model_.accessors, index, "accessor");
+        const std::string name = std::string(what) + " (accessor " + std::to_string(index) + ")";
+        if (accessor.type != type)
+            fail(name + " has elements of a wrong type");
+        const auto width =
+            static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
+        const std::size_t size = size_of(accessor.componentType, name);
+        if (accessor.count > ARHOST_NONE || (accessor.bufferView < 0 && accessor.count > empty_accessor_limit))
+            fail(name + " has too many elements");
+        std::vector<T> values;
+        if (accessor.bufferView >= 0) {
+            const std::size_t own_stride = at(model_.bufferViews, accessor.bufferView, "buffer view").byteStride;
+            const std::size_t stride = own_stride ? own_stride : size * width;
+            if (stride < size * width || stride > 4096)
+                fail(name + " has the byte stride " + std::to_string(stride));
+            const std::size_t length = accessor.count == 0 ? 0 : (accessor.count - 1) * stride + size * width;
+            const unsigned char *from = bytes(accessor.bufferView, accessor.byteOffset, length, name);
+            values.resize(accessor.count * width); // not before it is known that as many bytes are there
+            for (std::size_t i = 0; i < accessor.count; ++i)
+                convert<T>(from + i * stride, accessor, width, &values[i * width]);
+        } else {
+            values.resize(accessor.count * width);
+        }
+        if (accessor.sparse.isSparse)
+            overlay(accessor, width, size, name, values);
+        return values;
+    }
+
+private:
+    std::size_t size_of(int component_type, const std::string &name) const {
+        if (component_type == TINYGLTF_COMPONENT_TYPE_DOUBLE)
+            fail(name + " has numbers of double precision, which glTF does not know");
+        const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(component_type));
+        if (size <= 0)
+            fail(name + " has numbers of an unknown type");
+        return static_cast<std::size_t>(size);
+    }
+
+    const unsigned char *bytes(int view_index, std::size_t offset, std::size_t length,
+                               const std::string &name) const {
+        const tinygltf::BufferView &view = at(model_.bufferViews, view_index, "buffer view");
+        const auto &data = at(model_.buffers, view.buffer, "buffer").data;
+        if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset ||
+            offset > view.byteLength || length > view.byteLength - offset)
+            fail(name + " reaches past the end of its buffer");
+        return data.data() + view.byteOffset + offset;
+    }
+
+    template <class T>
+    static void convert(const unsigned char *from, const tinygltf::Accessor &accessor, std::size_t width, T *to) {
+        for (std::size_t i = 0; i < width; ++i)
+            switch (accessor.componentType) {
+            case TINYGLTF_COMPONENT_TYPE_FLOAT:
+                to[i] = static_cast<T>(component<float>(from + 4 * i));
+                break;
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+                to[i] = static_cast<T>(component<std::uint32_t>(from + 4 * i));
+                break;
+            case TINYGLTF_COMPONENT_TYPE_INT:
+                to[i] = static_cast<T>(component<std::int32_t>(from + 4 * i));
+                break;
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+                to[i] = scaled<T>(component<std::uint16_t>(from + 2 * i), 65535, accessor.normalized);
+                break;
+            case TINYGLTF_COMPONENT_TYPE_SHORT:
+                to[i] = scaled<T>(component<std::int16_t>(from + 2 * i), 32767, accessor.normalized);
+                break;
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+                to[i] = scaled<T>(component<std::uint8_t>(from + i), 255, accessor.normalized);
+                break;
+            default:
+                to[i] = scaled<T>(component<std::int8_t>(from + i), 127, accessor.normalized);
+            }
+    }
+
+    template <class T> static T scaled(int value, int one, bool normalized) {
+        if (!normalized)
+            return static_cast<T>(value);
+        return static_cast<T>(std::max(static_cast<float>(value) / static_cast<float>(one), -1.f));
+    }
+
+    template <class T>
+    void overlay(const tinygltf::Accessor &accessor, std::size_t width, std::size_t size, const std::string &name,
+                 std::vector<T> &values) const {
+        const auto &sparse = accessor.sparse;
+        const int type = sparse.indices.componentType;
+        if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 ||
+            (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+             type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT))
+            fail(name + " is sparse in a wrong way");
+        const auto count = static_cast<std::size_t>(sparse.count);
+        const std::size_t index_size = size_of(type, name);
+        const unsigned char *indices = bytes(
+            sparse.indices.bufferView, static_cast<std::size_t>(sparse.indices.byteOffset), count * index_size, name);
+        const unsigned char *from = bytes(
+            sparse.values.bufferView, static_cast<std::size_t>(sparse.values.byteOffset), count * size * width, name);
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t index = index_size == 1   ? indices[i]
+                                      : index_size == 2 ? component<std::uint16_t>(indices + 2 * i)
+                                                        : component<std::uint32_t>(indices + 4 * i);
+            if (index >= accessor.count)
+                fail(name + " is sparse, and an index lies outside");
+            convert<T>(from + i * size * width, accessor, width, &values[index * width]);
+        }
+    }
+
+    const tinygltf::Model &model_;
+    const std::string &name_;
+};
+
+template <class Vector> std::vector<Vector> vectors(const std::vector<float> &floats) {
+    std::vector<Vector> result(floats.size() / Vector::length());
+    if (!result.empty())
+        std::memcpy(static_cast<void *>(result.data()), floats.data(), result.size() * sizeof(Vector));
+    return result;
+}
+
+std::string printable(std::string text) {
+    for (char &c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            c = '?';
+    return text.substr(0, 200);
+}
+
+class GltfLoader {
+public:
+    GltfLoader(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
+               const GltfPlacement &placement, const LoadCallbacks &callbacks)
+        : builder_(builder), textures_(textures), file_(file), name_(file.string()), placement_(placement),
+          watch_(callbacks, file.filename().string()), model_(parse(file, watch_)), accessors_(model_, name_) {}
+
+    float load() {
+        check_extensions();
+        order_nodes();
+        choose_animation();
+        for (std::size_t i = 0; i < order_.size(); ++i) {
+            add_parts(i);
+            watch_.report(static_cast<double>(i) / static_cast<double>(order_.size()));
+        }
+        if (parts_.empty())
+            accessors_.fail("there are no triangles in its default scene");
+        settle_deformations();
+        if (animation_)
+            add_motion();
+        for (Part &part : parts_)
+            add_object(part);
+        tell();
+        return animation_ ? duration_s_ : 0;
+    }
+
+private:
+    struct Place {
+        int node;                           // in the file
+        std::uint32_t parent = ARHOST_NONE; // a place
+        glm::dmat4 from_place{1};           // at rest, into the space of placement_.node
+        bool has_channel = false;           // its translation, rotation or scale
+        bool moves = false;                 // it, or one above it
+        bool has_weights_channel = false;
+        std::vector<float> morph_weights;
+    };
+
+    struct Part {
+        TriangleMesh mesh;
+        std::uint32_t material, place;
+        int skin;
+        std::string name;
+        bool deforms = false;
+    };
+
+    void check_extensions() const {
+        std::string passed_over;
+        for (const std::string &extension : model_.extensionsUsed)
+            if (extension != "KHR_mesh_quantization")
+                passed_over += (passed_over.empty() ? "" : ", ") + extension;
+        for (const std::string &extension : model_.extensionsRequired)
+            if (std::ranges::find(harmless_extensions, extension) == std::end(harmless_extensions) &&
+                !extension.starts_with("KHR_materials_"))
+                accessors_.fail("needs the extension '" + printable(extension) +
+                                "', which is not known here; export it without");
+        if (!passed_over.empty())
+            watch_.info(name_ + ": passes over the extensions " + printable(passed_over));
+    }
+
+    // ---- nodes ----
+
+    // Parents before their children.
+    void order_nodes() {
+        std::vector<std::pair<int, std::uint32_t>> open;
+        if (model_.scenes.empty()) {
+            std::vector<bool> is_child(model_.nodes.size());
+            for (const tinygltf::Node &node : model_.nodes)
+                for (const int child : node.children)
+                    if (child >= 0 && static_cast<std::size_t>(child) < is_child.size())
+                        is_child[static_cast<std::size_t>(child)] = true;
+            for (std::size_t i = model_.nodes.size(); i-- > 0;)
+                if (!is_child[i])
+                    open.emplace_back(static_cast<int>(i), ARHOST_NONE);
+        } else {
+            const tinygltf::Scene &scene = accessors_.at(model_.scenes, std::max(model_.defaultScene, 0), "scene");
+            for (auto node = scene.nodes.rbegin(); node != scene.nodes.rend(); ++node)
+                open.emplace_back(*node, ARHOST_NONE);
+        }
+        place_of_.assign(model_.nodes.size(), ARHOST_NONE);
+        const glm::dmat4 root = placement_.from_gltf.matrix();
+        while (!open.empty()) {
+            const auto [index, parent] = open.back();
+            open.pop_back();
+            const tinygltf::Node &node = accessors_.at(model_.nodes, index, "node");
+            std::uint32_t &place = place_of_[static_cast<std::size_t>(index)];
+            if (place != ARHOST_NONE)
+                accessors_.fail("node " + std::to_string(index) + " stands in the tree of nodes twice");
+            place = static_cast<std::uint32_t>(order_.size());
+            order_.push_back({index,
+                              parent,
+                              (parent == ARHOST_NONE ? root : order_[parent].from_place) * local(index),
+                              false,
+                              false,
+                              false,
+                              {}});
+            for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
+                open.emplace_back(*child, place);
+        }
+    }
+
+    std::vector<double> numbers(const std::vector<double> &given, std::vector<double> otherwise, int index) const {
+        if (given.empty())
+            return otherwise;
+        if (given.size() != otherwise.size() ||
+            !std::ranges::all_of(given, [](double v) { return std::abs(v) <= coordinate_limit_mm; }))
+            accessors_.fail("node " + std::to_string(index) + " has a place of wrong numbers");
+        return given;
+    }
+    glm::dvec3 translation(int index) const {
+        return glm::make_vec3(
+            numbers(model_.nodes[static_cast<std::size_t>(index)].translation, {0, 0, 0}, index).data());
+    }
+    glm::dquat rotation(int index) const {
+        const auto r = numbers(model_.nodes[static_cast<std::size_t>(index)].rotation, {0, 0, 0, 1}, index);
+        const glm::dquat turn(r[3], r[0], r[1], r[2]);
+        if (!(glm::length(turn) > 1e-6))
+            accessors_.fail("node " + std::to_string(index) + " has a rotation of length 0");
+        return glm::normalize(turn);
+    }
+    glm::dvec3 scale(int index) const {
+        auto s = numbers(model_.nodes[static_cast<std::size_t>(index)].scale, {1, 1, 1}, index);
+        for (double &factor : s)
+            if (std::abs(factor) < least_scale)
+                factor = std::copysign(least_scale, factor);
+        return glm::make_vec3(s.data());
+    }
+
+    glm::dmat4 local(int index) const {
+        const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(index)];
+        if (!node.matrix.empty()) {
+            glm::dmat4 matrix = glm::make_mat4(numbers(node.matrix, std::vector<double>(16), index).data());
+            for (int column = 0; column < 4; ++column)
+                matrix[column][3] = column == 3;
+            if (!(std::abs(glm::determinant(matrix)) > 1e-18))
+                accessors_.fail("node " + std::to_string(index) + " has a matrix that can't be inverted");
+            return matrix;
+        }
+        glm::dmat4 matrix = glm::mat4_cast(rotation(index));
+        for (int i = 0; i < 3; ++i)
+            matrix[i] *= scale(index)[i];
+        matrix[3] = glm::dvec4(translation(index), 1);
+        return matrix;
+    }
+
+    // ---- animations ----
+
+    void choose_animation() {
+        std::string names;
+        for (std::size_t i = 0; i < model_.animations.size(); ++i)
+            names += (i ? ", " : "") + std::to_string(i) + " '" + printable(model_.animations[i].name) + "'";
+        if (!placement_.animation) {
+            if (!names.empty())
+                watch_.info(name_ + ": stands still; 'animation' may be one of: " + names);
+            return;
+        }
+        const std::string &wanted = *placement_.animation;
+        for (const tinygltf::Animation &animation : model_.animations)
+            if (animation.name == wanted && !animation_)
+                animation_ = &animation;
+        std::size_t number = 0;
+        const auto [end, error] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), number);
+        if (!animation_ && error == std::errc() && end == wanted.data() + wanted.size() &&
+            number < model_.animations.size())
+            animation_ = &model_.animations[number];
+        if (!animation_)
+            throw AnimationError(name_ + ": has no animation '" + printable(wanted) + "'" +
+                                 (names.empty() ? ", nor any other" : "; there are: " + names));
+        for (const tinygltf::AnimationChannel &channel : animation_->channels) {
+            if (const auto place = place_of(channel.target_node)) {
+                if (channel.target_path == "weights")
+                    order_[*place].has_weights_channel = true;
+                else if (channel.target_path == "translation" || channel.target_path == "rotation" ||
+                         channel.target_path == "scale")
+                    order_[*place].has_channel = true;
+            }
+        }
+        for (Place &place : order_) {
+            place.moves = place.has_channel || (place.parent != ARHOST_NONE && order_[place.parent].moves);
+            if (place.has_channel && !model_.nodes[static_cast<std::size_t>(place.node)].matrix.empty())
+                accessors_.fail("node " + std::to_string(place.node) + " has a matrix, so it can't be animated");
+        }
+    }
+
+    std::optional<std::uint32_t> place_of(int node) const {
+        if (node < 0 || static_cast<std::size_t>(node) >= place_of_.size() ||
+            place_of_[static_cast<std::size_t>(node)] == ARHOST_NONE)
+            return std::nullopt;
+        return place_of_[static_cast<std::size_t>(node)];
+    }
+
+    Channel channel_of(const tinygltf::AnimationChannel &from, std::uint32_t place) {
+        const tinygltf::AnimationSampler &sampler = accessors_.at(animation_->samplers, from.sampler, "sampler");
+        Channel channel;
+        channel.node = first_node_ + place;
+        channel.interpolation = sampler.interpolation == "STEP"          ? ARHOST_INTERPOLATION_STEP
+                                : sampler.interpolation == "CUBICSPLINE" ? ARHOST_INTERPOLATION_CUBIC
+                                                                         : ARHOST_INTERPOLATION_LINEAR;
+        channel.times = accessors_.read<float>(sampler.input, TINYGLTF_TYPE_SCALAR, "an animation's times");
+        const auto &times = channel.times;
+        if (times.empty() || !(times.front() >= 0 && times.back() <= duration_limit_s))
+            accessors_.fail("an animation has no keys, or times outside 0 to 1e6 s");
+        for (std::size_t i = 1; i < times.size(); ++i)
+            if (!(times[i] > times[i - 1]))
+                accessors_.fail("an animation's times don't ascend");
+        std::size_t width = 3;
+        int type = TINYGLTF_TYPE_VEC3;
+        if (from.target_path == "weights") {
+            channel.target = ARHOST_CHANNEL_MORPH_WEIGHTS;
+            width = order_[place].morph_weights.size();
+            type = TINYGLTF_TYPE_SCALAR;
+        } else if (from.target_path == "rotation") {
+            channel.target = ARHOST_CHANNEL_ROTATION;
+            width = 4;
+            type = TINYGLTF_TYPE_VEC4;
+        } else {
+            channel.target = from.target_path == "scale" ? ARHOST_CHANNEL_SCALE : ARHOST_CHANNEL_TRANSLATION;
+        }
+        channel.values = accessors_.read<float>(sampler.output, type, "an animation's values");
+        auto &values = channel.values;
+        const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
+        if (values.size() != times.size() * width * (cubic ? 3 : 1))
+            accessors_.fail("an animation has " + std::to_string(values.size()) + " numbers for " +
+                            std::to_string(times.size()) + " keys");
+        if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
+            accessors_.fail("an animation has a number beyond 1e9");
+        if (channel.target == ARHOST_CHANNEL_ROTATION)
+            for (std::size_t key = 0; key < times.size(); ++key) {
+                float *v = &values[cubic ? key * 12 + 4 : key * 4];
+                const glm::vec4 turn(v[0], v[1], v[2], v[3]);
+                if (!(glm::length(turn) > 1e-6f && glm::length(turn) < 1e6f))
+                    accessors_.fail("an animation has a rotation of length 0");
+                for (int i = 0; i < 4; ++i)
+                    v[i] = turn[i] / glm::length(turn);
+            }
+        duration_s_ = std::max(duration_s_, times.back());
+        return channel;
+    }
+
+    MotionNode node_of(const Place &place) const {
+        MotionNode node;
+        node.morph_weights = place.morph_weights;
+        node.animated = place.has_channel;
+        if (place.has_channel) {
+            const glm::dquat turn = rotation(place.node);
+            node.translation = translation(place.node);
+            node.rotation = glm::vec4(turn.x, turn.y, turn.z, turn.w);
+            node.scale = scale(place.node);
+        } else {
+            node.parent_from_node = glm::dmat4x3(local(place.node));
+        }
+        return node;
+    }
+
+    // A node for the file's space, one for each place below it, and what the animation does with them.
+    void add_motion() {
+        MotionNode root;
+        root.parent = placement_.node;
+        root.parent_from_node = glm::dmat4x3(placement_.from_gltf.matrix());
+        const std::uint32_t root_index = builder_.add_node(root);
+        first_node_ = root_index + 1;
+        for (const Place &place : order_) {
+            MotionNode node = node_of(place);
+            node.parent = place.parent == ARHOST_NONE ? root_index : first_node_ + place.parent;
+            builder_.add_node(std::move(node));
+        }
+        for (const tinygltf::AnimationChannel &channel : animation_->channels)
+            if (const auto place = place_of(channel.target_node)) {
+                const bool weights = channel.target_path == "weights";
+                if (weights ? !order_[*place].morph_weights.empty() : order_[*place].has_channel)
+                    builder_.add_channel(channel_of(channel, *place));
+            }
+        if (!(duration_s_ > 0))
+            throw AnimationError(name_ + ": the animation '" + printable(*placement_.animation) + "' has no length");
+    }
+
+    // The skin, its joints counted from `first_node`.
+    Skin skin_of(int index, std::uint32_t first_node) const {
+        const tinygltf::Skin &from = accessors_.at(model_.skins, index, "skin");
+        Skin skin;
+        for (const int joint : from.joints) {
+            const auto place = place_of(joint);
+            if (!place)
+                accessors_.fail("skin " + std::to_string(index) + " has the joint " + std::to_string(joint) +
+                                ", which is not in the default scene");
+            skin.joints.push_back(first_node + *place);
+        }
+        if (skin.joints.empty() || skin.joints.size() > 65536)
+            accessors_.fail("skin " + std::to_string(index) + " has no joints, or more than 65536");
+        skin.node_from_mesh.assign(skin.joints.size(), glm::mat4x3(1));
+        if (from.inverseBindMatrices >= 0) {
+            const auto matrices =
+                accessors_.read<float>(from.inverseBindMatrices, TINYGLTF_TYPE_MAT4, "inverse bind matrices");
+            if (matrices.size() < 16 * skin.joints.size() ||
+                !std::ranges::all_of(matrices, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
+                accessors_.fail("skin " + std::to_string(index) + " has too few matrices, or a number beyond 1e9");
+            for (std::size_t i = 0; i < skin.joints.size(); ++i)
+                skin.node_from_mesh[i] = glm::mat4x3(glm::make_mat4(&matrices[16 * i]));
+        }
+        return skin;
+    }
+
+    // ---- meshes ----
+
+    void add_parts(std::size_t place_index) {
+        Place &place = order_[place_index];
+        const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(place.node)];
+        if (node.mesh < 0)
+            return;
+        const tinygltf::Mesh &mesh = accessors_.at(model_.meshes, node.mesh, "mesh");
+        const std::size_t targets = mesh.primitives.empty() ? 0 : mesh.primitives.front().targets.size();
+        const std::vector<double> &weights = node.weights.empty() ? mesh.weights : node.weights;
+        place.morph_weights.assign(targets, 0);
+        for (std::size_t i = 0; i < std::min(targets, weights.size()); ++i)
+            if (std::abs(weights[i]) <= coordinate_limit_mm)
+                place.morph_weights[i] = static_cast<float>(weights[i]);
+        for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+            const tinygltf::Primitive &primitive = mesh.primitives[i];
+            if (primitive.targets.size() != targets)
+                accessors_.fail("the parts of mesh " + std::to_string(node.mesh) +
+                                " have different numbers of morph targets");
+            const std::string &own_name = node.name.empty() ? mesh.name : node.name;
+            Part part{mesh_of(primitive, node.skin >= 0), 0, static_cast<std::uint32_t>(place_index), node.skin,
+                      placement_.name + "/" +
+                          (own_name.empty() ? "node " + std::to_string(place.node) : printable(own_name))};
+            if (part.mesh.triangles.empty())
+                continue;
+            part.material = placement_.material ? *placement_.material : material_of(primitive.material);
+            settle_texcoords(part);
+            parts_.push_back(std::move(part));
+        }
+    }
+
+    // The file's own materials may name textures where there are no places on them.
+    void settle_texcoords(Part &part) const {
+        const arhost_material &m = builder_.material(part.material);
+        if (!part.mesh.texcoords.empty() ||
+            (m.colour_texture == ARHOST_NONE && m.metallic_roughness_texture == ARHOST_NONE &&
+             m.normal_texture == ARHOST_NONE && m.emission_texture == ARHOST_NONE))
+            return;
+        watch_.info(part.name + ": has a texture but no texture coordinates; it is coloured by one corner");
+        part.mesh.texcoords.assign(part.mesh.positions.size(), glm::vec2(0));
+    }
+
+    TriangleMesh mesh_of(const tinygltf::Primitive &primitive, bool skinned) {
+        TriangleMesh mesh;
+        const auto attribute = [](const std::map<std::string, int> &attributes, const char *name) {
+            const auto found = attributes.find(name);
+            return found == attributes.end() ? -1 : found->second;
+        };
+        const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+        if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
+            mode != TINYGLTF_MODE_TRIANGLE_FAN) {
+            watch_.info(name_ + ": points and lines are passed over");
+            return mesh;
+        }
+        const auto vec3s = [&](int accessor, const char *what) {
+            return vectors<glm::vec3>(accessors_.read<float>(accessor, TINYGLTF_TYPE_VEC3, what));
+        };
+        const auto check = [&](const auto &values, const char *what) {
+            for (const auto &value : values)
+                for (int i = 0; i < value.length(); ++i)
+                    if (!(std::abs(value[i]) <= coordinate_limit_mm))
+                        accessors_.fail(std::string(what) + " holds a number beyond 1e9, or none");
+        };
+        const int position = attribute(primitive.attributes, "POSITION");
+        if (position < 0)
+            return mesh;
+        mesh.positions = vec3s(position, "POSITION");
+        check(mesh.positions, "POSITION");
+        const std::size_t count = mesh.positions.size();
+        const auto check_count = [&](std::size_t found, const char *what) {
+            if (found != count)
+                accessors_.fail(std::string(what) + " has " + std::to_string(found) + " elements for " +
+                                std::to_string(count) + " vertices");
+        };
+        if (const int normal = attribute(primitive.attributes, "NORMAL"); normal >= 0) {
+            mesh.normals = vec3s(normal, "NORMAL");
+            check_count(mesh.normals.size(), "NORMAL");
+        }
+        if (const int texcoord = attribute(primitive.attributes, "TEXCOORD_0"); texcoord >= 0) {
+            mesh.texcoords = vectors<glm::vec2>(accessors_.read<float>(texcoord, TINYGLTF_TYPE_VEC2, "TEXCOORD_0"));
+            check_count(mesh.texcoords.size(), "TEXCOORD_0");
+            check(mesh.texcoords, "TEXCOORD_0");
+        }
+        mesh.triangles = triangles_of(primitive, mode, count);
+        if (skinned)
+            read_joints(attribute(primitive.attributes, "JOINTS_0"), attribute(primitive.attributes, "WEIGHTS_0"),
+                        count, mesh);
+        if (attribute(primitive.attributes, "JOINTS_1") >= 0)
+            watch_.info(name_ + ": of more than four joints a vertex, the first four are used");
+        const bool has_normals = !mesh.normals.empty();
+        for (const auto &target : primitive.targets) {
+            const auto append = [&](const char *name, std::vector<glm::vec3> &to) {
+                const int accessor = attribute(target, name);
+                const auto values = accessor < 0 ? std::vector<glm::vec3>(count) : vec3s(accessor, name);
+                check_count(values.size(), name);
+                check(values, name);
+                to.insert(to.end(), values.begin(), values.end());
+            };
+            append("POSITION", mesh.morph_positions);
+            if (has_normals)
+                append("NORMAL", mesh.morph_normals);
+        }
+        settle_normals(mesh, std::nullopt);
+        return mesh;
+    }
+
+    std::vector<glm::uvec3> triangles_of(const tinygltf::Primitive &primitive, int mode,
+                                         std::size_t vertex_count) const {
+        std::vector<std::uint32_t> corners;
+        if (primitive.indices >= 0) {
+            corners = accessors_.read<std::uint32_t>(primitive.indices, TINYGLTF_TYPE_SCALAR, "the triangles");
+        } else {
+            corners.resize(vertex_count);
+            for (std::size_t i = 0; i < corners.size(); ++i)
+                corners[i] = static_cast<std::uint32_t>(i);
+        }
+        for (const std::uint32_t corner : corners)
+            if (corner >= vertex_count)
+                accessors_.fail("a triangle names vertex " + std::to_string(corner) + ", but there are " +
+                                std::to_string(vertex_count));
+        std::vector<glm::uvec3> triangles;
+        const std::size_t step = mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1;
+        triangles.reserve(corners.size() / step);
+        for (std::size_t i = 0; i + 2 < corners.size(); i += step) {
+            if (mode == TINYGLTF_MODE_TRIANGLE_FAN)
+                triangles.emplace_back(corners[i + 1], corners[i + 2], corners[0]);
+            else if (mode == TINYGLTF_MODE_TRIANGLE_STRIP && i % 2 == 1)
+                triangles.emplace_back(corners[i], corners[i + 2], corners[i + 1]);
+            else
+                triangles.emplace_back(corners[i], corners[i + 1], corners[i + 2]);
+        }
+        return triangles;
+    }
+
+    void read_joints(int joints, int weights, std::size_t count, TriangleMesh &mesh) const {
+        if (joints < 0 || weights < 0)
+            accessors_.fail("a mesh has a skin, but no joints or weights");
+        const auto indices = accessors_.read<std::uint32_t>(joints, TINYGLTF_TYPE_VEC4, "JOINTS_0");
+        mesh.weights = vectors<glm::vec4>(accessors_.read<float>(weights, TINYGLTF_TYPE_VEC4, "WEIGHTS_0"));
+        if (indices.size() != 4 * count || mesh.weights.size() != count)
+            accessors_.fail("JOINTS_0 or WEIGHTS_0 has not as many elements as there are vertices");
+        mesh.joints.resize(count);
+        for (std::size_t v = 0; v < count; ++v) {
+            glm::vec4 &w = mesh.weights[v];
+            for (int i = 0; i < 4; ++i)
+                w[i] = w[i] > 0 && w[i] < 1e6f ? w[i] : 0;
+            const float sum = w.x + w.y + w.z + w.w;
+            w = sum > 0 ? w / sum : glm::vec4(1, 0, 0, 0);
+            for (int i = 0; i < 4; ++i)
+                mesh.joints[v][i] = w[i] > 0 ? static_cast<std::uint16_t>(std::min(indices[4 * v + i], 65535u)) : 0;
+        }
+    }
+
+    // What the animation doesn't deform gets its shape at rest for good.
+    void settle_deformations() {
+        ArenaBuilder at_rest; // evaluates it as it does an animation
+        at_rest.settings.duration_s = 1;
+        for (const Place &place : order_) {
+            MotionNode node;
+            node.parent_from_node = glm::dmat4x3(place.from_place);
+            node.morph_weights = place.morph_weights;
+            at_rest.add_node(std::move(node));
+        }
+        std::vector<Part *> resting;
+        for (Part &part : parts_) {
+            const Place &place = order_[part.place];
+            const bool morphs = !part.mesh.morph_positions.empty();
+            if (part.skin < 0 && !morphs)
+                continue;
+            Skin skin;
+            if (part.skin >= 0) {
+                skin = skin_of(part.skin, 0);
+                for (std::size_t v = 0; v < part.mesh.joints.size(); ++v)
+                    for (int i = 0; i < 4; ++i)
+                        if (part.mesh.joints[v][i] >= skin.joints.size())
+                            accessors_.fail("a vertex names joint " + std::to_string(part.mesh.joints[v][i]) +
+                                            ", but the skin has " + std::to_string(skin.joints.size()));
+            }
+            part.deforms = (morphs && place.has_weights_channel) ||
+                           std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return order_[j].moves; });
+            if (part.deforms)
+                continue;
+            const std::uint32_t skin_index = part.skin < 0 ? ARHOST_NONE : at_rest.add_skin(std::move(skin));
+            at_rest.add_object("", at_rest.add_triangles(std::move(part.mesh)), 0, ARHOST_VIRTUAL, glm::mat4x3(1),
+                               {false, true, part.place, skin_index});
+            resting.push_back(&part);
+        }
+        if (resting.empty())
+            return;
+        const Arena arena = std::move(at_rest).build();
+        const auto at = [&]<class T>(const arhost_buffer &buffer, T) {
+            const T *from = reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
+            return std::vector<T>(from, from + buffer.count);
+        };
+        MotionEvaluator evaluator(arena.scene());
+        const arhost_motion motion = evaluator.at(0);
+        const auto geometries = at(arena.scene().geometries, arhost_geometry());
+        for (std::size_t i = 0; i < resting.size(); ++i) {
+            TriangleMesh &mesh = resting[i]->mesh;
+            mesh = {};
+            mesh.triangles = at(geometries[i].indices, glm::uvec3());
+            mesh.texcoords = at(geometries[i].texcoords, glm::vec2());
+            const auto *positions = reinterpret_cast<const glm::vec3 *>(motion.deformed[i].positions);
+            const auto *normals = reinterpret_cast<const glm::vec3 *>(motion.deformed[i].normals);
+            mesh.positions.assign(positions, positions + motion.deformed[i].vertex_count);
+            if (normals)
+                mesh.normals.assign(normals, normals + motion.deformed[i].vertex_count);
+        }
+    }
+
+    void add_object(Part &part) {
+        const Place &place = order_[part.place];
+        triangles_ += part.mesh.triangles.size();
+        vertices_ += part.mesh.positions.size();
+        const Transform from_mesh = Transform::of(place.from_place);
+        const bool mirrored = glm::determinant(placement_.from_gltf.matrix()) < 0;
+        if (part.deforms && part.skin >= 0) {
+            if (mirrored) // its vertices are put into the world, so its outsides must be too
+                for (glm::uvec3 &t : part.mesh.triangles)
+                    std::swap(t.y, t.z);
+            const std::uint32_t skin = skin_index(part.skin);
+            const std::uint32_t node = part.mesh.morph_positions.empty() ? ARHOST_NONE : first_node_ + part.place;
+            finish(part, {false, true, node, skin});
+        } else if (part.skin < 0 && (part.deforms || place.moves)) {
+            Box box;
+            for (const glm::vec3 &p : part.mesh.positions)
+                box.include(glm::vec3(from_mesh(p)));
+            box_.include(box);
+            finish(part, {true, part.deforms, first_node_ + part.place, ARHOST_NONE});
+        } else {
+            if (part.skin < 0)
+                from_mesh.apply(part.mesh);
+            else if (mirrored)
+                for (glm::uvec3 &t : part.mesh.triangles)
+                    std::swap(t.y, t.z);
+            for (const glm::vec3 &p : part.mesh.positions) {
+                box_.include(p);
+                if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= coordinate_limit_mm))
+                    accessors_.fail("reaches further than 1e9 mm after its transform");
+            }
+            const bool carried = placement_.node != ARHOST_NONE;
+            finish(part, {carried, false, placement_.node, ARHOST_NONE});
+        }
+    }
+
+    void finish(Part &part, const Motion &motion) {
+        builder_.add_object(part.name, builder_.add_triangles(std::move(part.mesh)), part.material, placement_.role,
+                            glm::mat4x3(1), motion);
+    }
+
+    std::uint32_t skin_index(int skin) {
+        const auto [known, is_new] = skins_.try_emplace(skin);
+        if (is_new)
+            known->second = builder_.add_skin(skin_of(skin, first_node_));
+        return known->second;
+    }
+
+    void tell() const {
+        char text[200];
+        if (box_.min.x <= box_.max.x)
+            std::snprintf(text, sizeof text, ": %zu triangles, %zu vertices, %.4g x %.4g x %.4g mm", triangles_,
+                          vertices_, box_.max.x - box_.min.x, box_.max.y - box_.min.y, box_.max.z - box_.min.z);
+        else
+            std::snprintf(text, sizeof text, ": %zu triangles, %zu vertices, deformed by an animation", triangles_,
+                          vertices_);
+        watch_.info(name_ + text);
+    }
+
+    // ---- materials ----
+
+    std::uint32_t material_of(int index) {
+        const auto [known, is_new] = materials_.try_emplace(index);
+        if (is_new)
+            known->second = builder_.add_material(
+                read_material(index < 0 ? tinygltf::Material() : accessors_.at(model_.materials, index, "material")));
+        return known->second;
+    }
+
+    arhost_material read_material(const tinygltf::Material &from) {
+        const auto number = [](double value, double limit) {
+            return static_cast<float>(std::clamp(value, 0.0, limit));
+        };
+        const auto &pbr = from.pbrMetallicRoughness;
+        arhost_material material = make_material(ARHOST_METALLIC_ROUGHNESS);
+        for (std::size_t i = 0; i < 3; ++i) {
+            material.ambient[i] = material.diffuse[i] =
+                pbr.baseColorFactor.size() > i ? number(pbr.baseColorFactor[i], 1) : 1;
+            material.emission[i] =
+                from.emissiveFactor.size() > i ? number(from.emissiveFactor[i], radiance_limit) : 0;
+        }
+        material.metallic = number(pbr.metallicFactor, 1);
+        material.roughness = number(pbr.roughnessFactor, 1);
+        material.colour_texture = texture_of(pbr.baseColorTexture, true);
+        material.metallic_roughness_texture = texture_of(pbr.metallicRoughnessTexture, false);
+        material.normal_texture = texture_of(from.normalTexture, false);
+        material.emission_texture = texture_of(from.emissiveTexture, true);
+        if (from.alphaMode == "MASK" || from.alphaMode == "BLEND") {
+            const double alpha = pbr.baseColorFactor.size() > 3 ? pbr.baseColorFactor[3] : 1;
+            const double cutoff = from.alphaMode == "MASK" ? from.alphaCutoff : 0.5;
+            if (from.alphaMode == "BLEND")
+                watch_.info(name_ + ": the material '" + printable(from.name) + "' is " +
+                            (material.colour_texture == ARHOST_NONE
+                                 ? "translucent, and drawn opaque; 'material' may give it glass"
+                                 : "blended, and drawn with holes where its alpha is below 0.5"));
+            if (material.colour_texture != ARHOST_NONE) // of the texture's alpha times the factor
+                material.alpha_cutoff = alpha > 0 ? number(cutoff / alpha, 1) : 1;
+        }
+        return material;
+    }
+
+    template <class Info> std::uint32_t texture_of(const Info &info, bool is_colour) {
+        if (info.index < 0)
+            return ARHOST_NONE;
+        if (info.texCoord != 0)
+            watch_.info(name_ + ": a texture uses the texture coordinates " + std::to_string(info.texCoord) +
+                        "; the first ones are taken in their place");
+        const tinygltf::Texture &texture = accessors_.at(model_.textures, info.index, "texture");
+        const tinygltf::Image &image = accessors_.at(model_.images, texture.source, "image");
+        if (image.image.empty())
+            accessors_.fail("the image '" + printable(image.uri.substr(0, 100)) + "' can't be read");
+        TextureUse use{is_colour};
+        if (texture.sampler >= 0) {
+            const auto wrap = [](int mode) {
+                return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? ARHOST_WRAP_CLAMP
+                       : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? ARHOST_WRAP_MIRROR
+                                                                       : ARHOST_WRAP_REPEAT;
+            };
+            const tinygltf::Sampler &sampler = accessors_.at(model_.samplers, texture.sampler, "sampler");
+            use.wrap_u = wrap(sampler.wrapS);
+            use.wrap_v = wrap(sampler.wrapT);
+        }
+        return textures_.add(file_, use, image.image, "#image " + std::to_string(texture.source));
+    }
+
+    ArenaBuilder &builder_;
+    Textures &textures_;
+    const std::filesystem::path &file_;
+    const std::string name_;
+    const GltfPlacement &placement_;
+    const Watch watch_;
+    const tinygltf::Model model_;
+    const Accessors accessors_;
+    std::vector<Place> order_;
+    std::vector<std::uint32_t> place_of_; // of the file's nodes: in order_, or ARHOST_NONE
+    const tinygltf::Animation *animation_ = nullptr;
+    float duration_s_ = 0;
+    std::uint32_t first_node_ = 0; // in the arena, that of order_[0]
+    std::vector<Part> parts_;
+    std::map<int, std::uint32_t> materials_, skins_; // of the file → in the arena
+    std::size_t triangles_ = 0, vertices_ = 0;
+    Box box_;
+};
+
+} // namespace
+
+float add_gltf(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
+               const GltfPlacement &placement, const LoadCallbacks &callbacks) {
+    return GltfLoader(builder, textures, file, placement, callbacks).load();
+}
+
+} // namespace arhost::scene

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/image.hpp"
+
+#include "scene/image_reader.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <numbers>
+#include <string_view>
+
+namespace arhost::scene {
+namespace {
+
+// Once opened, it stays: libraries below OpenImageIO have threads.
+ReadImage *reader() {
+    static ReadImage *const found = [] {
+        void *module = ::dlopen("arhost-images.so", RTLD_NOW | RTLD_LOCAL);
+        void *symbol = module ? ::dlsym(module, read_image_symbol) : nullptr;
+        if (!symbol)
+            throw ImageError(std::string("images can't be loaded: ") + ::dlerror());
+        return reinterpret_cast<ReadImage *>(symbol);
+    }();
+    return found;
+}
+
+// By content, as names lie. Each name is a decoder's of OpenImageIO; all its other ones stay shut.
+const char *format_of(std::string_view start) {
+    using namespace std::string_view_literals;
+    if (start.starts_with("\x89PNG\r\n"sv))
+        return "png";
+    if (start.starts_with("\xff\xd8\xff"sv))
+        return "jpeg";
+    if (start.starts_with("\x76\x2f\x31\x01"sv))
+        return "openexr";
+    if (start.starts_with("#?"sv))
+        return "hdr";
+    if (start.size() > 2 && start[0] == 'P' && (std::string_view("123456Ff").find(start[1]) != start.npos))
+        return "pnm";
+    return nullptr;
+}
+
+std::string start_of(const std::filesystem::path &file) {
+    std::error_code ignored;
+    if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
+        throw ImageError(file.string() + ": is not a regular file");
+    errno = 0;
+    std::ifstream stream(file, std::ios::binary);
+    char start[8] = {};
+    stream.read(start, sizeof start);
+    if (stream.gcount() == 0)
+        throw ImageError(file.string() + (errno ? std::string(": can't be read: ") + std::strerror(errno)
+                                                : std::string(": is empty")));
+    return {start, static_cast<std::size_t>(stream.gcount())};
+}
+
+std::span<float> floats_of(const Texels &texels) {
+    return {reinterpret_cast<float *>(texels.bytes.get()), texels.size / sizeof(float)};
+}
+
+// Light is neither negative nor endless; where a file says so, a word tells.
+void make_finite(const Image &image, const std::string &name, const Watch &watch) {
+    std::size_t mended = 0;
+    for (float &value : floats_of(image.texels)) {
+        if (value >= 0 && value <= radiance_limit) {
+            value += 0.f; // −0 becomes 0
+            continue;
+        }
+        value = value > radiance_limit ? radiance_limit : 0; // NaN: 0
+        ++mended;
+    }
+    if (mended > 0)
+        watch.info(name + ": " + std::to_string(mended) +
+                   " numbers below 0, above 1e6 or not a number are set to 0 or 1e6");
+}
+
+const std::array<float, 256> &linear_from_byte() {
+    static const std::array<float, 256> table = [] {
+        std::array<float, 256> t;
+        for (int i = 0; i < 256; ++i) // IEC 61966-2-1
+            t[i] = static_cast<float>(i <= 10 ? i / 255.0 / 12.92 : std::pow((i / 255.0 + 0.055) / 1.055, 2.4));
+        return t;
+    }();
+    return table;
+}
+
+// Sums over `values`, so that the last is 1; even ones where all are 0.
+void accumulate(std::span<const double> values, std::span<float> sums) {
+    double total = 0;
+    for (const double value : values)
+        total += value;
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        sum += total > 0 ? values[i] / total : 1.0 / static_cast<double>(values.size());
+        sums[i] = static_cast<float>(std::min(sum, 1.0));
+    }
+    sums.back() = 1;
+}
+
+} // namespace
+
+Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Watch &watch) {
+    const std::string name = file.string();
+    const char *format = format_of(
+        content.empty() ? start_of(file)
+                        : std::string(content.begin(), content.begin() + std::min<std::size_t>(8, content.size())));
+    if (!format)
+        throw ImageError(name + ": is none of PNG, JPEG, PPM, HDR and EXR by its content; convert it to one of them");
+    Image image;
+    std::exception_ptr stopped; // which must not fly through a library written without regard to it
+    ImageRequest request{format, name, content, {}, {}};
+    request.allocate = [&](std::uint32_t width, std::uint32_t height, bool is_float) {
+        image.width = width;
+        image.height = height;
+        image.is_float = is_float;
+        image.texels = Texels::of_size(std::size_t(width) * height * (is_float ? 16 : 4));
+        return image.texels.bytes.get();
+    };
+    request.report = [&](float fraction) {
+        try {
+            watch.report(fraction);
+            return true;
+        } catch (...) {
+            stopped = std::current_exception();
+            return false;
+        }
+    };
+    std::string error;
+    reader()(request, error);
+    if (stopped)
+        std::rethrow_exception(stopped);
+    if (!error.empty()) {
+        while (!error.empty() && error.back() == '\n')
+            error.pop_back();
+        throw ImageError(name + ": " + error);
+    }
+    if (image.is_float)
+        make_finite(image, name, watch);
+    return image;
+}
+
+Image linearised(Image image) {
+    if (image.is_float)
+        return image;
+    Image linear{image.width, image.height, true, Texels::of_size(image.texels.size * sizeof(float))};
+    const std::span<float> to = floats_of(linear.texels);
+    for (std::size_t i = 0; i < to.size(); ++i) {
+        const auto value = std::to_integer<unsigned char>(image.texels.bytes[i]);
+        to[i] = i % 4 == 3 ? static_cast<float>(value) / 255 : linear_from_byte()[value];
+    }
+    return linear;
+}
+
+void add_cumulative_sums(Environment &environment, const Texture &texture) {
+    const std::span<const float> texels = floats_of(texture.texels);
+    environment.rows.resize(texture.height);
+    environment.columns.resize(std::size_t(texture.width) * texture.height);
+    std::vector<double> luminance(texture.width), of_rows(texture.height);
+    for (std::size_t row = 0; row < texture.height; ++row) {
+        double sum = 0;
+        for (std::size_t column = 0; column < texture.width; ++column) {
+            const float *t = &texels[4 * (row * texture.width + column)];
+            sum += luminance[column] = 0.2126 * t[0] + 0.7152 * t[1] + 0.0722 * t[2]; // Rec. 709
+        }
+        accumulate(luminance, std::span(environment.columns).subspan(row * texture.width, texture.width));
+        of_rows[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / texture.height);
+    }
+    accumulate(of_rows, environment.rows);
+}
+
+} // namespace arhost::scene

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/image_reader.hpp"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <memory>
+
+namespace {
+
+using arhost::scene::ImageRequest;
+
+constexpr int side_limit = 16384; // of arhost/scene.h
+
+// One to four channels in place, spread to red, green, blue and alpha.
+template <class T> void expand(T *texels, std::size_t count, bool grey, int alpha, T opaque) {
+    for (T *texel = texels; texel != texels + 4 * count; texel += 4) {
+        const T a = alpha < 0 ? opaque : texel[alpha];
+        if (grey)
+            texel[1] = texel[2] = texel[0];
+        texel[3] = a;
+    }
+}
+
+std::string read(const ImageRequest &request) {
+    const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(request.format);
+    if (!input)
+        return "can't be loaded: this OpenImageIO lacks the format '" + std::string(request.format) + "'";
+    OIIO::Filesystem::IOMemReader memory(const_cast<unsigned char *>(request.content.data()), request.content.size());
+    OIIO::ImageSpec wanted, spec;
+    wanted["oiio:UnassociatedAlpha"] = 1;
+    if (!request.content.empty() && !input->set_ioproxy(&memory))
+        return "can't be loaded: images of the format '" + std::string(request.format) +
+               "' must be files of their own";
+    if (!input->open(request.file, spec, wanted))
+        return "can't be loaded: " + input->geterror();
+    if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
+        return "is a deep or volume image, which can't be a texture";
+    if (spec.width < 1 || spec.height < 1 || spec.width > side_limit || spec.height > side_limit)
+        return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; up to " +
+               std::to_string(side_limit) + " a side are loaded, so scale it down";
+    const bool is_float = spec.format.is_floating_point();
+    // Grey, grey with alpha, colour, or colour with alpha; what else an EXR file has is passed over.
+    const bool grey = spec.nchannels < 3;
+    const int alpha = spec.nchannels == 2 ? 1 : spec.nchannels > 3 && spec.alpha_channel == 3 ? 3 : -1;
+    const int channels = grey ? spec.nchannels : alpha == 3 ? 4 : 3;
+    std::byte *texels = request.allocate(spec.width, spec.height, is_float);
+    const OIIO::stride_t texel_size = is_float ? 16 : 4;
+    const auto progress = [](void *opaque, float done) {
+        return !static_cast<const ImageRequest *>(opaque)->report(done);
+    };
+    if (!input->read_image(0, 0, 0, channels, is_float ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8, texels,
+                           texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
+                           const_cast<ImageRequest *>(&request)))
+        return "can't be loaded: " + input->geterror();
+    const std::size_t count = std::size_t(spec.width) * spec.height;
+    if (is_float)
+        expand(reinterpret_cast<float *>(texels), count, grey, alpha, 1.f);
+    else
+        expand(reinterpret_cast<unsigned char *>(texels), count, grey, alpha, static_cast<unsigned char>(255));
+    return {};
+}
+
+} // namespace
+
+extern "C" __attribute__((visibility("default"))) void arhost_read_image(const ImageRequest &request,
+                                                                         std::string &error) {
+    error = read(request);
+}

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/motion.hpp"
+
+#include "scene/arena.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+namespace arhost::scene {
+namespace {
+
+constexpr std::size_t spare_floats = 4;
+constexpr float least_scale = 1e-6f; // animations hide things by a scale of 0, which has no inverse
+
+glm::vec3 vector_of(const float *v) {
+    return {v[0], v[1], v[2]};
+}
+glm::quat rotation_of(const float *v) { // x, y, z, w
+    return {v[3], v[0], v[1], v[2]};
+}
+
+glm::dmat4 matrix_of(const float *m) {
+    glm::dmat4 matrix(1);
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 3; ++row)
+            matrix[column][row] = m[3 * column + row];
+    return matrix;
+}
+
+glm::dmat4 matrix_of(const glm::vec3 &translation, const glm::quat &rotation, const glm::vec3 &scale) {
+    const glm::dmat3 turned = glm::mat3_cast(glm::dquat(rotation));
+    glm::dmat4 matrix(1);
+    for (int i = 0; i < 3; ++i) {
+        const double factor = std::abs(scale[i]) < least_scale ? std::copysign(least_scale, scale[i]) : scale[i];
+        matrix[i] = glm::dvec4(turned[i] * factor, 0);
+    }
+    matrix[3] = glm::dvec4(translation, 1);
+    return matrix;
+}
+
+// false where a ray tracer couldn't use it: extreme numbers have multiplied along the tree of nodes.
+bool write(const glm::dmat4 &matrix, float (&to)[12]) {
+    std::array<float, 12> values;
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 3; ++row)
+            values[3 * column + row] = static_cast<float>(matrix[column][row]);
+    const glm::dmat3 linear(matrix);
+    const double size = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
+    if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }) ||
+        !(std::abs(glm::determinant(linear)) > 1e-9 * size))
+        return false;
+    std::ranges::copy(values, to);
+    return true;
+}
+
+// NaN becomes the limit too.
+void keep_within_limit(std::vector<float> &values) {
+    constexpr float limit = coordinate_limit_mm;
+    for (float &v : values)
+        v = v < limit ? (v > -limit ? v : -limit) : limit;
+}
+
+// The interval of a channel's keys that a time lies in.
+struct Interval {
+    std::size_t before, after;
+    float share;    // of the way
+    float length_s; // between the two keys
+};
+
+Interval interval_of(std::span<const float> times, float time_s) {
+    const std::size_t after = std::ranges::upper_bound(times, time_s) - times.begin();
+    if (after == 0)
+        return {0, 0, 0, 0};
+    if (after == times.size())
+        return {after - 1, after - 1, 0, 0};
+    const float length = times[after] - times[after - 1];
+    return {after - 1, after, (time_s - times[after - 1]) / length, length};
+}
+
+} // namespace
+
+MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
+    : scene_(scene), places_(scene.nodes.count), world_from_node_(scene.nodes.count) {
+    const auto nodes = view<arhost_node>(scene_.nodes);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+        places_[i].morph_weights.resize(nodes[i].morph_weights.count);
+    const auto objects = view<arhost_object>(scene_.objects);
+    for (std::uint32_t i = 0; i < objects.size(); ++i) {
+        if (objects[i].moves) {
+            moved_.push_back({i, {}});
+            std::ranges::copy(objects[i].world_from_object, moved_.back().world_from_object);
+        }
+        if (objects[i].deforms) {
+            const arhost_geometry &geometry = view<arhost_geometry>(scene_.geometries)[objects[i].geometry];
+            const std::size_t floats = std::size_t(3) * geometry.positions.count + spare_floats;
+            const bool has_normals = geometry.normals.count > 0;
+            const Deformed &buffer = buffers_.emplace_back(
+                Deformed{std::vector<float>(floats), std::vector<float>(has_normals ? floats : 0)});
+            deformed_.push_back({i, geometry.positions.count, buffer.positions.data(),
+                                 has_normals ? buffer.normals.data() : nullptr});
+        }
+    }
+}
+
+arhost_motion MotionEvaluator::at(double time_s) {
+    const double within = std::isfinite(time_s) && scene_.duration_s > 0 ? std::fmod(time_s, scene_.duration_s) : 0;
+    place_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within));
+    const auto objects = view<arhost_object>(scene_.objects);
+    for (arhost_moved_object &moved : moved_)
+        write(world_from_node_[objects[moved.object].node], moved.world_from_object); // else it stays
+    for (std::size_t i = 0; i < buffers_.size(); ++i)
+        deform(objects[deformed_[i].object], buffers_[i]);
+    return {sizeof(arhost_motion), static_cast<std::uint32_t>(moved_.size()),    moved_.data(),
+            deformed_.data(),      static_cast<std::uint32_t>(deformed_.size()), 0};
+}
+
+void MotionEvaluator::place_nodes(float time_s) {
+    const auto nodes = view<arhost_node>(scene_.nodes);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        Place &place = places_[i];
+        place.translation = vector_of(nodes[i].translation);
+        place.rotation = rotation_of(nodes[i].rotation);
+        place.scale = vector_of(nodes[i].scale);
+        std::ranges::copy(view<float>(nodes[i].morph_weights), place.morph_weights.begin());
+    }
+    for (const arhost_channel &channel : view<arhost_channel>(scene_.channels))
+        apply(channel, time_s);
+    for (std::size_t i = 0; i < nodes.size(); ++i) { // parents come first
+        const Place &place = places_[i];
+        const glm::dmat4 parent_from_node = nodes[i].animated
+                                                ? matrix_of(place.translation, place.rotation, place.scale)
+                                                : matrix_of(nodes[i].parent_from_node);
+        world_from_node_[i] =
+            nodes[i].parent == ARHOST_NONE ? parent_from_node : world_from_node_[nodes[i].parent] * parent_from_node;
+    }
+}
+
+void MotionEvaluator::apply(const arhost_channel &channel, float time_s) {
+    Place &place = places_[channel.node];
+    const Interval interval = interval_of(view<float>(channel.times), time_s);
+    const std::size_t width = channel.target == ARHOST_CHANNEL_ROTATION        ? 4
+                              : channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS ? place.morph_weights.size()
+                                                                               : 3;
+    const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
+    const float t = channel.interpolation == ARHOST_INTERPOLATION_STEP ? 0 : interval.share;
+    const float *values = view<float>(channel.values).data();
+    // A key's in-tangent, value and out-tangent, or its value only.
+    const auto part = [&](std::size_t key, std::size_t which) {
+        return values + (cubic ? key * 3 + which : key) * width;
+    };
+    const float *a = part(interval.before, 1), *b = part(interval.after, 1);
+    const float *leaving = part(interval.before, 2), *arriving = part(interval.after, 0);
+    const auto mixed = [&](std::size_t i) {
+        if (!cubic || t == 0)
+            return a[i] + (b[i] - a[i]) * t;
+        const float t2 = t * t, t3 = t2 * t; // glTF 2.0, appendix C.5
+        return (2 * t3 - 3 * t2 + 1) * a[i] + interval.length_s * (t3 - 2 * t2 + t) * leaving[i] +
+               (3 * t2 - 2 * t3) * b[i] + interval.length_s * (t3 - t2) * arriving[i];
+    };
+    switch (channel.target) {
+    case ARHOST_CHANNEL_TRANSLATION:
+        place.translation = {mixed(0), mixed(1), mixed(2)};
+        break;
+    case ARHOST_CHANNEL_SCALE:
+        place.scale = {mixed(0), mixed(1), mixed(2)};
+        break;
+    case ARHOST_CHANNEL_ROTATION:
+        if (cubic) {
+            const glm::quat sum(mixed(3), mixed(0), mixed(1), mixed(2));
+            const float length = glm::length(sum);
+            place.rotation = length > 1e-6f && std::isfinite(length) ? sum / length : rotation_of(a);
+        } else {
+            place.rotation = glm::normalize(glm::slerp(rotation_of(a), rotation_of(b), t)); // the short way
+        }
+        break;
+    default:
+        for (std::size_t i = 0; i < width; ++i)
+            place.morph_weights[i] = mixed(i);
+    }
+}
+
+void MotionEvaluator::deform(const arhost_object &object, Deformed &into) const {
+    const arhost_geometry &geometry = view<arhost_geometry>(scene_.geometries)[object.geometry];
+    const auto morph = [&](const arhost_buffer &base, const arhost_buffer &targets, std::vector<float> &sums) {
+        const std::size_t count = std::size_t(3) * base.count;
+        if (count == 0)
+            return;
+        std::memcpy(sums.data(), view<float>(base).data(), count * sizeof(float));
+        if (targets.count == 0)
+            return;
+        const float *displacements = view<float>(targets).data();
+        for (const float weight : places_[object.node].morph_weights) {
+            if (weight != 0)
+                for (std::size_t i = 0; i < count; ++i)
+                    sums[i] += weight * displacements[i];
+            displacements += count;
+        }
+    };
+    morph(geometry.positions, geometry.morph_positions, into.positions);
+    morph(geometry.normals, geometry.morph_normals, into.normals);
+    if (object.skin != ARHOST_NONE)
+        skin(geometry, view<arhost_skin>(scene_.skins)[object.skin], into);
+    else
+        for (std::size_t i = 0; i + spare_floats < into.normals.size(); i += 3) {
+            const glm::vec3 normal = vector_of(&into.normals[i]);
+            const float length = glm::length(normal);
+            for (int k = 0; k < 3; ++k)
+                into.normals[i + k] = length > 0 && std::isfinite(length) ? normal[k] / length : k == 2;
+        }
+    keep_within_limit(into.positions);
+}
+
+// Each vertex goes with the weighted mean of its joints (glTF 2.0, 3.7.3.3), and so does its normal, by the
+// mean's inverse transpose: the matrix of its minors, which need not be divided by the determinant.
+void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const {
+    using Matrix = std::array<float, 12>;
+    const auto joints = view<std::uint32_t>(skin.joints);
+    const auto node_from_mesh = view<Matrix>(skin.node_from_mesh);
+    std::vector<Matrix> world_from_mesh(joints.size());
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+        const glm::dmat4 matrix = world_from_node_[joints[i]] * matrix_of(node_from_mesh[i].data());
+        for (int k = 0; k < 12; ++k)
+            world_from_mesh[i][k] = static_cast<float>(matrix[k / 3][k % 3]);
+    }
+    const auto vertex_joints = view<glm::u16vec4>(geometry.joints);
+    const auto vertex_weights = view<glm::vec4>(geometry.weights);
+    for (std::size_t v = 0; v < vertex_joints.size(); ++v) {
+        Matrix m{};
+        for (int j = 0; j < 4; ++j) {
+            const float weight = vertex_weights[v][j];
+            if (weight == 0)
+                continue;
+            const Matrix &joint = world_from_mesh[vertex_joints[v][j]];
+            for (int k = 0; k < 12; ++k)
+                m[k] += weight * joint[k];
+        }
+        float *p = &into.positions[3 * v];
+        const glm::vec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
+        const glm::vec3 placed = x * p[0] + y * p[1] + z * p[2] + glm::vec3(m[9], m[10], m[11]);
+        for (int k = 0; k < 3; ++k)
+            p[k] = placed[k];
+        if (into.normals.empty())
+            continue;
+        float *n = &into.normals[3 * v];
+        const glm::vec3 yz = glm::cross(y, z);
+        const glm::vec3 turned = yz * n[0] + glm::cross(z, x) * n[1] + glm::cross(x, y) * n[2];
+        const float length = std::copysign(glm::length(turned), glm::dot(x, yz)); // mirrored: outside stays outside
+        const bool usable = length != 0 && std::isfinite(length);
+        for (int k = 0; k < 3; ++k)
+            n[k] = usable ? turned[k] / length : k == 2;
+    }
+}
+
+} // namespace arhost::scene

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where the moving things of a scene are at a time: what arhost/motion.h hands to ray tracers.
+#pragma once
+
+#include <arhost/motion.h>
+#include <arhost/scene.h>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace arhost::scene {
+
+// The scene must be valid (`validate`) and outlive the evaluator. Each needs a thread of its own.
+class MotionEvaluator {
+public:
+    explicit MotionEvaluator(const arhost_scene &scene);
+
+    // The motion begins again every duration_s. What is returned is valid until the next call.
+    arhost_motion at(double time_s);
+
+private:
+    struct Place {
+        glm::vec3 translation{0};
+        glm::quat rotation{1, 0, 0, 0};
+        glm::vec3 scale{1};
+        std::vector<float> morph_weights;
+    };
+    struct Deformed {
+        std::vector<float> positions, normals; // FLOAT3, with spare floats behind
+    };
+
+    template <class T> std::span<const T> view(const arhost_buffer &buffer) const {
+        return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene_) + buffer.offset),
+                buffer.count};
+    }
+    void place_nodes(float time_s);
+    void apply(const arhost_channel &channel, float time_s);
+    void deform(const arhost_object &object, Deformed &into) const;
+    void skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const;
+
+    const arhost_scene &scene_;
+    std::vector<Place> places_; // a node's own
+    std::vector<glm::dmat4> world_from_node_;
+    std::vector<arhost_moved_object> moved_;
+    std::vector<Deformed> buffers_;
+    std::vector<arhost_deformed_geometry> deformed_;
+};
+
+} // namespace arhost::scene

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_samples.hpp"
+#include "plugin_under_test.hpp"
+#include "scene/loader.hpp"
+#include "scene/motion.hpp"
+#include "scene_samples.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+using namespace arhost::scene;
+using namespace arhost::scene::test;
+using arhost::test::ScratchFolder;
+using testing::ElementsAre;
+using testing::FloatNear;
+using testing::HasSubstr;
+
+namespace {
+
+std::string base64(const std::string &bytes) {
+    const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        std::uint32_t three = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+            three = three << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+        for (std::size_t k = 0; k < 4; ++k)
+            text += i + k > bytes.size() ? '=' : digits[three >> (18 - 6 * k) & 63];
+    }
+    return text;
+}
+
+// A glTF file with one buffer.
+struct Gltf {
+    std::string bytes, views, accessors;                                   // JSON, without brackets
+    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0", more; // more: with a comma before
+    int view_count = 0, accessor_count = 0;
+
+    int view(const std::string &data, int stride = 0) {
+        bytes.resize((bytes.size() + 3) / 4 * 4);
+        views += std::string(view_count ? "," : "") + R"({"buffer": 0, "byteOffset": )" +
+                 std::to_string(bytes.size()) + R"(, "byteLength": )" + std::to_string(data.size()) +
+                 (stride ? R"(, "byteStride": )" + std::to_string(stride) : "") + "}";
+        bytes += data;
+        return view_count++;
+    }
+    int accessor(int view, int component, int count, const std::string &type, const std::string &extra = "") {
+        accessors += std::string(accessor_count ? "," : "") + "{" +
+                     (view >= 0 ? R"("bufferView": )" + std::to_string(view) + ", " : "") + R"("componentType": )" +
+                     std::to_string(component) + R"(, "count": )" + std::to_string(count) + R"(, "type": ")" + type +
+                     "\"" + extra + "}";
+        return accessor_count++;
+    }
+    int floats(const std::vector<float> &values, const std::string &type, int width) {
+        return accessor(view(std::string(reinterpret_cast<const char *>(values.data()), values.size() * 4)), 5126,
+                        static_cast<int>(values.size()) / width, type);
+    }
+    std::string json(const std::string &buffer_uri) const {
+        return R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [)" + scene_nodes +
+               R"(]}], "nodes": [)" + nodes + R"(], "meshes": [)" + meshes + R"(], "bufferViews": [)" + views +
+               R"(], "accessors": [)" + accessors + R"(], "buffers": [{"byteLength": )" +
+               std::to_string(bytes.size()) + buffer_uri + "}]" + more + "}";
+    }
+    std::string text() const {
+        return json(R"(, "uri": "data:application/octet-stream;base64,)" + base64(bytes) + "\"");
+    }
+    std::string binary() const {
+        std::string chunk = json(""), data = bytes;
+        chunk.resize((chunk.size() + 3) / 4 * 4, ' ');
+        data.resize((data.size() + 3) / 4 * 4);
+        const auto number = [](std::size_t value) {
+            const auto v = static_cast<std::uint32_t>(value);
+            return std::string(reinterpret_cast<const char *>(&v), 4);
+        };
+        return "glTF" + number(2) + number(28 + chunk.size() + data.size()) + number(chunk.size()) + "JSON" + chunk +
+               number(data.size()) + std::string("BIN\0", 4) + data;
+    }
+};
+
+// A triangle (0,0,0), (1,0,0), (0,1,0) in accessor 0, texcoords in 1.
+Gltf triangle() {
+    Gltf gltf;
+    gltf.floats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
+    gltf.floats({0, 0, 1, 0, 0, 1}, "VEC2", 2);
+    gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]})";
+    return gltf;
+}
+
+// The same with two joints, node 1 and node 2 below it, 1 above; vertex 2 goes with the second. Animation
+// "wave": node 2 turns by 90° about z within 1 s.
+Gltf skinned() {
+    Gltf gltf = triangle();
+    gltf.accessor(gltf.view(std::string("\0\0\0\0\0\0\0\0\1\0\0\0", 12)), 5121, 3, "VEC4"); // 2
+    gltf.accessor(gltf.view(std::string("\xff\0\0\0\xff\0\0\0\xff\0\0\0", 12)), 5121, 3, "VEC4",
+                  R"(, "normalized": true)"); // 3
+    gltf.floats(
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, /**/ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
+        "MAT4", 16);                                                      // 4
+    gltf.floats({0, 1}, "SCALAR", 1);                                     // 5
+    gltf.floats({0, 0, 0, 1, 0, 0, 0.70710678f, 0.70710678f}, "VEC4", 4); // 6
+    gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3}}]})";
+    gltf.nodes =
+        R"({"mesh": 0, "skin": 0, "translation": [50, 0, 0]}, {"children": [2]}, {"translation": [0, 1, 0]})";
+    gltf.scene_nodes = "0, 1";
+    gltf.more = R"(, "skins": [{"joints": [1, 2], "inverseBindMatrices": 4}], "animations": [{"name": "wave",
+        "samplers": [{"input": 5, "output": 6}], "channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}]}])";
+    return gltf;
+}
+
+struct Loaded {
+    Arena arena;
+    std::vector<std::string> info;
+};
+
+Loaded load(const std::string &gltf, const std::string &object = "", const std::string &axes = "y-up",
+            const std::string &name = "a.gltf") {
+    const ScratchFolder folder;
+    write_file(folder.path() / name, gltf);
+    write_file(folder.path() / "s.yaml", "version: 1\naxes: " + axes +
+                                             "\nmaterials: {grey: {model: mirror}}\nobjects:\n  - {gltf: " + name +
+                                             object + "}\n");
+    LoadCallbacks callbacks;
+    std::vector<std::string> info;
+    callbacks.info = [&](const std::string &text) { info.push_back(text); };
+    Arena arena = load_scene(folder.path() / "s.yaml", callbacks).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    return {std::move(arena), info};
+}
+
+std::string error_of(const std::string &gltf, const std::string &object = "") {
+    try {
+        load(gltf, object);
+    } catch (const arhost::yaml::Error &error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
+    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
+}
+const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
+    return at<arhost_geometry>(a, a.scene().geometries)[i];
+}
+const arhost_object &object(const Arena &a, std::size_t i = 0) {
+    return at<arhost_object>(a, a.scene().objects)[i];
+}
+const arhost_material &material(const Arena &a, std::size_t i = 0) {
+    return at<arhost_material>(a, a.scene().materials)[i];
+}
+std::vector<float> vertex(const Arena &a, std::size_t i) {
+    const float *p = at<float>(a, geometry(a).positions) + 3 * i;
+    return {p[0], p[1], p[2]};
+}
+auto near(float value) {
+    return FloatNear(value, 1e-5f);
+}
+
+} // namespace
+
+TEST(Gltf, PutsStaticMeshesIntoTheWorld) {
+    Gltf gltf = triangle();
+    gltf.nodes = R"({"children": [1], "scale": [2, 2, 2]}, {"mesh": 0, "name": "leaf", "translation": [0, 0, 5]})";
+    const Loaded loaded = load(gltf.text(), ", name: tree, transform: [{translate: [100, 0, 0]}]");
+    const Arena &arena = loaded.arena;
+    ASSERT_EQ(arena.scene().objects.count, 1u);
+    EXPECT_STREQ(at<char>(arena, arena.scene().names) + object(arena).name, "tree/leaf");
+    EXPECT_THAT(vertex(arena, 0), ElementsAre(100, 0, 10));
+    EXPECT_THAT(vertex(arena, 1), ElementsAre(102, 0, 10));
+    EXPECT_EQ(at<glm::vec2>(arena, geometry(arena).texcoords)[2], glm::vec2(0, 1)) << "from the top, as the arena's";
+    EXPECT_EQ(arena.scene().nodes.count, 0u);
+    EXPECT_EQ(material(arena, object(arena).material).model, ARHOST_METALLIC_ROUGHNESS);
+    EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("a.gltf: 1 triangles, 3 vertices, 2 x 2 x 0 mm")));
+}
+
+TEST(Gltf, StandsUprightInZUpScenes) {
+    const Loaded loaded = load(triangle().text(), "", "z-up");
+    EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(near(0), near(0), near(1))) << "its y is up";
+}
+
+TEST(Gltf, ReadsBinaryFiles) {
+    const Loaded loaded = load(triangle().binary(), "", "y-up", "a.glb");
+    EXPECT_THAT(vertex(loaded.arena, 1), ElementsAre(1, 0, 0));
+}
+
+TEST(Gltf, TakesAMaterialOfTheScene) {
+    const Loaded loaded = load(triangle().text(), ", material: grey, role: occluder");
+    EXPECT_EQ(material(loaded.arena, object(loaded.arena).material).model, ARHOST_MIRROR);
+    EXPECT_EQ(object(loaded.arena).role, ARHOST_OCCLUDER);
+}
+
+TEST(Gltf, ReadsStridesIndicesAndSparseAccessors) {
+    Gltf gltf;
+    const std::vector<float> interleaved = {0, 0, 0, 9, 1, 0, 0, 9, 0, 1, 0, 9, 5, 5, 5};
+    const int view = gltf.view(std::string(reinterpret_cast<const char *>(interleaved.data()), 60), 16);
+    const int indices = gltf.view(std::string("\3", 1));
+    const float moved[] = {1, 1, 0};
+    const int values = gltf.view(std::string(reinterpret_cast<const char *>(moved), 12));
+    gltf.accessor(view, 5126, 4, "VEC3",
+                  R"(, "sparse": {"count": 1, "indices": {"bufferView": )" + std::to_string(indices) +
+                      R"(, "componentType": 5121}, "values": {"bufferView": )" + std::to_string(values) + "}}");
+    gltf.accessor(gltf.view(std::string("\0\0\1\0\2\0\3\0", 8)), 5123, 4, "SCALAR");
+    gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 5}]})";
+    const Arena arena = load(gltf.text()).arena;
+    EXPECT_THAT(vertex(arena, 2), ElementsAre(0, 1, 0));
+    EXPECT_THAT(vertex(arena, 3), ElementsAre(1, 1, 0));
+    ASSERT_EQ(geometry(arena).indices.count, 2u);
+    const auto *triangles = at<glm::uvec3>(arena, geometry(arena).indices);
+    EXPECT_EQ(triangles[0], glm::uvec3(0, 1, 2));
+    EXPECT_EQ(triangles[1], glm::uvec3(1, 3, 2)) << "a strip turns round each second triangle";
+}
+
+TEST(Gltf, ReadsMaterialsAndTextures) {
+    Gltf gltf = triangle();
+    const std::string image = png(1, 1, 4, {1, 2, 3, 4});
+    const int view = gltf.view(image);
+    gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]})";
+    gltf.more = R"(, "materials": [{"alphaMode": "MASK", "alphaCutoff": 0.25, "emissiveFactor": [1, 0.5, 0],
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 0.5], "metallicFactor": 0.1, "roughnessFactor": 0.2,
+        "baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}}, "normalTexture": {"index": 1}}],
+        "textures": [{"source": 0, "sampler": 0}, {"source": 0}], "samplers": [{"wrapS": 33071, "wrapT": 33648}],
+        "images": [{"mimeType": "image/png", "bufferView": )" +
+                std::to_string(view) + "}]";
+    const Arena arena = load(gltf.text()).arena;
+    const arhost_material &m = material(arena, object(arena).material);
+    EXPECT_THAT(m.diffuse, ElementsAre(0.5f, 0.25f, 1));
+    EXPECT_THAT(m.emission, ElementsAre(1, 0.5f, 0));
+    EXPECT_EQ(m.metallic, 0.1f);
+    EXPECT_EQ(m.roughness, 0.2f);
+    EXPECT_EQ(m.alpha_cutoff, 0.5f) << "of the texture's alpha, which the factor halves";
+    ASSERT_EQ(arena.scene().textures.count, 3u);
+    const auto *textures = at<arhost_texture>(arena, arena.scene().textures);
+    EXPECT_EQ(textures[m.colour_texture].format, ARHOST_TEXEL_SRGB8);
+    EXPECT_EQ(textures[m.colour_texture].wrap_u, ARHOST_WRAP_CLAMP);
+    EXPECT_EQ(textures[m.colour_texture].wrap_v, ARHOST_WRAP_MIRROR);
+    EXPECT_EQ(textures[m.metallic_roughness_texture].format, ARHOST_TEXEL_RGBA8);
+    EXPECT_EQ(textures[m.normal_texture].wrap_u, ARHOST_WRAP_REPEAT);
+    EXPECT_EQ(m.emission_texture, ARHOST_NONE);
+    EXPECT_EQ(at<std::uint8_t>(arena, textures[m.colour_texture].texels)[2], 3);
+}
+
+TEST(Gltf, RestsWithoutAnAnimation) {
+    const Loaded loaded = load(skinned().text());
+    EXPECT_EQ(loaded.arena.scene().duration_s, 0);
+    EXPECT_EQ(object(loaded.arena).deforms, 0u);
+    EXPECT_EQ(geometry(loaded.arena).joints.count, 0u);
+    EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(0, 1, 0)) << "a skin's node places nothing";
+    EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("stands still; 'animation' may be one of: 0 'wave'")));
+}
+
+TEST(Gltf, DeformsSkinsByTheirAnimation) {
+    for (const std::string animation : {"wave", "0"}) {
+        const Loaded loaded = load(skinned().text(), ", animation: " + animation +
+                                                         ", transform: [{scale: 10}, {translate: [1, 2, 3]}]");
+        const Arena &arena = loaded.arena;
+        EXPECT_EQ(arena.scene().duration_s, 1);
+        EXPECT_EQ(object(arena).deforms, 1u);
+        EXPECT_EQ(object(arena).moves, 0u);
+        MotionEvaluator evaluator(arena.scene());
+        const arhost_motion motion = evaluator.at(0.5);
+        ASSERT_EQ(motion.deformed_count, 1u);
+        const float *p = motion.deformed[0].positions;
+        EXPECT_THAT(std::vector<float>(p, p + 9), ElementsAre(1, 2, 3, 11, 2, 3, near(1), near(12), near(3)));
+        EXPECT_EQ(arena.scene().bounds_max[0], 11);
+    }
+}
+
+TEST(Gltf, MovesRigidNodesAndWhatIsBelowThem) {
+    Gltf gltf = triangle();
+    const int times = gltf.floats({0, 2}, "SCALAR", 1), ways = gltf.floats({0, 0, 0, 0, 4, 0}, "VEC3", 3);
+    gltf.nodes = R"({"children": [1]}, {"mesh": 0, "translation": [7, 0, 0]}, {"mesh": 0})";
+    gltf.scene_nodes = "0, 2";
+    gltf.more = R"(, "animations": [{"samplers": [{"input": )" + std::to_string(times) + R"(, "output": )" +
+                std::to_string(ways) +
+                R"(}], "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}])";
+    const Arena arena = load(gltf.text(), ", animation: 0, transform: [{scale: 10}]").arena;
+    ASSERT_EQ(arena.scene().objects.count, 2u);
+    EXPECT_EQ(object(arena, 0).moves, 1u);
+    EXPECT_EQ(object(arena, 1).moves, 0u) << "nothing above it is animated";
+    MotionEvaluator evaluator(arena.scene());
+    const arhost_motion motion = evaluator.at(1);
+    ASSERT_EQ(motion.moved_count, 1u);
+    EXPECT_THAT(motion.moved[0].world_from_object, ElementsAre(10, 0, 0, 0, 10, 0, 0, 0, 10, 70, 20, 0));
+}
+
+TEST(Gltf, MorphsByItsAnimation) {
+    Gltf gltf = triangle();
+    const int target = gltf.floats({0, 0, 0, 0, 0, 2, 0, 0, 0}, "VEC3", 3);
+    const int times = gltf.floats({0, 1}, "SCALAR", 1), weights = gltf.floats({0, 1}, "SCALAR", 1);
+    gltf.meshes = R"({"weights": [0.5], "primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": )" +
+                  std::to_string(target) + "}]}]}";
+    EXPECT_THAT(vertex(load(gltf.text()).arena, 1), ElementsAre(1, 0, 1)) << "at rest with the mesh's weights";
+    gltf.more = R"(, "animations": [{"samplers": [{"input": )" + std::to_string(times) + R"(, "output": )" +
+                std::to_string(weights) +
+                R"(}], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}])";
+    const Arena arena = load(gltf.text(), ", animation: 0").arena;
+    MotionEvaluator evaluator(arena.scene());
+    EXPECT_EQ(evaluator.at(0.25).deformed[0].positions[5], 0.5f);
+}
+
+TEST(Gltf, GoesTheWayOfAMotionToo) {
+    const Arena arena =
+        load(skinned().text(), ", animation: wave, motion: {keys: [{at_s: 0}, {at_s: 4, translate: [0, 0, 8]}]}")
+            .arena;
+    EXPECT_EQ(arena.scene().duration_s, 4);
+    MotionEvaluator evaluator(arena.scene());
+    EXPECT_EQ(evaluator.at(1).deformed[0].positions[2], 2);
+}
+
+TEST(Gltf, TellsWhatIsWrong) {
+    EXPECT_THAT(error_of("{"), HasSubstr("s.yaml:5:12: objects[0].gltf: "));
+    EXPECT_THAT(error_of("{"), HasSubstr("is not a glTF 2.0 file that can be loaded: "));
+    EXPECT_THAT(error_of("glTF\2"), HasSubstr("is not a glTF 2.0 file that can be loaded: "));
+    EXPECT_THAT(error_of(skinned().text(), ", animation: jump"), HasSubstr("objects[0].animation: "));
+    EXPECT_THAT(error_of(skinned().text(), ", animation: jump"),
+                HasSubstr("has no animation 'jump'; there are: 0 'wave'"));
+    EXPECT_THAT(error_of(triangle().text(), ", animation: 0"), HasSubstr("has no animation '0', nor any other"));
+    const auto spoilt = [](const auto &spoil) {
+        Gltf gltf = skinned();
+        spoil(gltf);
+        return error_of(gltf.text(), ", animation: wave");
+    };
+    const auto replace = [](std::string &in, const std::string &what, const std::string &by) {
+        in.replace(in.find(what), what.size(), by);
+    };
+    EXPECT_THAT(spoilt([](Gltf &g) { g.meshes = R"({"primitives": [{"attributes": {"POSITION": 99}}]})"; }),
+                HasSubstr("names accessor 99, but there are 7"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.accessors, "\"count\": 3", "\"count\": 300"); }),
+                HasSubstr("POSITION (accessor 0) reaches past the end of its buffer"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.accessors, "VEC3", "VEC2"); }),
+                HasSubstr("POSITION (accessor 0) has elements of a wrong type"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.accessors, "5126", "5130"); }), HasSubstr("double precision"));
+    EXPECT_THAT(spoilt([&](Gltf &g) {
+                    replace(g.accessors, "\"bufferView\": 0, ", "");
+                    replace(g.accessors, "\"count\": 3", "\"count\": 2000000000");
+                }),
+                HasSubstr("too many elements"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 100000"); }),
+                HasSubstr("reaches past the end"));
+    EXPECT_THAT(spoilt([](Gltf &g) { g.scene_nodes = "0"; }),
+                HasSubstr("joint 1, which is not in the default scene"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.nodes, "\"children\": [2]", "\"children\": [2, 2]"); }),
+                HasSubstr("node 2 stands in the tree of nodes twice"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.nodes, "\"children\": [2]", "\"children\": [1]"); }),
+                HasSubstr("twice"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { g.bytes[60] = 5; }), HasSubstr("names joint 5, but the skin has 2"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.more, "\"input\": 5", "\"input\": 6"); }), HasSubstr("wrong type"));
+    EXPECT_THAT(spoilt([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
+                HasSubstr("needs the extension 'KHR_draco_mesh_compression'"));
+    Gltf points = triangle();
+    points.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]})";
+    EXPECT_THAT(error_of(points.text()), HasSubstr("there are no triangles in its default scene"));
+}
+
+TEST(YamlMotion, MovesAnyObject) {
+    const Arena arena =
+        load_scene(
+            arhost::yaml::Node::parse(
+                "version: 1\naxes: z-up\nmaterials: {grey: {model: mirror}}\nobjects:\n"
+                "  - {cuboid: {size: 2}, material: grey, transform: [{translate: [5, 0, 0]}], motion: {keys: [\n"
+                "      {at_s: 0}, {at_s: 2, translate: [0, 0, 6], rotate: {axis: [0, 0, 1], degrees: 90}, scale: "
+                "3}]}}\n",
+                "s.yaml"))
+            .build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    EXPECT_EQ(arena.scene().duration_s, 2);
+    EXPECT_EQ(arena.scene().bounds_max[0], 6);
+    MotionEvaluator evaluator(arena.scene());
+    const float *m = evaluator.at(1).moved[0].world_from_object; // turned by 45°, twice as large, 3 higher
+    EXPECT_THAT(std::vector<float>(m, m + 12), ElementsAre(near(1.4142135f), near(1.4142135f), 0, near(-1.4142135f),
+                                                           near(1.4142135f), 0, 0, 0, near(2), 0, 0, 3));
+}
+
+TEST(YamlMotion, TellsWhatIsWrong) {
+    const auto error = [](const std::string &keys) -> std::string {
+        try {
+            load_scene(arhost::yaml::Node::parse("version: 1\naxes: z-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
+                                                 "  - {sphere: {radius: 2}, material: a, motion: {keys: " +
+                                                     keys + "}}\n",
+                                                 "s.yaml"));
+        } catch (const arhost::yaml::Error &error) {
+            return error.what();
+        }
+        return "no error";
+    };
+    EXPECT_EQ(error("[{at_s: 0, scale: 1}]"), "s.yaml:5:55: objects[0].motion.keys: needs two keys at least");
+    EXPECT_THAT(error("[{at_s: 0}, {at_s: 1}]"), HasSubstr("name neither translate, rotate nor scale"));
+    EXPECT_THAT(error("[{at_s: 1, scale: 1}, {at_s: 1, scale: 2}]"),
+                HasSubstr("keys[1].at_s: must be later than the key before"));
+    EXPECT_THAT(error("[{at_s: 0, scale: 0}, {at_s: 1}]"),
+                HasSubstr("keys[0].scale: each factor must be 1e-6 to 1e6"));
+    EXPECT_THAT(error("[{at_s: 0, scale: [1, 1, 2]}, {at_s: 1}]"), HasSubstr("scales a sphere unevenly"));
+    EXPECT_THAT(error("[{at_s: 0, spin: 3}, {at_s: 1}]"), HasSubstr("keys[0].spin: unknown key"));
+}

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_samples.hpp"
+#include "plugin_under_test.hpp"
+#include "scene/loader.hpp"
+#include "scene_samples.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+using namespace arhost::scene;
+using namespace arhost::scene::test;
+using arhost::test::ScratchFolder;
+using testing::ElementsAre;
+using testing::FloatNear;
+using testing::HasSubstr;
+
+namespace {
+
+const std::string start = "version: 1\naxes: z-up\n";
+const std::string plane = "objects:\n  - {plane: {size: 1}, material: a}\n";
+
+// Loads a scene in a folder with one image.
+class Scene {
+public:
+    Scene(const std::string &image_name, const std::string &image) { write_file(folder_.path() / image_name, image); }
+    Arena load(const std::string &text, const LoadCallbacks &callbacks = {}) {
+        write_file(folder_.path() / "s.yaml", start + text);
+        Arena arena = load_scene(folder_.path() / "s.yaml", callbacks).build();
+        EXPECT_EQ(validate(arena.bytes()), "");
+        return arena;
+    }
+    Arena load_texture(const std::string &texture, const LoadCallbacks &callbacks = {}) {
+        return load("materials: {a: {model: diffuse, texture: " + texture + "}}\n" + plane, callbacks);
+    }
+    // Behind "s.yaml:", without the folder.
+    std::string error_of(const std::string &text) {
+        try {
+            load(text);
+        } catch (const arhost::yaml::Error &error) {
+            std::string what = error.what();
+            const std::string path = folder_.path().string() + "/";
+            for (std::size_t at; (at = what.find(path)) != std::string::npos;)
+                what.erase(at, path.size());
+            return what;
+        }
+        return "no error";
+    }
+
+private:
+    ScratchFolder folder_;
+};
+
+template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
+    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
+}
+const arhost_texture &texture(const Arena &a, std::size_t i = 0) {
+    return at<arhost_texture>(a, a.scene().textures)[i];
+}
+const arhost_material &material(const Arena &a) {
+    return *at<arhost_material>(a, a.scene().materials);
+}
+std::vector<int> bytes(const Arena &a, std::size_t i = 0) {
+    const auto *p = at<std::uint8_t>(a, texture(a, i).texels);
+    return {p, p + 4 * texture(a, i).texels.count};
+}
+std::vector<float> floats(const Arena &a, std::size_t i = 0) {
+    const auto *p = at<float>(a, texture(a, i).texels);
+    return {p, p + 4 * texture(a, i).texels.count};
+}
+
+} // namespace
+
+TEST(Textures, ComeFromPngWithTheFirstRowAtTheTopAndStraightAlpha) {
+    const Arena arena = Scene("a.png", png(1, 2, 4, {10, 20, 30, 40, 50, 60, 70, 80})).load_texture("a.png");
+    ASSERT_EQ(arena.scene().textures.count, 1u);
+    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_SRGB8);
+    EXPECT_EQ(texture(arena).width, 1u);
+    EXPECT_EQ(texture(arena).height, 2u);
+    EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_REPEAT);
+    EXPECT_THAT(bytes(arena), ElementsAre(10, 20, 30, 40, 50, 60, 70, 80));
+    EXPECT_EQ(material(arena).colour_texture, 0u);
+    EXPECT_THAT(material(arena).diffuse, testing::Each(1.0f)) << "where the texture gives the colour";
+}
+
+TEST(Textures, GetTheChannelsThatTheyLack) {
+    EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 1, {7})).load_texture("a.png")), ElementsAre(7, 7, 7, 255));
+    EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 2, {7, 9})).load_texture("a.png")), ElementsAre(7, 7, 7, 9));
+    EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 3, {1, 2, 3})).load_texture("a.png")), ElementsAre(1, 2, 3, 255));
+    EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 1, {'\x80', 0}, 16)).load_texture("a.png")),
+                ElementsAre(128, 128, 128, 255));
+    EXPECT_THAT(bytes(Scene("a.ppm", "P6\n1 1\n255\n\1\2\3").load_texture("a.ppm")), ElementsAre(1, 2, 3, 255));
+    const std::vector<int> grey_jpeg = bytes(Scene("a.jpg", jpeg()).load_texture("a.jpg"));
+    ASSERT_EQ(grey_jpeg.size(), 256u);
+    EXPECT_NEAR(grey_jpeg[0], 128, 2);
+    EXPECT_EQ(grey_jpeg[255], 255);
+}
+
+TEST(Textures, OfFloatsAreLinearAndKeptWithinTheirRange) {
+    const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
+    EXPECT_EQ(texture(radiance).format, ARHOST_TEXEL_RGBA32F);
+    EXPECT_EQ(texture(radiance).height, 2u);
+    const std::vector<float> texels = floats(radiance);
+    EXPECT_NEAR(texels[0], 1, 0.01);
+    EXPECT_NEAR(texels[1], 0.5, 0.01);
+    EXPECT_EQ(texels[3], 1);
+    EXPECT_NEAR(texels[6] / texels[5], 2, 0.3);
+
+    LoadCallbacks callbacks;
+    std::vector<std::string> info;
+    callbacks.info = [&](const std::string &text) { info.push_back(text); };
+    const Arena arena =
+        Scene("a.exr", exr({0.5f, std::nanf("")}, {-1, 2e6f}, {3, INFINITY})).load_texture("a.exr", callbacks);
+    EXPECT_THAT(floats(arena), ElementsAre(3, 0, 0.5f, 1, 1e6f, 1e6f, 0, 1));
+    EXPECT_THAT(info, testing::Contains(HasSubstr("a.exr: 4 numbers below 0, above 1e6 or not a number")));
+}
+
+TEST(Textures, SayHowTheyAreWrappedAndEncoded) {
+    const Arena arena =
+        Scene("a.png", png(1, 1, 1, {7})).load_texture("{image: a.png, wrap: mirror, encoding: linear}");
+    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA8);
+    EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_MIRROR);
+    EXPECT_EQ(texture(arena).wrap_v, ARHOST_WRAP_MIRROR);
+}
+
+TEST(Textures, OfTheSameFileAreStoredOnce) {
+    const Arena arena =
+        Scene("a.png", png(1, 1, 1, {7}))
+            .load("materials:\n  a: {model: metallic-roughness, texture: a.png, emission_texture: ./a.png, "
+                  "metallic_roughness_texture: a.png,\n"
+                  "    normal_texture: {image: a.png, wrap: clamp}}\n" +
+                  plane);
+    ASSERT_EQ(arena.scene().textures.count, 3u);
+    EXPECT_EQ(material(arena).colour_texture, 0u);
+    EXPECT_EQ(material(arena).emission_texture, 0u);
+    EXPECT_EQ(material(arena).metallic_roughness_texture, 1u);
+    EXPECT_EQ(material(arena).normal_texture, 2u);
+    EXPECT_THAT(material(arena).emission, testing::Each(1.0f));
+    EXPECT_EQ(texture(arena, 1).format, ARHOST_TEXEL_RGBA8);
+    EXPECT_EQ(texture(arena, 2).wrap_u, ARHOST_WRAP_CLAMP);
+}
+
+TEST(Textures, TellWhatIsWrongWithTheirFile) {
+    const auto error = [](const std::string &name, const std::string &content) {
+        return Scene(name, content)
+            .error_of("materials:\n  a: {model: diffuse, texture: " + name + "}\nobjects: []\n");
+    };
+    EXPECT_EQ(error("a.png", "GIF89a"),
+              "s.yaml:4:32: materials.a.texture: a.png: is none of PNG, JPEG, PPM, HDR and EXR "
+              "by its content; convert it to one of them");
+    EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
+    EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: can't be loaded: "));
+    EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: can't be loaded: "));
+    EXPECT_EQ(error("a.png", png(16385, 1, 1, "")), "s.yaml:4:32: materials.a.texture: a.png: has 16385 x 1 pixels; "
+                                                    "up to 16384 a side are loaded, so scale it down");
+    EXPECT_EQ(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: b.png}\nobjects: []\n"),
+              "s.yaml:4:32: materials.a.texture: b.png: can't be read: No such file or directory");
+    EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: .}\nobjects: []\n"),
+                HasSubstr("is not a regular file"));
+    EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: mirror, texture: a.png}\nobjects: []\n"),
+                HasSubstr("materials.a.texture: unknown key"));
+    EXPECT_THAT(Scene("a.png", "")
+                    .error_of("materials:\n  a: {model: diffuse, texture: {image: a.png, wrap: round}}\n"
+                              "objects: []\n"),
+                HasSubstr("materials.a.texture.wrap: "));
+}
+
+TEST(Textures, NeedTextureCoordinates) {
+    EXPECT_EQ(
+        Scene("a.png", png(1, 1, 1, {7}))
+            .error_of("materials:\n  a: {model: diffuse, texture: a.png}\nobjects:\n  - {sphere: {radius: 1}, "
+                      "material: a}\n"),
+        "s.yaml:6:14: objects[0].sphere: has no texture coordinates, so its material can't have textures; give it "
+        "another material, or a mesh with texture coordinates");
+}
+
+TEST(Textures, StopWhenTheLoadingIsCancelled) {
+    LoadCallbacks callbacks;
+    callbacks.cancelled = [] { return true; };
+    EXPECT_THROW(Scene("a.png", png(64, 64, 1, "")).load_texture("a.png", callbacks), Cancelled);
+}
+
+// A direction has u = ½ + atan2(x, −z)/2π of the environment: the image's middle lies at −z, ¾ at +x.
+TEST(Environments, LieAboutTheScenesUp) {
+    const auto looked_up = [](const std::string &axes, double degrees, glm::vec3 d) {
+        ScratchFolder folder;
+        write_file(folder.path() / "a.png", png(1, 1, 1, {7}));
+        write_file(folder.path() / "s.yaml", "version: 1\naxes: " + axes +
+                                                 "\nenvironment: {image: a.png, rotate_degrees: " +
+                                                 std::to_string(degrees) + "}\nmaterials: {}\nobjects: []\n");
+        const Arena arena = load_scene(folder.path() / "s.yaml").build();
+        EXPECT_EQ(validate(arena.bytes()), "");
+        const float *m = arena.scene().environment.environment_from_world;
+        const auto row = [&](int i) { return m[i] * d.x + m[3 + i] * d.y + m[6 + i] * d.z + 0.f; };
+        return std::vector<float>{std::round(row(0) * 1e5f) / 1e5f + 0.f, std::round(row(1) * 1e5f) / 1e5f + 0.f,
+                                  std::round(row(2) * 1e5f) / 1e5f + 0.f};
+    };
+    EXPECT_THAT(looked_up("y-up", 0, {1, 2, 3}), ElementsAre(1, 2, 3));
+    EXPECT_THAT(looked_up("z-up", 0, {0, 0, 1}), ElementsAre(0, 1, 0)) << "up";
+    EXPECT_THAT(looked_up("z-up", 0, {0, 1, 0}), ElementsAre(0, 0, -1)) << "away: the image's middle";
+    EXPECT_THAT(looked_up("z-up", 0, {1, 0, 0}), ElementsAre(1, 0, 0));
+    // Turned left by 90° seen from above, the middle is at the left.
+    EXPECT_THAT(looked_up("z-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
+    EXPECT_THAT(looked_up("y-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
+}
+
+TEST(Environments, HaveCumulativeSums) {
+    // White left, black right; the lower row black.
+    const Arena arena = Scene("a.png", png(2, 2, 1, {'\xff', 0, 0, 0}))
+                            .load("environment: {image: a.png, intensity: 3}\nmaterials: {}\nobjects: []\n");
+    const arhost_environment &environment = arena.scene().environment;
+    EXPECT_EQ(environment.texture, 0u);
+    EXPECT_EQ(environment.intensity, 3);
+    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA32F);
+    EXPECT_THAT(floats(arena), ElementsAre(1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
+    const auto *rows = at<float>(arena, environment.rows), *columns = at<float>(arena, environment.columns);
+    EXPECT_THAT(std::vector<float>(rows, rows + 2), ElementsAre(1, 1));
+    EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(1, 1, 0.5f, 1)) << "evenly where all is black";
+    EXPECT_THAT(arena.scene().ambient, testing::Each(0.0f)) << "the environment lights from everywhere";
+}
+
+TEST(Environments, WeighRowsByTheirExtent) {
+    const Arena arena = Scene("a.png", png(1, 3, 1, {'\xbc', '\xbc', '\xbc'}))
+                            .load("ambient: 0.1\nenvironment: {image: a.png}\nmaterials: {}\nobjects: []\n");
+    const auto *rows = at<float>(arena, arena.scene().environment.rows);
+    EXPECT_NEAR(rows[0], 0.25, 1e-6) << "sin 30° : sin 90° : sin 150°";
+    EXPECT_NEAR(rows[1], 0.75, 1e-6);
+    EXPECT_EQ(rows[2], 1);
+    EXPECT_NEAR(floats(arena)[0], 0.5029, 1e-3) << "188 of 255 in sRGB";
+    EXPECT_EQ(arena.scene().ambient[0], 0.1f);
+}
+
+TEST(Environments, TellWhatIsWrong) {
+    const auto error = [](const std::string &text) {
+        return Scene("a.png", png(1, 1, 1, {7})).error_of(text + "\nmaterials: {}\nobjects: []\n");
+    };
+    EXPECT_EQ(error("environment: a.png"), "s.yaml:3:14: environment: must be a map with the key 'image'");
+    EXPECT_THAT(error("environment: {intensity: 2}"), HasSubstr("environment: the key 'image' is missing"));
+    EXPECT_THAT(error("environment: {image: b.png}"),
+                HasSubstr("s.yaml:3:22: environment.image: b.png: can't be read"));
+    EXPECT_THAT(error("environment: {image: a.png, intensity: -1}"), HasSubstr("environment.intensity: "));
+}
