@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <numbers>
 #include <span>
 #include <sstream>
 
@@ -37,6 +39,16 @@ void set_focal_length(double &to, double value, const Node &node) {
         node.fail(message.str());
     }
     to = value;
+}
+
+// Square pixels that reach so far between the image's upper and lower edge.
+void set_vertical_fov(arhost_intrinsics &to, double degrees) {
+    to.fx = to.fy = to.height / 2.0 / std::tan(degrees / 2 * std::numbers::pi / 180);
+}
+
+void set_axis_to_centre(arhost_intrinsics &to) {
+    to.cx = (to.width - 1) / 2.0;
+    to.cy = (to.height - 1) / 2.0;
 }
 
 // Checks the count for the model and drops what has no effect.
@@ -171,14 +183,22 @@ arhost_intrinsics parse_camera(const Node &node) {
             file->fail("the calibration file " + path.string() + " does not exist");
         return read_calibration(path, size_beside_file(node));
     }
-    node.allow_keys({"file", "width", "height", "fx", "fy", "cx", "cy", "distortion"});
+    node.allow_keys({"file", "width", "height", "fx", "fy", "vertical_fov_degrees", "cx", "cy", "distortion"});
     arhost_intrinsics intrinsics = intrinsics_for({side(node.require("width")), side(node.require("height"))});
-    const Node fx = node.require("fx"), fy = node.find("fy").value_or(fx);
-    set_focal_length(intrinsics.fx, fx.real(), fx);
-    set_focal_length(intrinsics.fy, fy.real(), fy);
-    const auto cx = node.find("cx"), cy = node.find("cy");
-    intrinsics.cx = cx ? cx->real() : (intrinsics.width - 1) / 2.0;
-    intrinsics.cy = cy ? cy->real() : (intrinsics.height - 1) / 2.0;
+    if (const auto fov = node.find("vertical_fov_degrees")) {
+        if (node.find("fx") || node.find("fy"))
+            fov->fail("stands for fx and fy; keep it or them");
+        set_vertical_fov(intrinsics, fov->real(0.01, 179));
+    } else {
+        const Node fx = node.require("fx"), fy = node.find("fy").value_or(fx);
+        set_focal_length(intrinsics.fx, fx.real(), fx);
+        set_focal_length(intrinsics.fy, fy.real(), fy);
+    }
+    set_axis_to_centre(intrinsics);
+    if (const auto cx = node.find("cx"))
+        intrinsics.cx = cx->real();
+    if (const auto cy = node.find("cy"))
+        intrinsics.cy = cy->real();
     if (const auto distortion = node.find("distortion")) {
         distortion->allow_keys({"model", "coefficients"});
         const std::string model = distortion->require("model").choice({"none", "brown", "fisheye"});
@@ -192,6 +212,13 @@ arhost_intrinsics parse_camera(const Node &node) {
                        coefficients ? coefficients->reals() : std::vector<double>(),
                        coefficients.value_or(*distortion));
     }
+    return intrinsics;
+}
+
+arhost_intrinsics dissertation_camera(const Size &size) {
+    arhost_intrinsics intrinsics = intrinsics_for(size);
+    set_vertical_fov(intrinsics, 45);
+    set_axis_to_centre(intrinsics);
     return intrinsics;
 }
 

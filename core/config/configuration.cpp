@@ -5,6 +5,7 @@
 #include "config/options.hpp"
 #include "config/schema.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <limits>
 #include <set>
@@ -107,14 +108,20 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     const PluginPath plugin_path(folders, built_in_plugins);
     const supervise::RestartLimits restart = parse_restart(root.find("restart"));
 
-    const yaml::Node source_node = root.require("source");
-    SourceConfiguration source{parse_component(source_node, "source", plugin_path, restart)};
-    if (const auto fps = source_node.find("fps"))
-        source.fps = fps->real(0, 10'000);
-
-    Configuration configuration{.node = root, .source = std::move(source)};
+    Configuration configuration{.node = root};
+    const auto trajectory_node = root.find("trajectory");
+    if (trajectory_node)
+        configuration.trajectory = camera::read_trajectory(trajectory_node->input_path());
+    if (const auto node = trajectory_node ? root.find("source") : root.require("source")) {
+        configuration.source = SourceConfiguration{parse_component(*node, "source", plugin_path, restart)};
+        if (const auto fps = node->find("fps"))
+            configuration.source->fps = fps->real(0, 10'000);
+    }
     if (const auto mode = root.find("mode"))
         configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
+    if (configuration.mode == Mode::live && !configuration.source)
+        root.require("mode").fail("live needs a 'source' that sets the pace; without one a trajectory is traced "
+                                  "in lockstep");
     configuration.frames =
         static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
     if (const auto node = root.find("camera")) {
@@ -122,14 +129,25 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         configuration.camera = camera::parse_camera(*node);
         configuration.camera_node = node;
     }
-    if (const auto node = root.find("tracker"))
+    if (const auto &trajectory = configuration.trajectory) {
+        const std::uint64_t end = trajectory->end();
+        configuration.frames = configuration.frames ? std::min(configuration.frames, end) : end;
+        if (!configuration.camera) {
+            configuration.camera = trajectory->intrinsics.value_or(camera::dissertation_camera({800, 600}));
+            configuration.camera_node = trajectory_node;
+        }
+    }
+    if (const auto node = root.find("tracker")) {
         configuration.tracker = parse_tracker(*node, plugin_path, restart);
+        if (!configuration.source)
+            node->fail("a tracker needs a 'source' that gives it frames");
+    }
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
         configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart),
                                                          scene.input_path(), scene};
-        if (!configuration.tracker)
-            node->fail("a ray tracer needs a 'tracker' that tells where the camera is");
+        if (!configuration.tracker && !configuration.trajectory)
+            node->fail("a ray tracer needs a 'tracker' or a 'trajectory' that tells where the camera is");
         if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
             scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
     }
@@ -146,6 +164,10 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         if (path && !files.insert(std::filesystem::absolute(path->text()).lexically_normal()).second)
             path->fail("another output writes '" + path->text() + "' already");
     }
+    if (trajectory_node && files.contains(trajectory_node->input_path()))
+        trajectory_node->fail("an output of this run writes this very file; choose another path for it");
+    if (trajectory_node)
+        files.insert(trajectory_node->input_path());
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =

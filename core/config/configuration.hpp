@@ -4,6 +4,7 @@
 #pragma once
 
 #include "camera/coordinates.hpp"
+#include "camera/trajectory.hpp"
 #include "config/plugin_path.hpp"
 #include "supervise/component.hpp"
 #include "yaml/yaml.hpp"
@@ -45,9 +46,10 @@ struct RaytracerConfiguration : ComponentConfiguration {
 struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
-    std::uint64_t frames = 0; // 0: all
-    SourceConfiguration source;
-    std::optional<arhost_intrinsics> camera{};
+    std::uint64_t frames = 0;                       // 0: all
+    std::optional<SourceConfiguration> source{};    // none: black frames for a trajectory
+    std::optional<camera::Trajectory> trajectory{}; // where cameras come from in place of the tracker
+    std::optional<arhost_intrinsics> camera{};      // always set where there is a trajectory
     std::optional<yaml::Node> camera_node{};
     std::optional<TrackerConfiguration> tracker{};
     std::optional<RaytracerConfiguration> raytracer{};

@@ -22,7 +22,8 @@ const std::vector<Key> &table() {
         {"frames", integer, false, "0", "Stop after so many frames; 0: at the source's end."},
         {"plugin_path", list, false, "", "Further folders to look for plugins in, before the built-in one."},
 
-        {"source", map, true, "", "Where frames come from."},
+        {"source", map, false, "",
+         "Where frames come from. Only a `trajectory` does without: it is traced over black."},
         {"source.plugin", text, true, "", "A plugin's name (`source_synthetic`), or a path to a `.so`."},
         {"source.path", input_path, false, "",
          "The file, or files by a printf pattern, for plugins that read files."},
@@ -31,12 +32,16 @@ const std::vector<Key> &table() {
         {"source.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"source.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
 
-        {"camera", map, false, "the source's own", "The camera's intrinsics (docs/camera.md)."},
+        {"trajectory", input_path, false, "", "Cameras from this file, not from the tracker (docs/trajectories.md)."},
+
+        {"camera", map, false, "the trajectory's, or the source's own", "The camera's intrinsics (docs/camera.md)."},
         {"camera.file", input_path, false, "", "A calibration, as OpenCV writes it (YAML)."},
         {"camera.width", integer, false, "", "Image width that the intrinsics belong to, in px."},
         {"camera.height", integer, false, "", "Image height, in px."},
         {"camera.fx", real, false, "", "Focal length in px."},
         {"camera.fy", real, false, "fx", "Focal length in px."},
+        {"camera.vertical_fov_degrees", real, false, "",
+         "In place of fx and fy, where the camera is not calibrated."},
         {"camera.cx", real, false, "(width − 1) / 2", "Principal point in px; pixel centres are at integers."},
         {"camera.cy", real, false, "(height − 1) / 2", "Principal point in px."},
         {"camera.distortion", map, false, "none", "The lens."},

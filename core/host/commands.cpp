@@ -54,20 +54,94 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     return coordinates;
 }
 
-config::Configuration read_configuration(const Arguments &arguments) {
-    yaml::Node root = yaml::Node::load(arguments.file);
+config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
         if (equals == 0 || equals == std::string::npos)
             throw yaml::Error("--set " + setting + ": must be key.path=value, as in --set source.fps=30");
         root.override_value(setting.substr(0, equals), setting.substr(equals + 1));
     }
-    config::Configuration configuration = config::parse(root, built_in_plugins());
     if (arguments.frames)
-        configuration.frames = *arguments.frames;
+        root.override_value("frames", std::to_string(*arguments.frames), "--frames");
+    config::Configuration configuration = config::parse(root, built_in_plugins());
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
     return configuration;
+}
+
+config::Configuration read_configuration(const Arguments &arguments) {
+    yaml::Node root = yaml::Node::load(arguments.file);
+    return parse_configuration(root, arguments);
+}
+
+// The sink that writes files of such a name.
+std::string sink_for(const fs::path &file) {
+    const std::string extension = file.extension().string();
+    for (const char *picture : {".png", ".jpg", ".jpeg"})
+        if (extension == picture)
+            return "sink_images";
+    if (extension == ".jsonl")
+        return "sink_poses";
+    if (extension.empty())
+        throw yaml::Error("--output " + file.string() +
+                          ": end the name in .mp4 or .mkv for a film, .png or .jpg for images, .jsonl for poses");
+    return "sink_video"; // which knows what it can write
+}
+
+// What is replayed is the trajectory in `arguments.file`'s chain or in the simplest one. That file's
+// outputs are not touched: they may be what the recorded run has left.
+config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
+    constexpr const char *simplest = "version: 1\nraytracer: {plugin: rt_embree}\n";
+    constexpr const char *simplest_chain =
+        "version: 1\n"
+        "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
+        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+        "80}]}\n"
+        "raytracer: {plugin: rt_embree}\n";
+    yaml::Node root = !arguments.file.empty()
+                          ? yaml::Node::load(arguments.file)
+                          : yaml::Node::parse(replay.with_pipeline ? simplest_chain : simplest, "arhost replay");
+    if (arguments.file.empty() && replay.scene.empty())
+        throw yaml::Error("--scene is missing: the scene to trace, as in --scene config/scenes/optix-cs.yaml");
+    root.override_text("trajectory", replay.trajectory, "--trajectory");
+    root.override_value("outputs", "[]", "arhost replay");
+    if (!replay.scene.empty())
+        root.override_text("raytracer.scene", replay.scene, "--scene");
+    if (!replay.raytracer.empty())
+        root.override_text("raytracer.plugin", replay.raytracer, "--raytracer");
+    if (replay.width.has_value() != replay.height.has_value())
+        throw yaml::Error("--width and --height go together; give both or none");
+    if (replay.width)
+        root.override_value("camera",
+                            "{width: " + std::to_string(*replay.width) +
+                                ", height: " + std::to_string(*replay.height) + ", vertical_fov_degrees: 45}",
+                            "--width, --height");
+    if (!replay.output.empty() && replay.output != "none") {
+        root.override_value("outputs", "[{plugin: " + sink_for(replay.output) + "}]", "--output");
+        root.override_text("outputs[0].path", replay.output, "--output");
+    } else if (replay.with_pipeline) {
+        root.override_value("outputs", "[{plugin: sink_null}]", "arhost replay");
+    }
+    if (!replay.stats.empty())
+        root.override_text("stats", replay.stats, "--stats");
+    config::Configuration configuration = parse_configuration(root, arguments);
+    if (replay.width && configuration.trajectory->intrinsics)
+        throw yaml::Error("--width, --height: " + replay.trajectory + " tells its own image size; leave them out");
+    if (replay.with_pipeline && !(configuration.source && configuration.tracker))
+        throw yaml::Error("--with-pipeline needs a 'source' and a 'tracker'; " + arguments.file + " lacks them");
+    if (!replay.with_pipeline) {
+        configuration.source.reset();
+        configuration.tracker.reset();
+    }
+    if (replay.stats.empty())
+        configuration.stats.reset();
+    configuration.mode = config::Mode::lockstep;
+    return configuration;
+}
+
+void warn_of_trajectory(const config::Configuration &configuration, Console &console) {
+    if (configuration.trajectory && !configuration.trajectory->warning.empty())
+        console.log(ARHOST_SEVERITY_WARNING, "trajectory", configuration.trajectory->warning);
 }
 
 double cpu_seconds_of_host() {
@@ -98,11 +172,7 @@ bool write_statistics(const fs::path &file, Console &console, const std::string 
     return false;
 }
 
-} // namespace
-
-int run(const Arguments &arguments, supervise::Launcher &launcher) {
-    const config::Configuration configuration = read_configuration(arguments);
-
+int run(const config::Configuration &configuration, bool verbose, supervise::Launcher &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
@@ -111,7 +181,8 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
     ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread, which must not take them
     const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
-    Console console(arguments.verbose);
+    Console console(verbose);
+    warn_of_trajectory(configuration, console);
     ring::Reactor reactor;
     Pipeline *running = nullptr;
     Pipeline pipeline(configuration, make_context(reactor, launcher, console),
@@ -161,9 +232,20 @@ int run(const Arguments &arguments, supervise::Launcher &launcher) {
     return stopped_by_signal ? interrupted : success;
 }
 
+} // namespace
+
+int run(const Arguments &arguments, supervise::Launcher &launcher) {
+    return run(read_configuration(arguments), arguments.verbose, launcher);
+}
+
+int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Launcher &launcher) {
+    return run(replay_configuration(arguments, replay), arguments.verbose, launcher);
+}
+
 int check(const Arguments &arguments, supervise::Launcher &launcher) {
     Console console(arguments.verbose);
     const config::Configuration configuration = read_configuration(arguments);
+    warn_of_trajectory(configuration, console);
     ring::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
 
@@ -175,7 +257,8 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
             config::options_for(std::get<ring::PluginDescription>(result), kind, component, i);
         }
     };
-    check_component(configuration.source, ARHOST_KIND_SOURCE);
+    if (configuration.source)
+        check_component(*configuration.source, ARHOST_KIND_SOURCE);
     if (configuration.tracker)
         check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
     if (configuration.raytracer)

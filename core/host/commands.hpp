@@ -25,8 +25,16 @@ struct Arguments {
     bool verbose = false;
 };
 
+// `arhost replay`.
+struct ReplayArguments {
+    std::string trajectory, scene, raytracer, output, stats; // "": not given
+    std::optional<std::uint32_t> width, height;              // px
+    bool with_pipeline = false;
+};
+
 // All take a launcher that was forked before any thread.
 int run(const Arguments &arguments, supervise::Launcher &launcher);
+int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Launcher &launcher);
 int check(const Arguments &arguments, supervise::Launcher &launcher);
 int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher);
 int print_schema(bool markdown);

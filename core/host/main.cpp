@@ -62,6 +62,32 @@ int main(int argc, char **argv) {
     axes.add_option("--y2", arguments.axis2[1]);
     axes.add_option("--z2", arguments.axis2[2]);
 
+    ReplayArguments replay_arguments;
+    CLI::App *replay_command =
+        app.add_subcommand("replay", "Trace the cameras of a recorded run again (docs/trajectories.md)");
+    replay_command->add_option("--trajectory", replay_arguments.trajectory, "The recorded cameras")
+        ->type_name("FILE")
+        ->required();
+    replay_command->add_option("--scene", replay_arguments.scene, "The scene to trace")->type_name("FILE");
+    replay_command->add_option("--raytracer", replay_arguments.raytracer, "The ray tracer's plugin (rt_embree)")
+        ->type_name("PLUGIN");
+    replay_command->add_flag("--with-pipeline", replay_arguments.with_pipeline,
+                             "With source, tracker and composite at work too, not the ray tracer alone");
+    replay_command->add_option("--config", arguments.file, "Take components and scene from here, but no outputs")
+        ->type_name("FILE");
+    replay_command->add_option("--width", replay_arguments.width, "Image width in px, where FILE tells none (800)")
+        ->check(CLI::Range(1, 16384));
+    replay_command->add_option("--height", replay_arguments.height, "Image height in px (600)")
+        ->check(CLI::Range(1, 16384));
+    replay_command->add_option("--frames", arguments.frames, "Stop after so many frames")
+        ->type_name("N")
+        ->check(CLI::Range(0.0, 1e15));
+    replay_command->add_option("--output", replay_arguments.output, "A film, images, poses; by the name's extension")
+        ->type_name("FILE|none");
+    replay_command->add_option("--stats", replay_arguments.stats, "Where the statistics are written (JSON)")
+        ->type_name("FILE");
+    add_configuration_options(*replay_command);
+
     CLI::App *check_command =
         app.add_subcommand("check", "Check a configuration, its plugins' options and its scene");
     check_command->add_option("FILE", arguments.file, "The configuration")->required();
@@ -84,6 +110,8 @@ int main(int argc, char **argv) {
         if (*schema_command)
             return print_schema(markdown);
         arhost::supervise::Launcher launcher; // before any thread
+        if (*replay_command)
+            return replay(arguments, replay_arguments, launcher);
         if (*check_command)
             return check(arguments, launcher);
         if (*plugins_command)

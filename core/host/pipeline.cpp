@@ -32,8 +32,12 @@ Pipeline::Pipeline(const config::Configuration &configuration, supervise::Contex
       live_(configuration.mode == config::Mode::live) {}
 
 bool Pipeline::run() {
-    make_source();
-    source_->start();
+    if (configuration_.source) {
+        make_source();
+        source_->start();
+    } else {
+        make_black_frames();
+    }
     if (configuration_.raytracer) {
         SceneLoading::Hooks hooks;
         hooks.loaded = [this](SharedMemory arena) {
@@ -72,7 +76,7 @@ Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &
 }
 
 void Pipeline::make_source() {
-    const config::SourceConfiguration &source = configuration_.source;
+    const config::SourceConfiguration &source = *configuration_.source;
     Component::Hooks hooks = hooks_for("source", source.node);
     hooks.hello = [this, &source](const PluginDescription &plugin, std::size_t candidate) {
         const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate));
@@ -95,7 +99,7 @@ void Pipeline::make_source() {
         else if (configuration_.tracker)
             source.node.fail(
                 "this source does not know its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
-        if (configuration_.tracker) {
+        if (configuration_.tracker || configuration_.trajectory) {
             try {
                 camera::check_size(intrinsics_, format.width, format.height);
             } catch (const std::runtime_error &error) {
@@ -118,6 +122,21 @@ void Pipeline::make_source() {
         }
     };
     source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, std::move(hooks));
+}
+
+// What a trajectory without a source is composited over.
+void Pipeline::make_black_frames() {
+    intrinsics_ = *configuration_.camera;
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_GREY8;
+    format.width = intrinsics_.width;
+    format.height = intrinsics_.height;
+    format.fps = configuration_.trajectory->fps;
+    arhost_frame_layout(&format); // the configuration has checked the size
+    format_ = format;
+    source_slots_ = std::make_shared<SlotPool>(
+        supervise::make_host_region("arhost-black", {format.byte_size, source_slot_count}));
 }
 
 void Pipeline::make_tracker() {
@@ -193,14 +212,14 @@ void Pipeline::make_outputs() {
             const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SINK, output, candidate));
             if (plugin.capabilities & ARHOST_IS_REALTIME_SINK)
                 sink->depth = live_sink_depth; // a window never makes a film wait
-            const double fps = configuration_.source.fps > 0 ? configuration_.source.fps : format_->fps;
-            return Component::Create{{{"options", options},
-                                      {"setup",
-                                       {{"width", format_->width},
-                                        {"height", format_->height},
-                                        {"fps", fps},
-                                        {"first_sequence", sink->first_sequence()}}}},
-                                     {}};
+            const bool fps_is_set = configuration_.source && configuration_.source->fps > 0;
+            Json setup = {{"width", format_->width},
+                          {"height", format_->height},
+                          {"fps", fps_is_set ? configuration_.source->fps : format_->fps},
+                          {"first_sequence", sink->first_sequence()}};
+            if (intrinsics_.width > 0)
+                setup["intrinsics"] = to_json(intrinsics_);
+            return Component::Create{{{"options", options}, {"setup", setup}}, {}};
         };
         hooks.result = [this, sink, name](const Command &command, const Result &result) {
             sink->on_result(command, result);
@@ -274,7 +293,7 @@ void Pipeline::enter_next_phase() {
     const auto settled = [](const std::unique_ptr<Component> &component) {
         return !component || component->running();
     };
-    if (phase_ == Phase::source && source_->running() && !scene_loading_ && (!configuration_.raytracer || arena_)) {
+    if (phase_ == Phase::source && settled(source_) && !scene_loading_ && (!configuration_.raytracer || arena_)) {
         if (configuration_.tracker) {
             make_tracker();
             tracker_->start();
@@ -301,6 +320,8 @@ bool Pipeline::no_more_frames() const {
 }
 
 bool Pipeline::read() {
+    if (!source_)
+        return read_from_trajectory();
     if (no_more_frames() || !source_->running() || reads_.size() >= reads_in_flight)
         return false;
     std::optional<Lease> slot = source_slots_->acquire();
@@ -312,6 +333,31 @@ bool Pipeline::read() {
     command.sequence = next_read_++;
     reads_.push_back(std::move(*slot));
     source_->submit(command);
+    return true;
+}
+
+// Without a source the frames are the trajectory's, each once: what the recorded run dropped is not traced.
+bool Pipeline::read_from_trajectory() {
+    if (no_more_frames())
+        return false;
+    std::optional<Lease> slot = source_slots_->acquire();
+    if (!slot)
+        return false;
+    const camera::Trajectory &trajectory = *configuration_.trajectory;
+    const camera::TrajectoryFrame *recorded = trajectory.at_or_after(next_read_);
+    if (recorded->frame >= configuration_.frames) { // a limit that is set, and lies within the trajectory
+        ended_ = true;
+        return false;
+    }
+    auto frame = std::make_unique<Frame>();
+    frame->record.struct_size = sizeof(arhost_record);
+    frame->record.sequence = recorded->frame;
+    frame->record.overlay = ARHOST_OVERLAY_NONE;
+    frame->record.clock = trajectory.clock.value_or(ARHOST_CLOCK_MEDIA);
+    frame->record.capture_ns = recorded->capture_ns;
+    frame->pixels = std::move(*slot);
+    next_read_ = recorded->frame + 1;
+    begin(std::move(frame));
     return true;
 }
 
@@ -339,19 +385,26 @@ void Pipeline::on_read(const Command &command, const Result &result) {
         return source_->end_process(std::string("broke the contract: ") + problem);
     }
     last_capture_ns_ = result.frame.capture_ns;
-    frame->received = Clock::now();
     frame->pixels = std::move(pixels);
-    if (statistics_.frames_in++ == 0)
-        statistics_.first_frame = frame->received;
     statistics_.dropped["source"] += result.frame.skipped;
     statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
-    Frame &added = *(frames_[command.sequence] = std::move(frame));
-    if (!tracker_)
-        added.stage = Frame::Stage::done;
-    else if (live_ && is_behind())
+    begin(std::move(frame));
+}
+
+// A frame sets out.
+void Pipeline::begin(std::unique_ptr<Frame> frame) {
+    frame->received = Clock::now();
+    if (statistics_.frames_in++ == 0)
+        statistics_.first_frame = frame->received;
+    Frame &added = *(frames_[frame->record.sequence] = std::move(frame));
+    if (configuration_.trajectory)
+        take_camera_of_trajectory(added);
+    if (live_ && is_behind())
         pass(added, "latency");
-    else
+    else if (tracker_)
         wait_for(added, Frame::Stage::to_track);
+    else
+        on_camera_known(added);
 }
 
 bool Pipeline::track() {
@@ -414,23 +467,47 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         pass(frame, "tracker");
         return tracker_->end_process(std::string("broke the contract: ") + problem);
     }
+    take_camera_of_markers(frame);
+    on_camera_known(frame);
+}
+
+void Pipeline::take_camera_of_markers(Frame &frame) {
     // The first in the order of the configuration; trackers report in that order.
     const std::span markers(frame.record.markers, frame.record.marker_count);
     const auto anchor = std::find_if(markers.begin(), markers.end(),
                                      [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
-    if (anchor != markers.end()) {
-        ++statistics_.tracked;
-        last_camera_ = {command.sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
-    }
-    const std::uint32_t hold = configuration_.tracker->hold_frames;
-    if (!last_camera_ || command.sequence - last_camera_->first > hold) {
-        frame.stage = Frame::Stage::done;
+    statistics_.tracked += anchor != markers.end();
+    if (configuration_.trajectory)
         return;
-    }
-    frame.held = last_camera_->first != command.sequence;
+    const std::uint64_t sequence = frame.record.sequence;
+    if (anchor != markers.end())
+        last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
+    if (!last_camera_ || sequence - last_camera_->first > configuration_.tracker->hold_frames)
+        return;
+    frame.held = last_camera_->first != sequence;
     frame.record.camera = last_camera_->second;
     frame.record.has_camera = 1;
-    if (raytracer_)
+}
+
+// The recorded time too, so that what moves in the scene is where it was. A frame that the recorded run
+// dropped has no camera.
+void Pipeline::take_camera_of_trajectory(Frame &frame) const {
+    const camera::Trajectory &trajectory = *configuration_.trajectory;
+    const camera::TrajectoryFrame *recorded = trajectory.at_or_after(frame.record.sequence);
+    if (!recorded || recorded->frame != frame.record.sequence)
+        return;
+    if (trajectory.clock) {
+        frame.record.clock = *trajectory.clock;
+        frame.record.capture_ns = recorded->capture_ns;
+    }
+    if (recorded->view) {
+        frame.record.camera = camera::camera_of(*recorded->view, intrinsics_);
+        frame.record.has_camera = 1;
+    }
+}
+
+void Pipeline::on_camera_known(Frame &frame) {
+    if (raytracer_ && frame.record.has_camera)
         wait_for(frame, Frame::Stage::to_render);
     else
         frame.stage = Frame::Stage::done;
@@ -609,7 +686,8 @@ void Pipeline::forget_overtaken(std::uint64_t shown) {
 
 void Pipeline::end_run() {
     ended_ = true;
-    source_->cancel_call();
+    if (source_)
+        source_->cancel_call();
 }
 
 void Pipeline::give_up_sink(SinkQueue &sink) {
@@ -654,7 +732,7 @@ void Pipeline::fail(const std::string &reason, bool by_configuration) {
 void Pipeline::give_up(const std::string &name, const yaml::Node &node, const std::string &reason,
                        bool by_configuration) {
     // What the configuration's own check said begins with its place in the file.
-    const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--set");
+    const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--");
     fail(located ? reason : node.where() + ": " + name + ": " + reason, by_configuration);
     if (phase_ != Phase::running)
         return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One run of one configuration: source → tracker → camera → ray tracer → composite → outputs. Everything
+// One run of one configuration: source → tracker → camera → ray tracer → composite → outputs. A trajectory
+// gives the cameras in place of the tracker, and does without a source. Everything
 // happens on the thread that calls run(), one event at a time; the work is done by the workers, all but
 // the composite.
 //
@@ -48,6 +49,7 @@ private:
     enum class Phase { source, stages, outputs, running, stopping, over };
 
     void make_source();
+    void make_black_frames();
     void make_tracker();
     void make_raytracer();
     void make_outputs();
@@ -58,6 +60,7 @@ private:
     void end_run(); // as if the source had no more
     bool no_more_frames() const;
     bool read();
+    bool read_from_trajectory();
     bool track();
     bool render();
     bool compose();
@@ -65,6 +68,10 @@ private:
     void stop_components();
 
     void on_read(const ring::Command &command, const ring::Result &result);
+    void begin(std::unique_ptr<Frame> frame);
+    void take_camera_of_markers(Frame &frame);
+    void take_camera_of_trajectory(Frame &frame) const;
+    void on_camera_known(Frame &frame);
     Frame *take_answer(const ring::Command &command, const ring::Result &result, const char *stage);
     void on_tracked(const ring::Command &command, const ring::Result &result);
     void on_rendered(const ring::Command &command, const ring::Result &result);

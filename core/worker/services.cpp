@@ -201,6 +201,11 @@ public:
         setup.height = height_ = json.at("height").get<std::uint32_t>();
         setup.fps = json.at("fps").get<double>();
         setup.first_sequence = json.at("first_sequence").get<std::uint64_t>();
+        arhost_intrinsics intrinsics{};
+        if (json.contains("intrinsics")) {
+            intrinsics = intrinsics_from_json(json["intrinsics"]);
+            setup.intrinsics = &intrinsics;
+        }
         return sink_.start(instance_, &setup);
     }
 

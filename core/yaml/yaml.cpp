@@ -96,19 +96,27 @@ Node Node::scalar(const std::string &text, const std::string &name) {
     return Node(YAML::Node(text), "", std::make_shared<Document>(Document{name, {}}));
 }
 
-void Node::override_value(const std::string &path, const std::string &value) {
+void Node::override_value(const std::string &path, const std::string &value, const std::string &option) {
     YAML::Node parsed;
     try {
         parsed = YAML::Load(value);
     } catch (const YAML::Exception &error) {
-        throw Error("--set " + path + "=" + value + ": YAML syntax: " + error.msg);
+        throw Error(option + " " + path + "=" + value + ": YAML syntax: " + error.msg);
     }
+    replace(path, parsed, option);
+}
+
+void Node::override_text(const std::string &path, const std::string &text, const std::string &option) {
+    replace(path, YAML::Node(text), option);
+}
+
+void Node::replace(const std::string &path, const YAML::Node &value, const std::string &option) {
     YAML::Node at = node_;
     std::string canonical; // as Node::path() would have it
     const std::vector<std::string> parts = split_path(path);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool last = i + 1 == parts.size();
-        const auto refuse = [&](const std::string &why) { throw Error("--set " + path + "=" + value + ": " + why); };
+        const auto refuse = [&](const std::string &why) { throw Error(option + " " + path + ": " + why); };
         if (parts[i].empty())
             refuse("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
         canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
@@ -119,12 +127,12 @@ void Node::override_value(const std::string &path, const std::string &value) {
             if (error != std::errc() || *end != '\0' || index >= at.size())
                 refuse("'" + parts[i] + "' is no index of a list of " + std::to_string(at.size()));
             if (last)
-                at[index] = parsed;
+                at[index] = value;
             else
                 next.reset(at[index]);
         } else if (at.IsMap() || at.IsNull() || !at.IsDefined()) {
             if (last)
-                at[parts[i]] = parsed;
+                at[parts[i]] = value;
             else
                 next.reset(at[parts[i]]);
         } else {
@@ -133,15 +141,16 @@ void Node::override_value(const std::string &path, const std::string &value) {
         if (!last)
             at.reset(next);
     }
-    document_->overrides[canonical] = value;
+    document_->overrides[canonical] = option;
 }
 
-bool Node::is_overridden() const {
-    for (const auto &[path, value] : document_->overrides)
+std::string Node::option() const {
+    std::string nearest_option; // of the longest path, which comes last
+    for (const auto &[path, option] : document_->overrides)
         if (path_.starts_with(path) &&
             (path_.size() == path.size() || path_[path.size()] == '.' || path_[path.size()] == '['))
-            return true;
-    return false;
+            nearest_option = option;
+    return nearest_option;
 }
 
 std::filesystem::path Node::file() const {
@@ -149,8 +158,8 @@ std::filesystem::path Node::file() const {
 }
 
 std::string Node::where() const {
-    if (is_overridden())
-        return "--set";
+    if (std::string name = option(); !name.empty())
+        return name;
     const YAML::Mark mark = node_.Mark();
     if (mark.is_null())
         return document_->name;

@@ -51,15 +51,18 @@ public:
     static Node scalar(const std::string &text, const std::string &name);
 
     // Replaces or adds the value at a path of keys ("tracker.options.dictionary", "outputs[0].path"):
-    // for `--set`. Errors about it then name `--set` instead of a line. Call it on the root.
-    void override_value(const std::string &path, const std::string &value);
+    // for `--set` and other options. Errors about it then name the option instead of a line. Call it on the
+    // root.
+    void override_value(const std::string &path, const std::string &value, const std::string &option = "--set");
+    // The same for a plain text, which is taken as it is.
+    void override_text(const std::string &path, const std::string &text, const std::string &option);
 
     bool is_map() const { return node_.IsMap(); }
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
     bool is_null() const { return node_.IsNull(); }
-    bool is_overridden() const;                       // by `--set`, itself or a node above it
-    const std::string &path() const { return path_; } // from the root, "" for the root itself
+    bool is_overridden() const { return !option().empty(); } // itself or a node above it
+    const std::string &path() const { return path_; }        // from the root, "" for the root itself
     std::filesystem::path file() const;
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
@@ -97,11 +100,13 @@ public:
 private:
     struct Document {
         std::string name;
-        std::map<std::string, std::string> overrides; // path of keys → text after `--set`
+        std::map<std::string, std::string> overrides; // path of keys → the option that set it
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}
     std::string scalar(const char *wanted) const;
+    std::string option() const; // that overrides this node, or ""
+    void replace(const std::string &path, const YAML::Node &value, const std::string &option);
 
     YAML::Node node_;
     std::string path_;

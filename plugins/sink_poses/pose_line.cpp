@@ -1,37 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose_line.hpp"
 
+#include "common_files/json_text.hpp"
+
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <span>
 
 namespace arhost::poses {
 namespace {
 
-constexpr std::string_view line_start = "{\"frame\": ";
-
-template <class Number> void append_number(std::string &text, Number number) {
-    char digits[32]; // a double takes at most 24
-    text.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
-}
-
-void append(std::string &text, double number) {
-    if (std::isfinite(number))
-        append_number(text, number);
-    else
-        text += "null";
-}
-
-void append(std::string &text, std::span<const double> numbers) {
-    text += '[';
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-        text += i > 0 ? ", " : "";
-        append(text, numbers[i]);
-    }
-    text += ']';
-}
+using json_text::append;
+using json_text::append_number;
 
 // Families are names in ASCII; anything else comes from a broken tracker and must not break the line.
 void append_text(std::string &text, std::string_view value) {
@@ -106,7 +86,7 @@ void append(std::string &text, const arhost_camera &camera) {
 } // namespace
 
 void append_line(std::string &text, const arhost_record &record) {
-    text += line_start;
+    text += json_text::frame_start;
     append_number(text, record.sequence);
     text += ", \"capture_ns\": ";
     append_number(text, record.capture_ns);
@@ -133,17 +113,6 @@ void append_line(std::string &text, const arhost_record &record) {
         text += '}';
     }
     text += "}\n";
-}
-
-std::optional<std::uint64_t> frame_of_line(std::string_view line) {
-    if (!line.starts_with(line_start))
-        return std::nullopt;
-    line.remove_prefix(line_start.size());
-    std::uint64_t frame = 0;
-    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), frame);
-    if (error != std::errc() || end == line.data() + line.size() || *end != ',')
-        return std::nullopt;
-    return frame;
 }
 
 } // namespace arhost::poses

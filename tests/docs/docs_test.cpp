@@ -56,6 +56,32 @@ TEST(Documentation, DemonstrationTakesTheOtherTrackerByOneLine) {
     EXPECT_EQ(run.run({"check", demo, "--set", "tracker.plugin=tracker_apriltag"}), 0) << run.output();
 }
 
+// Every command of docs/trajectories.md, one after the other, on a few frames.
+TEST(Documentation, ShowsRecordingsAndReplaysThatWork) {
+    const std::string document = read_file(root / "docs/trajectories.md");
+    ArhostRun run;
+    fs::create_directory_symlink(root / "config", run.path("config"));
+    run.write("record.yaml", yaml_blocks(document).at(0));
+    const std::size_t begin = document.find("```sh\n") + 6;
+    std::istringstream commands(document.substr(begin, document.find("```", begin) - begin));
+    int tried = 0;
+    for (std::string command; std::getline(commands, command);) {
+        if (!command.starts_with("arhost "))
+            continue;
+        std::vector<std::string> arguments;
+        const std::regex word(R"re("([^"]*)"|(\S+))re");
+        for (std::sregex_iterator it(command.begin(), command.end(), word), end; it != end; ++it)
+            arguments.push_back((*it)[1].matched ? (*it)[1] : (*it)[2]);
+        arguments.erase(arguments.begin());
+        arguments.insert(arguments.end(), {"--frames", "4"});
+        EXPECT_EQ(run.run(arguments), 0) << command << "\n" << run.output();
+        ++tried;
+    }
+    EXPECT_EQ(tried, 4);
+    for (const char *file : {"out/run.trajectory.jsonl", "out/pure.json", "out/pure.mp4", "out/chain.json"})
+        EXPECT_TRUE(run.exists(file)) << file;
+}
+
 TEST(Documentation, ShipsConfigurationsThatArhostAccepts) {
     for (const auto &entry : fs::directory_iterator(root / "config"))
         if (entry.path().extension() == ".yaml") {

@@ -229,6 +229,23 @@ TEST(CameraBlock, PutsThePrincipalPointAtTheImagesCentreByDefault) {
     EXPECT_EQ(intrinsics.coefficient_count, 0u);
 }
 
+TEST(CameraBlock, TakesAFieldOfViewInPlaceOfFocalLengths) {
+    const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, vertical_fov_degrees: 45, cx: 400}");
+    // The image's edges are half a pixel beyond the outermost centres, 300 px from its middle.
+    EXPECT_NEAR(intrinsics.fx, 724.2640687, 1e-6);
+    EXPECT_EQ(intrinsics.fy, intrinsics.fx);
+    EXPECT_EQ(intrinsics.cx, 400);
+    EXPECT_EQ(intrinsics.cy, 299.5);
+    const arhost_intrinsics dissertation = dissertation_camera({800, 600});
+    EXPECT_EQ(dissertation.fy, intrinsics.fy);
+    EXPECT_EQ(dissertation.cx, 399.5);
+    EXPECT_EQ(dissertation.distortion, ARHOST_DISTORTION_NONE);
+    EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, fx: 9, vertical_fov_degrees: 45}"); }),
+              "lab.yaml:1:52: vertical_fov_degrees: stands for fx and fy; keep it or them");
+    EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, vertical_fov_degrees: 180}"); }),
+              "lab.yaml:1:45: vertical_fov_degrees: must be 0.01 to 179, is 180");
+}
+
 TEST(CameraBlock, TakesEveryNumberGiven) {
     const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, fx: 700, fy: 701, cx: 400, cy: 300,\n"
                                                 " distortion: {model: fisheye, coefficients: [0.1, 0.2, 0.3, 0.4]}}");

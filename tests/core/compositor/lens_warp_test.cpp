@@ -26,8 +26,8 @@ std::vector<std::uint8_t> disc(double x0, double y0, double radius) {
         for (int x = 0; x < 320; ++x) {
             std::uint8_t *pixel = &image[4 * (y * 320 + x)];
             pixel[0] = 200, pixel[1] = 100, pixel[2] = 50;
-            pixel[3] = static_cast<std::uint8_t>(
-                255 * std::clamp(radius + 0.5 - std::hypot(x - x0, y - y0), 0.0, 1.0));
+            pixel[3] =
+                static_cast<std::uint8_t>(255 * std::clamp(radius + 0.5 - std::hypot(x - x0, y - y0), 0.0, 1.0));
         }
     return image;
 }
@@ -65,9 +65,9 @@ TEST(LensWarp, PutsWhatThePinholeSawWhereTheLensPutsIt) {
 }
 
 TEST(LensWarp, CoversTheWholeImageOfTheLens) {
-    for (const arhost_intrinsics &in : {lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
-                                        lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0}),
-                                        lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})}) {
+    for (const arhost_intrinsics &in :
+         {lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}), lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0}),
+          lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})}) {
         LensWarp warp(in);
         const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
         const ImageView bent = warp.bend({opaque.data(), 320 * 4}, {0, 0, 320, 240});
@@ -81,5 +81,6 @@ TEST(LensWarp, ReadsTheRegionOnlyWhateverAWorkerSaysOfIt) {
     const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
     const ImageView none = warp.bend({opaque.data(), 320 * 4}, {10, 10, 0, 0});
     EXPECT_TRUE(std::all_of(none.rgba, none.rgba + 320 * 240 * 4, [](std::uint8_t byte) { return byte == 0; }));
-    warp.bend({opaque.data(), 320 * 4}, {300, 200, 4'000'000'000u, 4'000'000'000u}); // under asan: reads nothing beyond
+    warp.bend({opaque.data(), 320 * 4},
+              {300, 200, 4'000'000'000u, 4'000'000'000u}); // under asan: reads nothing beyond
 }

@@ -73,6 +73,18 @@ TEST(Yaml, OverridesValuesFromTheCommandLine) {
     EXPECT_THAT(error_of([&] { node.override_value("outputs[7].path", "1"); }), HasSubstr("no index of a list of 1"));
 }
 
+TEST(Yaml, NamesTheOptionThatOverrodeAValue) {
+    Node node = Node::parse("outputs: [{path: a}]\n", "lab.yaml");
+    node.override_value("outputs", "[{path: b, fps: 3}]", "--output");
+    node.override_text("outputs[0].path", "c: [d]", "--path");
+    const Node output = node.require("outputs").items()[0];
+    EXPECT_EQ(output.require("path").text(), "c: [d]");
+    EXPECT_EQ(error_of([&] { output.require("path").integer(); }),
+              "--path: outputs[0].path: must be a whole number, is 'c: [d]'");
+    EXPECT_EQ(error_of([&] { output.require("fps").integer(4, 5); }),
+              "--output: outputs[0].fps: must be 4 to 5, is 3");
+}
+
 TEST(Yaml, ReadsPathsAgainstTheFileTheyStandIn) {
     const Node node = Node::parse("mesh: ../meshes/a.obj\n", "/data/scenes/x.yaml");
     EXPECT_EQ(node.require("mesh").input_path(), "/data/meshes/a.obj");

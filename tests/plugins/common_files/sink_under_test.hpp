@@ -92,12 +92,31 @@ inline arhost_record make_record(std::uint64_t sequence) {
     return record;
 }
 
+// A camera for pictures of that size, its numbers awkward.
+inline arhost_intrinsics make_intrinsics(int width, int height) {
+    arhost_intrinsics intrinsics{};
+    intrinsics.struct_size = sizeof intrinsics;
+    intrinsics.width = static_cast<std::uint32_t>(width);
+    intrinsics.height = static_cast<std::uint32_t>(height);
+    intrinsics.distortion = ARHOST_DISTORTION_BROWN;
+    intrinsics.fx = 1000.0 / 3;
+    intrinsics.fy = 1000.0 / 7;
+    intrinsics.cx = width / 2.1;
+    intrinsics.cy = height / 1.9;
+    intrinsics.coefficient_count = 4;
+    const double coefficients[] = {0.1 / 3, -1e-17, 0, 2e-3};
+    std::ranges::copy(coefficients, intrinsics.coefficients);
+    return intrinsics;
+}
+
 // One process's life of a sink. Destroying it without `stop` is as near to a kill as one process gets.
 class SinkUnderTest {
 public:
     SinkUnderTest(const std::string &id, const std::map<std::string, std::string> &options) : plugin_(id) {
         created_ = plugin_.create(options);
     }
+
+    bool knows_camera = true; // start() tells the intrinsics
 
     arhost_status created() const { return created_; }
     arhost_status start(int width, int height, std::uint64_t first_sequence = 0, double fps = 30) {
@@ -111,6 +130,8 @@ public:
         setup.height = static_cast<std::uint32_t>(height);
         setup.fps = fps;
         setup.first_sequence = first_sequence;
+        const arhost_intrinsics intrinsics = make_intrinsics(width, height);
+        setup.intrinsics = knows_camera ? &intrinsics : nullptr;
         return functions().start(plugin_.instance(), &setup);
     }
     arhost_status write(const Picture &picture, const arhost_record &record) {

@@ -39,9 +39,9 @@ typedef struct arhost_intrinsics {
     double coefficients[ARHOST_MAX_DISTORTION];
 } arhost_intrinsics;
 
-/* A camera in the scene's world: right-handed, millimetres. `look_at` − `eye` has length 1 as the host
- * sends it, and `up` is perpendicular to it with length 1; a ray tracer copes with any that are not
- * parallel, by w = eye − look_at, u = up × w, v = w × u. */
+/* A camera in the scene's world: right-handed, millimetres. `look_at` − `eye` has length 1 where it comes
+ * from a marker, and `up` is perpendicular to it with length 1; a trajectory's are what its file says. A
+ * ray tracer copes with any that are not parallel, by w = eye − look_at, u = up × w, v = w × u. */
 typedef struct arhost_camera {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */

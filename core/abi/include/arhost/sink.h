@@ -22,6 +22,7 @@ typedef struct arhost_sink_setup {
     /* 0 on a fresh start. After a restart, the sequence number of the frame that comes first: what was
      * written for it or later ones is to be replaced, what was written before is to be kept. */
     uint64_t first_sequence;
+    const arhost_intrinsics *intrinsics; /* of every camera in the records; NULL where none is known */
 } arhost_sink_setup;
 
 /* How the overlay of this frame arose. */

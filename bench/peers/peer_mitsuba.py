@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mitsuba 3's side of tools/bench peers: peer_mitsuba.py FOLDER THREADS (served.py)."""
+import sys
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from served import Scene, serve
+
+mi.set_variant("llvm_ad_rgb")
+dr.set_thread_count(int(sys.argv[2]))
+
+
+class DirectDiffuse(mi.BSDF):
+    """Lambert, whose paths end there: arhost does not follow light from one matt surface to another."""
+
+    def __init__(self, properties):
+        mi.BSDF.__init__(self, properties)
+        self.value = properties["value"] / np.pi
+        self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide]
+        self.m_flags = self.m_components[0]
+
+    def sample(self, context, si, sample1, sample2, active):
+        return dr.zeros(mi.BSDFSample3f), mi.Color3f(0)
+
+    def eval(self, context, si, wo, active):
+        lit = active & (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
+        return dr.select(lit, mi.Color3f(self.value * mi.Frame3f.cos_theta(wo)), 0)
+
+    def pdf(self, context, si, wo, active):
+        return mi.Float(0)
+
+    def eval_pdf(self, context, si, wo, active):
+        return self.eval(context, si, wo, active), mi.Float(0)
+
+
+mi.register_bsdf("directdiffuse", DirectDiffuse)
+wanted = Scene(sys.argv[1])
+
+
+def grey(value):
+    return {"type": "rgb", "value": value}
+
+
+def mesh(name, positions, normals, indices, bsdf):
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(bsdf)
+    made = mi.Mesh(name, len(positions), len(indices), has_vertex_normals=normals is not None, props=properties)
+    values = mi.traverse(made)
+    values["vertex_positions"] = positions.ravel()
+    if normals is not None:
+        values["vertex_normals"] = normals.ravel()
+    values["faces"] = indices.ravel()
+    values.update()
+    return made
+
+
+def scene_of(case):
+    surface = {
+        "diffuse": {"type": "diffuse", "reflectance": grey(wanted.bunny_grey)},
+        "mirror": {"type": "conductor", "material": "none", "specular_reflectance": grey(wanted.mirror_grey)},
+        "glass-path": {"type": "dielectric", "int_ior": wanted.glass_index, "ext_ior": 1.0,
+                       "specular_reflectance": grey(wanted.glass_grey),
+                       "specular_transmittance": grey(wanted.glass_grey)},
+    }[case]
+    parts = {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective", "fov": wanted.fov_y_degrees, "fov_axis": "y", "near_clip": 1, "far_clip": 10000,
+            "to_world": mi.ScalarTransform4f().look_at(origin=wanted.eye, target=wanted.look_at, up=[0, 1, 0]),
+            "sampler": {"type": "independent", "sample_count": 1},
+            "film": {"type": "hdrfilm", "width": wanted.width, "height": wanted.height, "rfilter": {"type": "box"},
+                     "pixel_format": "rgb", "component_format": "float32"},
+        },
+        "bunny": mesh("bunny", wanted.positions, wanted.normals, wanted.indices, surface),
+    }
+    if case != "glass-path":
+        a = wanted.ground_half_side
+        corners = np.array([[-a, 0, -a], [-a, 0, a], [a, 0, a], [a, 0, -a]], np.float32)
+        matt = {"type": "diffuse", "reflectance": grey(wanted.ground_grey)} if case == "diffuse" else \
+            {"type": "directdiffuse", "value": wanted.ground_grey}
+        parts["ground"] = mesh("ground", corners, None, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), matt)
+        # Lambert's 1/π is in arhost's intensity.
+        parts["lamp"] = {"type": "point", "position": wanted.lamp_position,
+                         "intensity": grey(wanted.lamp_intensity * np.pi)}
+    if case != "diffuse":
+        # Only what mirrors and glass show; the ground gets its light from the lamp.
+        parts["white"] = {"type": "constant", "radiance": grey(1), "sampling_weight": 0 if "lamp" in parts else 1}
+    return mi.load_dict(parts)
+
+
+# arhost's depths count bounces, Mitsuba's rays; no Russian roulette.
+def path(rays):
+    return {"type": "path", "max_depth": rays, "rr_depth": 10_000}
+
+
+integrators = {
+    # A ray and a shadow ray, as ours.
+    "diffuse": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+    "mirror": path(wanted.mirror_depth + 1),
+    "glass-path": path(wanted.glass_depth + 1),
+}
+scenes, frames = {}, {}
+
+
+def scene(case):
+    if case not in scenes:
+        scenes[case] = scene_of(case)
+    return scenes[case]
+
+
+def render(case, seed):
+    if case not in frames:
+        integrator = mi.load_dict(integrators[case])
+        # Records the kernel once: without, Python traces it anew each frame.
+        frames[case] = dr.freeze(lambda seen, number: mi.render(seen, integrator=integrator, spp=1, seed=number))
+    np.array(frames[case](scene(case), mi.UInt32(seed)))
+
+
+def image(case, samples):
+    seen = scene(case)
+    light = np.array(mi.render(seen, integrator=mi.load_dict(integrators[case]), spp=samples, seed=0))
+    # What primary rays hit, in the middle of each pixel as ours.
+    sensor = seen.sensors()[0]
+    number = np.arange(wanted.width * wanted.height)
+    middle = mi.Point2f((number % wanted.width + 0.5) / wanted.width, (number // wanted.width + 0.5) / wanted.height)
+    rays, _ = sensor.sample_ray(0, 0.5, middle, mi.Point2f(0.5))
+    alpha = np.array(seen.ray_test(rays)).reshape(wanted.height, wanted.width, 1)
+    return np.concatenate([light, alpha], 2)
+
+
+def rays(case):
+    """Of white glass, a path of at most k rays has brought light if it got out with them: the share of pixels
+    without is that of the paths that trace ray k + 1."""
+    seen = scene(case)
+    values = mi.traverse(seen)
+    keys = [key for key in values.keys() if "specular_" in key and key.endswith("value")]
+
+    def colour(value):
+        for key in keys:
+            values[key] = mi.Color3f(value)
+        values.update()
+
+    colour(1)
+    count = 1.0
+    for k in range(1, wanted.glass_depth + 1):
+        picture = np.array(mi.render(seen, integrator=mi.load_dict(path(k)), spp=1, seed=k))
+        count += (picture[..., 0] == 0).mean()
+    colour(wanted.glass_grey)
+    return float(count * wanted.width * wanted.height)
+
+
+serve(sys.argv[1],
+      {"name": "Mitsuba 3 (llvm)", "short": "mitsuba",
+       "version": f"{mi.__version__}, Dr.Jit {dr.__version__}, LLVM {'.'.join(map(str, dr.detail.llvm_version()))}"},
+      render, image, rays)

@@ -1,0 +1,211 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""rt_embree beside Mitsuba 3 (llvm) and Blender Cycles: `tools/bench peers [--quick]`. What is measured and
+how: bench/peers/README.md.
+
+Leaves build/peers/peers.json (all numbers) and build/peers/peers.png (the pictures side by side). Exits
+with 1 where the pictures show that the scenes are not the same; a target that is missed is only said."""
+import glob
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+here = os.path.dirname(os.path.abspath(__file__))
+root = os.path.dirname(os.path.dirname(here))
+venv = os.path.join(root, "build", "peers-venv")
+folder = os.path.join(root, "build", "peers")
+binaries = os.path.join(root, "build", "release", "bin")
+venv_python = os.path.join(venv, "bin", "python")
+
+threads = 2
+# With Python 3.11, Debian 12's; numpy as bpy wants it.
+packages = {"mitsuba": "3.9.1", "bpy": "5.0.1", "pillow": "11.3.0"}
+llvm_package = "libllvm19"
+cases = ["diffuse", "mirror", "glass-path"]
+ours_alone = "glass-tree"
+# How many times as fast as the peer (issue "peers").
+targets = {"mitsuba": {"diffuse": 3, "mirror": 3, "glass-path": 2, "glass-tree": 2},
+           "cycles": {"diffuse": 8, "mirror": 8, "glass-path": 4, "glass-tree": 2}}
+largest_mask_difference = 0.005
+
+
+def install():
+    """The peers into build/peers-venv, and LLVM where there is none that Mitsuba can load."""
+    if not glob.glob("/usr/lib/*/libLLVM*.so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*"):
+        print(f"To be installed by apt-get, for Mitsuba: {llvm_package}", flush=True)
+        as_root = [] if os.geteuid() == 0 else ["sudo"] if shutil.which("sudo") else None
+        if as_root is None:
+            print(f"Neither root nor sudo: without {llvm_package} Mitsuba is left out.")
+        else:
+            subprocess.run([*as_root, "apt-get", "update", "-q"], check=False)
+            subprocess.run([*as_root, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-q", "-y",
+                            "--no-install-recommends", llvm_package], check=False)
+    if not os.path.exists(venv_python):
+        fitting = [path for path in (sys.executable, "/usr/bin/python3", shutil.which("python3.11"))
+                   if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
+                                              stderr=subprocess.DEVNULL, check=False).returncode == 0]
+        if not fitting:
+            raise SystemExit("peers: they need Python 3.11 with venv (Debian 12: python3-venv)")
+        subprocess.run([fitting[0], "-m", "venv", venv], check=True)
+    for name, version in packages.items():
+        there = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
+                               capture_output=True, text=True, check=False).stdout.strip()
+        if there == version:
+            continue
+        print(f"To be installed by pip into {os.path.relpath(venv, root)}: {name} {version}", flush=True)
+        if subprocess.run([venv_python, "-m", "pip", "install", "-q", "--disable-pip-version-check",
+                           f"{name}=={version}"], check=False).returncode:
+            print(f"  pip could not: it is left out.")
+
+
+class Renderer:
+    """A renderer that answers lines (served.py, rt_embree_peers.cpp). Its own words go to a log."""
+
+    def __init__(self, command, log):
+        with open(os.path.join(folder, log), "w", encoding="utf-8") as file:
+            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, text=True)
+        self.log = log
+        self.about = self.answer()
+
+    def answer(self):
+        line = self.process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"{self.process.args[-3]} ended: see {os.path.join(folder, self.log)}")
+        return json.loads(line)
+
+    def ask(self, line):
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return self.answer()
+
+    def end(self):
+        self.process.stdin.close()
+        self.process.wait()
+
+
+def cpu_model():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        return next((line.split(":")[1].strip() for line in file if line.startswith("model name")), platform.machine())
+
+
+def measure(renderers, rounds, frames):
+    """Times by renderer and case. They take turns, so that each has its share of what else the machine does."""
+    times = {name: {case: {"wall_ms": [], "cpu_ms": [], "own_ms": []} for case in cases} for name in renderers}
+    times["ours"][ours_alone] = {"wall_ms": [], "cpu_ms": [], "own_ms": []}
+    for _ in range(rounds):
+        for case in [*cases, ours_alone]:
+            for name, renderer in renderers.items():
+                if case not in times[name]:
+                    continue
+                got = renderer.ask(f"{case} {frames}")
+                for key, values in times[name][case].items():
+                    values += got.get(key, [])
+    return times
+
+
+def main():
+    quick = "--quick" in sys.argv[1:]
+    if not os.path.exists(os.path.join(binaries, "rt-embree-peers")):
+        raise SystemExit("peers: build/release/bin/rt-embree-peers is not there: build it with tools/test")
+    os.makedirs(folder, exist_ok=True)
+    install()
+
+    available = sorted(os.sched_getaffinity(0))
+    if len(available) > threads:
+        os.sched_setaffinity(0, available[:threads])  # and all that are started from here
+    renderers = {"ours": Renderer([os.path.join(binaries, "rt-embree-peers"), folder, str(threads)], "ours.log")}
+    counter = Renderer([os.path.join(binaries, "rt-embree-peers-rays"), folder, str(threads)], "rays.log")
+    for name in ("mitsuba", "cycles"):
+        try:
+            renderers[name] = Renderer([venv_python, os.path.join(here, f"peer_{name}.py"), folder, str(threads)],
+                                       f"{name}.log")
+        except RuntimeError as error:
+            print(f"{name} is left out: {error}")
+    with open(os.path.join(folder, "scene.json"), encoding="utf-8") as file:
+        scene = json.load(file)
+
+    rounds, frames = (1, 3) if quick else (4, 10)
+    load_before = os.getloadavg()[0]
+    times = measure(renderers, rounds, frames)
+    load = max(load_before, os.getloadavg()[0])
+
+    rays = {"ours": {case: counter.ask(f"{case} 1")["rays"] for case in [*cases, ours_alone]}}
+    for name, renderer in renderers.items():
+        if name != "ours":
+            for case in cases:
+                renderer.ask(f"image {case}")
+            rays[name] = {"glass-path": renderer.ask("rays glass-path")["rays"]}
+    for renderer in [*renderers.values(), counter]:
+        renderer.end()
+
+    differences = {}
+    for name in renderers:
+        if name != "ours":
+            answer = subprocess.run([venv_python, os.path.join(here, "compare.py"), folder, name, *cases],
+                                    stdout=subprocess.PIPE, text=True, check=True).stdout
+            differences[name] = json.loads(answer)
+    subprocess.run([venv_python, os.path.join(here, "compare.py"), folder, "picture", *cases,
+                    *(name for name in renderers if name != "ours")], check=True)
+
+    print(f"peers: {scene['mesh']} of {scene['triangles']} triangles, {scene['width']}x{scene['height']}, 1 sample, "
+          f"{threads} threads, p50 of {rounds * frames} frames{' (a smoke test, no measurement)' if quick else ''}")
+    print(f"  {cpu_model()}, {len(available)} processors, load {load:.1f}")
+    for name, renderer in renderers.items():
+        print(f"  {renderer.about['name']}: {renderer.about['version']}")
+    middle = {name: {case: {key: statistics.median(values) for key, values in got.items() if values}
+                     for case, got in by_case.items()} for name, by_case in times.items()}
+    results = []
+    print(f"  {'case':11} {'peer':8} {'peer ms':>8} {'ours ms':>8} {'ratio':>6} {'of CPU time':>11}   target")
+    for name in renderers:
+        if name == "ours":
+            continue
+        for case in cases:
+            peer, ours = middle[name][case], middle["ours"][case]
+            wall, cpu = peer["wall_ms"] / ours["wall_ms"], peer["cpu_ms"] / ours["cpu_ms"]
+            own = peer["own_ms"] / ours["wall_ms"] if "own_ms" in peer else None
+            target = targets[name][case]
+            met = min(wall, cpu) >= target
+            results.append({"case": case, "peer": name, "ratio_wall": wall, "ratio_cpu": cpu, "ratio_own": own,
+                            "target": target, "met": met})
+            print(f"  {case:11} {name:8} {peer['wall_ms']:8.1f} {ours['wall_ms']:8.1f} {wall:6.2f} {cpu:11.2f}   "
+                  f"{target}: {'met' if met else 'MISSED'}"
+                  + (f"   (without its synchronisation {peer['own_ms']:.1f} ms: {own:.2f})" if own else ""))
+    print("  glass, million rays a second of CPU time (and of wall time)")
+    rates = {}
+    for name, case in [("ours", "glass-path"), ("ours", ours_alone), *((n, "glass-path") for n in rays if n != "ours")]:
+        cpu, wall = (rays[name][case] / middle[name][case][key] / 1e3 for key in ("cpu_ms", "wall_ms"))
+        rates[f"{name} {case}"] = {"rays": rays[name][case], "cpu": cpu, "wall": wall}
+        print(f"    {name:8} {case:11} {rays[name][case]:10.0f} rays {cpu:7.2f} ({wall:.2f})")
+    for name in rays:
+        if name == "ours":
+            continue
+        ratio = {key: rates[f"ours {ours_alone}"][key] / rates[f"{name} glass-path"][key] for key in ("cpu", "wall")}
+        met = min(ratio.values()) >= targets[name][ours_alone]
+        results.append({"case": ours_alone, "peer": name, "ratio_wall": ratio["wall"], "ratio_cpu": ratio["cpu"],
+                        "target": targets[name][ours_alone], "met": met})
+        print(f"    our tree to {name}: {ratio['wall']:.2f}, of CPU time {ratio['cpu']:.2f}   "
+              f"{targets[name][ours_alone]}: {'met' if met else 'MISSED'}")
+    same = True
+    for name, by_case in differences.items():
+        print(f"  {name}'s pictures: " + ", ".join(
+            f"{case} {100 * d['mask']:.2f} % of the mask, light {d['light']:.3f} to our {d['our_light']:.3f}"
+            for case, d in by_case.items()))
+        same &= all(d["mask"] < largest_mask_difference for d in by_case.values())
+    with open(os.path.join(folder, "peers.json"), "w", encoding="utf-8") as file:
+        json.dump({"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "quick": quick, "cpu": cpu_model(),
+                   "processors": len(available), "load": load, "threads": threads, "scene": scene,
+                   "versions": {name: renderer.about for name, renderer in renderers.items()},
+                   "median": middle, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
+                   "results": results}, file, indent=1)
+    print(f"  all numbers: build/peers/peers.json; pictures: build/peers/peers.png")
+    if not same:
+        raise SystemExit("peers: the masks differ by more than 0.5 %: these are not the same scenes")
+
+
+main()

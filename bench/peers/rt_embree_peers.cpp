@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Our side of tools/bench peers: `rt-embree-peers FOLDER THREADS` leaves the scene in FOLDER as the peers
+// shall load it (scene.json, and the mesh as raw numbers), then answers each line "CASE FRAMES" of its input
+// with the times of that many frames, as a line of JSON. Each case's last image is left in FOLDER as
+// ours-CASE.rgba. Built with COUNT_RAYS it tells how many rays a frame takes as well, and its times are void.
+#include "renderer.hpp"
+#include "scene/mesh.hpp"
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <glm/trigonometric.hpp>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace {
+
+std::atomic<std::uint64_t> rays_traced{0};
+
+}
+
+#ifdef COUNT_RAYS
+// The linker sends the kernel's calls of Embree through here (CMakeLists.txt).
+namespace {
+void count(const int *valid, int width) {
+    std::uint64_t active = 0;
+    for (int i = 0; i < width; ++i)
+        active += valid[i] != 0;
+    rays_traced.fetch_add(active, std::memory_order_relaxed);
+}
+} // namespace
+#if RTC_VERSION_MAJOR >= 4
+#define WRAP(kind, width, rays, arguments)                                                                           \
+    extern "C" void __real_rtc##kind##width(const int *, RTCScene, rays *, arguments *);                             \
+    extern "C" void __wrap_rtc##kind##width(const int *valid, RTCScene scene, rays *r, arguments *a) {               \
+        count(valid, width);                                                                                         \
+        __real_rtc##kind##width(valid, scene, r, a);                                                                 \
+    }
+#else
+#define WRAP(kind, width, rays, arguments)                                                                           \
+    extern "C" void __real_rtc##kind##width(const int *, RTCScene, RTCIntersectContext *, rays *);                   \
+    extern "C" void __wrap_rtc##kind##width(const int *valid, RTCScene scene, RTCIntersectContext *c, rays *r) {     \
+        count(valid, width);                                                                                         \
+        __real_rtc##kind##width(valid, scene, c, r);                                                                 \
+    }
+#endif
+WRAP(Intersect, 4, RTCRayHit4, RTCIntersectArguments)
+WRAP(Intersect, 8, RTCRayHit8, RTCIntersectArguments)
+WRAP(Intersect, 16, RTCRayHit16, RTCIntersectArguments)
+WRAP(Occluded, 4, RTCRay4, RTCOccludedArguments)
+WRAP(Occluded, 8, RTCRay8, RTCOccludedArguments)
+WRAP(Occluded, 16, RTCRay16, RTCOccludedArguments)
+#endif
+
+namespace {
+
+using namespace arhost::scene;
+
+constexpr std::uint32_t width = 800, height = 600;
+constexpr double fov_y_degrees = 45;
+constexpr float eye[3] = {0, 50, 170}, look_at[3] = {0, 50, 0};
+constexpr float lamp_position[3] = {80, 200, 150}, lamp_intensity = 40'000; // over d², d in mm
+constexpr float ground_half_side = 200;                                     // mm, at y = 0
+constexpr float bunny_grey = 0.6f, ground_grey = 0.5f, mirror_grey = 0.9f;
+// A little is lost at each bounce, so that the picture shows how long its paths are.
+constexpr float glass_grey = 0.95f, glass_index = 1.5f;
+constexpr std::uint32_t mirror_depth = 8, glass_depth = 20; // bounces
+
+const arhost_host quiet_host = {
+    sizeof(arhost_host),
+    ARHOST_ABI_VERSION,
+    "rt-embree-peers",
+    "0",
+    nullptr,
+    [](const arhost_host *, arhost_severity, const char *text) { std::fprintf(stderr, "%s\n", text); },
+    [](const arhost_host *, double, const char *) {},
+    [](const arhost_host *) { return 0; },
+    [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+
+// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
+TriangleMesh dented_ball() {
+    TriangleMesh mesh;
+    constexpr unsigned rings = 186, sides = 187;
+    for (unsigned ring = 0; ring <= rings; ++ring)
+        for (unsigned side = 0; side <= sides; ++side) {
+            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
+            const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
+            mesh.positions.push_back(
+                r * glm::vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
+            if (ring < rings && side < sides) {
+                const unsigned a = ring * (sides + 1) + side, b = a + sides + 1;
+                mesh.triangles.push_back({a, a + 1, b});
+                mesh.triangles.push_back({a + 1, b + 1, b});
+            }
+        }
+    mesh.normals = smooth_normals(mesh);
+    return mesh;
+}
+
+// The bunny, 100 mm high, on the ground.
+TriangleMesh bunny(std::string &name) {
+    const std::filesystem::path file = std::filesystem::path(ARHOST_SHARED_DATA) / "meshes/bunny_69451.ply.gz";
+    const bool there = std::filesystem::exists(file);
+    name = there ? "bunny" : "dented ball";
+    TriangleMesh mesh = there ? load_mesh(file, {.smooth = true}) : dented_ball();
+    glm::vec3 low = mesh.positions[0], high = low;
+    for (const glm::vec3 &p : mesh.positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    for (glm::vec3 &p : mesh.positions)
+        p = (p - glm::vec3((low.x + high.x) / 2, low.y, (low.z + high.z) / 2)) * (100 / (high.y - low.y));
+    return mesh;
+}
+
+TriangleMesh ground() {
+    const float a = ground_half_side;
+    return {{{-a, 0, -a}, {-a, 0, a}, {a, 0, a}, {a, 0, -a}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+arhost_material grey(arhost_material_model model, float value) {
+    arhost_material material = make_material(model);
+    for (int i = 0; i < 3; ++i) {
+        material.ambient[i] = 0;
+        if (model == ARHOST_DIFFUSE)
+            material.diffuse[i] = value;
+        else
+            material.reflectivity[i] = material.refraction[i] = value;
+    }
+    return material;
+}
+
+struct Case {
+    Arena arena;
+    rt_embree::Settings settings;
+};
+
+Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threads) {
+    Case made{Arena(64), {}};
+    made.settings.threads = threads;
+    ArenaBuilder builder;
+    builder.settings.axes = ARHOST_Y_UP;
+    builder.settings.ambient = glm::vec3(0);
+    builder.settings.background = glm::vec3(1);
+    arhost_material material = grey(ARHOST_DIFFUSE, bunny_grey);
+    const bool is_glass = name.starts_with("glass");
+    if (name == "mirror") {
+        material = grey(ARHOST_MIRROR, mirror_grey);
+        builder.settings.max_depth = mirror_depth;
+    } else if (is_glass) {
+        material = grey(ARHOST_GLASS, glass_grey);
+        material.index = glass_index;
+        material.fresnel_minimum = std::pow((glass_index - 1) / (glass_index + 1), 2.0f);
+        // What is not followed: nothing but what the depth limits ("path", as the peers do), the customary
+        // share of a hundredth ("tree").
+        material.importance_cutoff = name == "glass-tree" ? 0.01f : 0;
+        builder.settings.max_depth = glass_depth;
+        made.settings.one_path = name == "glass-path";
+    } else if (name != "diffuse") {
+        throw std::runtime_error("unknown case: " + name);
+    }
+    builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
+    if (!is_glass) {
+        builder.add_object("ground", builder.add_triangles(ground()),
+                           builder.add_material(grey(ARHOST_DIFFUSE, ground_grey)));
+        arhost_light light = make_light(ARHOST_POINT_LIGHT);
+        light.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+        for (int i = 0; i < 3; ++i) {
+            light.position[i] = lamp_position[i];
+            light.intensity[i] = lamp_intensity;
+        }
+        builder.add_light(light);
+    }
+    made.arena = std::move(builder).build();
+    return made;
+}
+
+arhost_camera camera() {
+    const double f = height / 2 / std::tan(glm::radians(fov_y_degrees / 2));
+    const arhost_intrinsics intrinsics{sizeof(arhost_intrinsics),
+                                       width,
+                                       height,
+                                       ARHOST_DISTORTION_NONE,
+                                       f,
+                                       f,
+                                       (width - 1) / 2.0,
+                                       (height - 1) / 2.0,
+                                       0,
+                                       0,
+                                       {}};
+    return {sizeof(arhost_camera),
+            0,
+            {eye[0], eye[1], eye[2]},
+            {look_at[0], look_at[1], look_at[2]},
+            {0, 1, 0},
+            intrinsics};
+}
+
+class Trial {
+public:
+    Trial(Case made)
+        : case_(std::move(made)), pixels_(width * height * 4),
+          renderer_({sizeof(arhost_raytracer_setup), width, height, 0, &case_.arena.scene(), &camera_.intrinsics},
+                    case_.settings, arhost::Host(&quiet_host)) {}
+    void render() { renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data()}); }
+    const std::vector<std::uint8_t> &pixels() const { return pixels_; }
+    const rt_embree::Renderer &renderer() const { return renderer_; }
+
+private:
+    Case case_;
+    arhost_camera camera_ = camera();
+    std::vector<std::uint8_t> pixels_;
+    rt_embree::Renderer renderer_;
+};
+
+void write(const std::filesystem::path &file, const void *bytes, std::size_t count) {
+    std::ofstream out(file, std::ios::binary);
+    out.write(static_cast<const char *>(bytes), static_cast<std::streamsize>(count));
+    if (!out.flush())
+        throw std::runtime_error("can't write " + file.string());
+}
+
+void write_scene(const std::filesystem::path &folder, const TriangleMesh &mesh, const std::string &name) {
+    write(folder / "positions.f32", mesh.positions.data(), mesh.positions.size() * sizeof mesh.positions[0]);
+    write(folder / "normals.f32", mesh.normals.data(), mesh.normals.size() * sizeof mesh.normals[0]);
+    write(folder / "triangles.u32", mesh.triangles.data(), mesh.triangles.size() * sizeof mesh.triangles[0]);
+    char text[1000];
+    const int length = std::snprintf(
+        text, sizeof text,
+        R"({"mesh": "%s", "triangles": %zu, "width": %u, "height": %u, "fov_y_degrees": %g,
+"eye": [%g, %g, %g], "look_at": [%g, %g, %g], "lamp_position": [%g, %g, %g], "lamp_intensity": %g,
+"ground_half_side": %g, "bunny_grey": %g, "ground_grey": %g, "mirror_grey": %g, "glass_grey": %g,
+"glass_index": %g, "mirror_depth": %u, "glass_depth": %u}
+)",
+        name.c_str(), mesh.triangles.size(), width, height, fov_y_degrees, eye[0], eye[1], eye[2], look_at[0],
+        look_at[1], look_at[2], lamp_position[0], lamp_position[1], lamp_position[2], lamp_intensity,
+        ground_half_side, bunny_grey, ground_grey, mirror_grey, glass_grey, glass_index, mirror_depth, glass_depth);
+    write(folder / "scene.json", text, static_cast<std::size_t>(length));
+}
+
+void serve(const std::filesystem::path &folder, unsigned threads) {
+    std::string mesh_name;
+    const TriangleMesh mesh = bunny(mesh_name);
+    write_scene(folder, mesh, mesh_name);
+    std::printf(R"({"name": "arhost rt_embree", "version": "Embree %d.%d"})"
+                "\n",
+                RTC_VERSION_MAJOR, RTC_VERSION_MINOR);
+    std::fflush(stdout);
+
+    std::map<std::string, std::unique_ptr<Trial>> trials;
+    std::string name;
+    for (int frames; std::cin >> name >> frames;) {
+        std::unique_ptr<Trial> &trial = trials[name];
+        if (!trial)
+            trial = std::make_unique<Trial>(make_case(name, mesh, threads));
+        trial->render(); // what others did to the caches since is not ours
+        std::string wall, cpu;
+        const std::uint64_t rays = rays_traced;
+        for (int i = 0; i < frames; ++i) {
+            const auto start = std::chrono::steady_clock::now();
+            const std::clock_t cpu_start = std::clock();
+            trial->render();
+            const char *separator = i ? ", " : "";
+            cpu += separator + std::to_string(1e3 * static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC);
+            wall += separator +
+                    std::to_string(
+                        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+        }
+        write(folder / ("ours-" + name + ".rgba"), trial->pixels().data(), trial->pixels().size());
+        std::printf(R"({"wall_ms": [%s], "cpu_ms": [%s], "rays": %.0f, "kernel": "%s"})"
+                    "\n",
+                    wall.c_str(), cpu.c_str(), static_cast<double>(rays_traced - rays) / std::max(frames, 1),
+                    trial->renderer().kernel_name());
+        std::fflush(stdout);
+    }
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    if (argc != 3) {
+        std::fputs("usage: rt-embree-peers FOLDER THREADS\n", stderr);
+        return 2;
+    }
+    try {
+        serve(argv[1], static_cast<unsigned>(std::atoi(argv[2])));
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "rt-embree-peers: %s\n", error.what());
+        return 1;
+    }
+}

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Lines of JSON, one a frame.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace arhost::json_text {
+
+// The shortest digits that read back as the same number.
+template <class Number> void append_number(std::string &text, Number number) {
+    char digits[32]; // a double takes at most 24
+    text.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
+}
+
+// JSON has no number that is not finite.
+inline void append(std::string &text, double number) {
+    if (std::isfinite(number))
+        append_number(text, number);
+    else
+        text += "null";
+}
+
+inline void append(std::string &text, std::span<const double> numbers) {
+    text += '[';
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+        text += i > 0 ? ", " : "";
+        append(text, numbers[i]);
+    }
+    text += ']';
+}
+
+// How a frame's line begins: its number follows, then a comma.
+inline constexpr std::string_view frame_start = "{\"frame\": ";
+
+// The number in a line that begins so, whole or not past it; nothing in any other.
+inline std::optional<std::uint64_t> frame_of_line(std::string_view line) {
+    if (!line.starts_with(frame_start))
+        return std::nullopt;
+    line.remove_prefix(frame_start.size());
+    std::uint64_t frame = 0;
+    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), frame);
+    if (error != std::errc() || end == line.data() + line.size() || *end != ',')
+        return std::nullopt;
+    return frame;
+}
+
+} // namespace arhost::json_text

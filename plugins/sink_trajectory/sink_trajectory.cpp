@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Records every frame's camera, to be traced again by `arhost replay`.
+#include "common_files/json_text.hpp"
+#include "common_files/line_file.hpp"
+#include "lines.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <string>
+
+namespace {
+
+using arhost::Failure;
+
+class TrajectorySink {
+public:
+    TrajectorySink(const arhost::Host &host, const arhost::Options &options)
+        : file_(host, options.text("path")), dissertation_(options.text("format") == "dissertation") {}
+
+    void start(const arhost_sink_setup &setup) {
+        if (!setup.intrinsics)
+            throw Failure(ARHOST_ERROR_CONFIGURATION,
+                          "there is no camera to record: add a tracker, or 'camera:' (docs/camera.md)");
+        intrinsics_ = *setup.intrinsics;
+        fps_ = setup.fps;
+        file_.start(setup.first_sequence, [&](std::string_view line) {
+            if (dissertation_) {
+                const bool before = next_line_ < setup.first_sequence;
+                next_line_ += before;
+                return before;
+            }
+            const auto frame = arhost::json_text::frame_of_line(line);
+            return frame ? *frame < setup.first_sequence : line.starts_with("{\"format\"");
+        });
+    }
+
+    arhost_status write(const arhost_output &output) {
+        const arhost_record &record = *output.record;
+        text_.clear();
+        if (dissertation_) {
+            // Its lines bear no numbers, so that frames which the live mode dropped need one, too.
+            if (record.sequence > next_line_)
+                text_.assign(record.sequence - next_line_, '\n');
+            arhost::trajectory::append_dissertation_frame(text_, record);
+        } else {
+            if (file_.empty())
+                arhost::trajectory::append_header(text_, intrinsics_, record.clock, fps_);
+            arhost::trajectory::append_frame(text_, record);
+        }
+        file_.append(text_);
+        next_line_ = record.sequence + 1;
+        return ARHOST_OK;
+    }
+
+private:
+    arhost::files::LineFile file_;
+    bool dissertation_;
+    arhost_intrinsics intrinsics_{};
+    double fps_ = 0;
+    std::uint64_t next_line_ = 0; // dissertation: the frame that the next line stands for
+    std::string text_;
+};
+
+constexpr const char *formats[] = {"arhost", "dissertation", nullptr};
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The trajectory to write, a line a frame."),
+    arhost::option(ARHOST_OPTION_TEXT, "format", "arhost",
+                   "arhost: JSON lines with time stamps and intrinsics; dissertation: nine numbers a line.", 0, 0,
+                   formats),
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SINK,
+    "sink_trajectory",
+    "Trajectory",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Records the camera of each frame, to be traced again by 'arhost replay'.",
+    0,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+} // namespace
+
+ARHOST_SINK(TrajectorySink, descriptor)
