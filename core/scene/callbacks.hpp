@@ -11,7 +11,7 @@ namespace arhost::scene {
 struct LoadCallbacks {
     std::function<void(double fraction, const std::string &what)> progress; // 0 to 1, several times a second
     std::function<bool()> cancelled;                                        // true: stop, throwing Cancelled
-    std::function<void(const std::string &)> info;                          // one sentence for the log
+    std::function<void(const std::string &)> info, warning;                 // one sentence for the log
 };
 
 class Cancelled : public std::runtime_error {

@@ -4,6 +4,7 @@
 #include "scene/gltf.hpp"
 #include "scene/mesh_text.hpp"
 #include "scene/shapes.hpp"
+#include "scene/stand_in.hpp"
 #include "scene/textures.hpp"
 
 #include <glm/geometric.hpp>
@@ -500,13 +501,36 @@ std::string extent_of(const TriangleMesh &mesh) {
     return text;
 }
 
+// The knot that stands for a mesh whose file isn't there.
+TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
+    node.allow_keys({"faces", "size"});
+    const std::int64_t faces = node.require("faces").integer(stand_in_faces_minimum, stand_in_faces_maximum);
+    const Node size_node = node.require("size");
+    const glm::dvec3 size = number_or_vector(size_node);
+    for (int i = 0; i < 3; ++i)
+        if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
+            size_node.fail("each side must be 1e-6 to 1e9 mm");
+    TriangleMesh mesh = stand_in(static_cast<std::uint32_t>(faces), size);
+    if (options.smooth.value_or(true))
+        mesh.normals = smooth_normals(mesh);
+    return mesh;
+}
+
 TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &world_from_object,
                      const LoadCallbacks &callbacks) {
     MeshOptions options;
     if (const auto smooth = object.find("smooth"))
         options.smooth = smooth->boolean();
+    const auto stand_in = object.find("stand_in");
+    std::error_code unknown;
+    const bool missing = stand_in && !std::filesystem::exists(path.input_path(), unknown) && !unknown;
+    if (missing && callbacks.warning)
+        callbacks.warning(path.input_path().string() +
+                          " isn't there: a knot of as many triangles as the scene asks for stands in for it; "
+                          "tools/get-models tells which meshes can be had");
     try {
-        TriangleMesh mesh = load_mesh(path.input_path(), options, callbacks);
+        TriangleMesh mesh =
+            missing ? stand_in_of(*stand_in, options) : load_mesh(path.input_path(), options, callbacks);
         world_from_object.apply(mesh);
         check_extent(path, mesh.positions);
         if (std::ranges::any_of(mesh.texcoords, [](const glm::vec2 &t) {
@@ -514,8 +538,9 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
             }))
             path.fail("has texture coordinates beyond 1e9");
         if (callbacks.info)
-            callbacks.info(path.input_path().string() + ": " + std::to_string(mesh.triangles.size()) +
-                           " triangles, " + std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
+            callbacks.info(path.input_path().string() + (missing ? " (stand-in): " : ": ") +
+                           std::to_string(mesh.triangles.size()) + " triangles, " +
+                           std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
         return mesh;
     } catch (const MeshError &error) {
         path.fail(error.what());
@@ -549,12 +574,13 @@ public:
 
 private:
     void add_object(const Node &node, std::size_t index, std::size_t count) {
-        node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "sphere", "cuboid", "plane", "transform",
-                         "motion", "material", "role"});
+        node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "stand_in", "sphere", "cuboid", "plane",
+                         "transform", "motion", "material", "role"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
-        if (const auto smooth = node.find("smooth"); smooth && shape_key != "mesh")
-            smooth->fail("belongs to a mesh only");
+        for (const char *key : {"smooth", "stand_in"})
+            if (const auto of_mesh = node.find(key); of_mesh && shape_key != "mesh")
+                of_mesh->fail("belongs to a mesh only");
         if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
             animation->fail("belongs to a gltf only; other objects may have a 'motion'");
         const std::string name = name_of(node, shape_key + " " + std::to_string(index));

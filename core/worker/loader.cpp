@@ -13,6 +13,7 @@ int load_scene_for(Link &link, const ring::Message &load) {
     scene::LoadCallbacks callbacks;
     callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
     callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
+    callbacks.warning = [&](const std::string &text) { link.log(ARHOST_SEVERITY_WARNING, text); };
     scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);
     const ring::SharedMemory memory = ring::SharedMemory::create("arhost-scene", builder.byte_size());
     {

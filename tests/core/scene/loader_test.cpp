@@ -488,19 +488,44 @@ TEST(SceneLoading, SmoothComputesNormals) {
     EXPECT_EQ(geometry(load_with_mesh(triangle_with_normals, ", smooth: false")).normals.count, 0u);
 }
 
-class ShippedScenes : public testing::TestWithParam<const char *> {};
+// A mesh that isn't there, with a stand-in of these keys.
+const std::string absent = start + "objects:\n  - mesh: absent.ply\n    material: grey\n    stand_in: ";
 
-TEST_P(ShippedScenes, LoadAndStandOnTheMarker) {
-    const Arena arena =
-        load_scene(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes" / GetParam()).build();
+TEST(SceneLoading, DrawsAStandInForAMeshThatIsNotThere) {
+    std::vector<std::string> info, warnings;
+    LoadCallbacks callbacks;
+    callbacks.info = [&](const std::string &text) { info.push_back(text); };
+    callbacks.warning = [&](const std::string &text) { warnings.push_back(text); };
+    const std::string text = absent + "{faces: 4968, size: [2, 1, 0.5]}\n    transform: [{scale: 10}]\n";
+    const Arena arena = load_scene(Node::parse(text, "s.yaml"), callbacks).build();
     EXPECT_EQ(validate(arena.bytes()), "");
-    EXPECT_EQ(arena.scene().axes, ARHOST_Z_UP);
-    EXPECT_EQ(arena.scene().bounds_min[2], 0);
-    EXPECT_GE(arena.scene().lights.count, 1u);
-    EXPECT_GE(arena.scene().objects.count, 5u);
+    EXPECT_EQ(geometry(arena).indices.count, 4968u);
+    EXPECT_EQ(geometry(arena).normals.count, geometry(arena).positions.count);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_THAT(warnings[0], HasSubstr("absent.ply"));
+    EXPECT_THAT(warnings[0], HasSubstr("tools/get-models"));
+    ASSERT_EQ(info.size(), 1u);
+    EXPECT_THAT(info[0], HasSubstr("absent.ply (stand-in): 4968 triangles"));
+    EXPECT_THAT(info[0], testing::EndsWith("20 x 10 x 5 mm"));
+    EXPECT_EQ(geometry(load(text + "    smooth: false\n")).normals.count, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Config, ShippedScenes, testing::Values("optix-cs.yaml", "demo.yaml"));
+TEST(SceneLoading, PrefersTheMeshToItsStandIn) {
+    LoadCallbacks callbacks;
+    callbacks.warning = [](const std::string &text) { ADD_FAILURE() << text; };
+    EXPECT_EQ(
+        geometry(load_with_mesh(triangle_with_normals, ", stand_in: {faces: 500, size: 1}", callbacks)).indices.count,
+        1u);
+}
+
+TEST(SceneLoading, RefusesWrongStandIns) {
+    EXPECT_THAT(error_of(absent + "{faces: 99, size: 1}\n"), HasSubstr("s.yaml:8:23: objects[0].stand_in.faces"));
+    EXPECT_THAT(error_of(absent + "{faces: 500}\n"), HasSubstr("size"));
+    EXPECT_THAT(error_of(absent + "{faces: 500, size: [1, 0, 1]}\n"), HasSubstr("1e-6"));
+    EXPECT_THAT(error_of(start + "objects:\n  - sphere: {radius: 1}\n    material: grey\n"
+                                 "    stand_in: {faces: 500, size: 1}\n"),
+                HasSubstr("belongs to a mesh only"));
+}
 
 TEST(SceneDocumentation, ItsExampleLoads) {
     std::ifstream stream(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "docs/scenes.md");

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every scene in config/scenes: with stand-ins, as right after a checkout, and with the meshes of
+// tools/get-models where there are any.
+#include "plugin_under_test.hpp"
+#include "scene/loader.hpp"
+
+#include <glm/common.hpp>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+
+using namespace arhost::scene;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path folder = fs::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes";
+
+// The dissertation's tables 3 and 4 and its figures 14 to 20, and the demonstration's own: how many triangles
+// the mesh has by table 1.
+const std::map<std::string, std::size_t> faces = {
+    {"demo", 0},
+    {"optix-cs", 0},
+    {"optix-b", 4968},
+    {"optix-hb", 1'087'451},
+    {"optix-gl", 448'880},
+    {"optix-cgl", 448'880},
+    {"optix-gd", 871'306},
+    {"optix-cgd", 871'306},
+    {"optix-skybox-bunny", 4968},
+    {"optix-skybox-dragon", 871'306},
+    {"optix-skybox-buddha", 1'087'451},
+    {"optix-skybox-teapot", 126'048},
+    {"optix-skybox-lucy", 448'880},
+    {"vkray-cs", 0},
+    {"vkray-b", 4968},
+    {"vkray-hb", 1'087'451},
+    {"vkray-hbf", 1'087'451},
+    {"vkray-md", 871'306},
+    {"vkray-cmd", 871'306},
+};
+
+std::vector<std::string> scene_names() {
+    std::vector<std::string> names;
+    for (const auto &entry : fs::directory_iterator(folder))
+        if (entry.path().extension() == ".yaml")
+            names.push_back(entry.path().stem().string());
+    std::ranges::sort(names);
+    return names;
+}
+
+// The triangles of the scene's largest mesh.
+std::size_t check(const fs::path &file, std::size_t *warnings) {
+    LoadCallbacks callbacks;
+    callbacks.warning = [&](const std::string &) { ++*warnings; };
+    const Arena arena = load_scene(file, callbacks).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    const arhost_scene &scene = arena.scene();
+    EXPECT_EQ(scene.axes, file.stem().string().starts_with("vkray") ? ARHOST_Y_UP : ARHOST_Z_UP);
+    EXPECT_EQ(scene.bounds_min[scene.axes == ARHOST_Z_UP ? 2 : 1], 0) << "the scene doesn't stand on the marker";
+    EXPECT_EQ(scene.lights.count, 1u);
+    std::size_t most = 0;
+    const auto *geometries =
+        reinterpret_cast<const arhost_geometry *>(arena.bytes().data() + scene.geometries.offset);
+    for (std::size_t i = 0; i < scene.geometries.count; ++i)
+        most = std::max<std::size_t>(most, geometries[i].indices.count);
+    return most;
+}
+
+} // namespace
+
+TEST(ShippedScenes, AreAllOfTheDissertations) {
+    std::vector<std::string> names;
+    for (const auto &[name, count] : faces)
+        names.push_back(name);
+    EXPECT_EQ(scene_names(), names);
+}
+
+class ShippedScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedScene, LoadsWithAStandInOfTheDissertationsFaces) {
+    const arhost::test::ScratchFolder scratch; // has no models/
+    fs::create_directories(scratch.path() / "config/scenes");
+    const fs::path file = scratch.path() / "config/scenes" / (GetParam() + ".yaml");
+    fs::copy_file(folder / file.filename(), file);
+    std::size_t warnings = 0;
+    const std::size_t most = check(file, &warnings);
+    const std::size_t expected = faces.contains(GetParam()) ? faces.at(GetParam()) : 0;
+    EXPECT_EQ(warnings, expected > 0);
+    if (expected > 0) {
+        EXPECT_EQ(most, expected);
+    }
+}
+
+TEST_P(ShippedScene, LoadsAsItIs) {
+    std::size_t warnings = 0;
+    check(folder / (GetParam() + ".yaml"), &warnings);
+}
+
+INSTANTIATE_TEST_SUITE_P(Config, ShippedScene, testing::ValuesIn(scene_names()), [](const auto &scene) {
+    std::string name = scene.param;
+    std::ranges::replace(name, '-', '_');
+    return name;
+});
+
+// From a folder, so without a network.
+TEST(GetModels, PutsTheMeshesInPlace) {
+    ARHOST_REQUIRE_SHARED_DATA("meshes");
+    const arhost::test::ScratchFolder scratch;
+    const std::string command = ARHOST_SOURCE_DIRECTORY "/tools/get-models " ARHOST_SHARED_DATA "/meshes " +
+                                scratch.path().string() + " > /dev/null";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    for (const auto &[name, triangles] : {std::pair("bunny", 4968),
+                                          {"bunny_69k", 69'451},
+                                          {"teapot", 6320},
+                                          {"lucy", 99'970},
+                                          {"dragon", 871'414},
+                                          {"buddha", 100'000}}) {
+        const TriangleMesh mesh = load_mesh(scratch.path() / (name + std::string(".ply")));
+        EXPECT_EQ(mesh.triangles.size(), static_cast<std::size_t>(triangles)) << name;
+        glm::vec3 low = mesh.positions[0], high = low;
+        for (const glm::uvec3 &t : mesh.triangles)
+            for (const auto corner : {t.x, t.y, t.z}) {
+                low = glm::min(low, mesh.positions[corner]);
+                high = glm::max(high, mesh.positions[corner]);
+            }
+        EXPECT_NEAR(low.y, 0, 1e-6) << name;
+        EXPECT_NEAR(high.y, 1, 1e-6) << name;
+        EXPECT_NEAR(low.x, -high.x, 1e-6) << name;
+        EXPECT_NEAR(low.z, -high.z, 1e-6) << name;
+    }
+}

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A picture of a scene file from a given place, by the Embree ray tracer: without a video, a tracker or a marker.
+#include "renderer.hpp"
+#include "scene/loader.hpp"
+
+#include <CLI/CLI.hpp>
+#include <glm/trigonometric.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace {
+
+using Vector = std::array<double, 3>;
+
+arhost_host host() {
+    return {sizeof(arhost_host),
+            ARHOST_ABI_VERSION,
+            "render-scene",
+            "0",
+            nullptr,
+            [](const arhost_host *, arhost_severity severity, const char *text) {
+                if (severity >= ARHOST_SEVERITY_WARNING)
+                    std::fprintf(stderr, "%s\n", text);
+            },
+            [](const arhost_host *, double, const char *) {},
+            [](const arhost_host *) { return 0; },
+            [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+}
+
+struct View {
+    Vector eye{0, -300, 200}, look_at{0, 0, 40}, up{};
+    double field_of_view = 45;
+    std::array<std::uint32_t, 2> size{800, 600};
+};
+
+arhost_camera camera_of(const View &view) {
+    const double f = view.size[1] / 2.0 / std::tan(glm::radians(view.field_of_view / 2));
+    arhost_camera camera{};
+    camera.struct_size = sizeof camera;
+    for (int i = 0; i < 3; ++i) {
+        camera.eye[i] = view.eye[i];
+        camera.look_at[i] = view.look_at[i];
+        camera.up[i] = view.up[i];
+    }
+    camera.intrinsics.struct_size = sizeof camera.intrinsics;
+    camera.intrinsics.width = view.size[0];
+    camera.intrinsics.height = view.size[1];
+    camera.intrinsics.distortion = ARHOST_DISTORTION_NONE;
+    camera.intrinsics.fx = camera.intrinsics.fy = f;
+    camera.intrinsics.cx = (view.size[0] - 1) / 2.0;
+    camera.intrinsics.cy = (view.size[1] - 1) / 2.0;
+    return camera;
+}
+
+// Straight alpha over a checkerboard of two greys, as painting programs show what is transparent.
+cv::Mat over_checkerboard(const cv::Mat &rgba) {
+    cv::Mat picture(rgba.size(), CV_8UC3);
+    for (int y = 0; y < rgba.rows; ++y)
+        for (int x = 0; x < rgba.cols; ++x) {
+            const cv::Vec4b &above = rgba.at<cv::Vec4b>(y, x);
+            const int below = (x / 20 + y / 20) % 2 ? 176 : 192;
+            for (int i = 0; i < 3; ++i)
+                picture.at<cv::Vec3b>(y, x)[i] =
+                    static_cast<std::uint8_t>((above[2 - i] * above[3] + below * (255 - above[3]) + 127) / 255);
+        }
+    return picture;
+}
+
+cv::Mat render(const std::string &file, View view, const rt_embree::Settings &settings) {
+    arhost::scene::LoadCallbacks callbacks;
+    callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
+    const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
+    if (const std::string wrong = arhost::scene::validate(arena.bytes()); !wrong.empty())
+        throw std::runtime_error(file + ": " + wrong);
+    if (view.up == Vector{})
+        view.up[arena.scene().axes == ARHOST_Z_UP ? 2 : 1] = 1;
+    const arhost_camera camera = camera_of(view);
+    const arhost_host for_messages = host();
+    rt_embree::Renderer renderer(
+        {sizeof(arhost_raytracer_setup), view.size[0], view.size[1], 0, &arena.scene(), &camera.intrinsics}, settings,
+        arhost::Host(&for_messages));
+    cv::Mat rgba(static_cast<int>(view.size[1]), static_cast<int>(view.size[0]), CV_8UC4);
+    renderer.render(
+        camera, {sizeof(arhost_image), static_cast<std::uint32_t>(rgba.step), view.size[0], view.size[1], rgba.data});
+    return rgba;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
+    std::string scene, output, label;
+    View view;
+    rt_embree::Settings settings;
+    settings.samples = 16;
+    settings.light_samples = 1;
+    bool transparent = false;
+    app.add_option("scene", scene, "The scene file")->required();
+    app.add_option("--eye", view.eye, "Where the camera is")->delimiter(',')->capture_default_str();
+    app.add_option("--look-at", view.look_at, "What is in the picture's middle")
+        ->delimiter(',')
+        ->capture_default_str();
+    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")->delimiter(',');
+    app.add_option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
+        ->check(CLI::Range(1.0, 170.0))
+        ->capture_default_str();
+    app.add_option("--size", view.size, "Of the picture, px")
+        ->delimiter('x')
+        ->check(CLI::Range(1, 16384))
+        ->capture_default_str();
+    app.add_option("--samples", settings.samples, "A pixel")->check(CLI::Range(1, 256))->capture_default_str();
+    app.add_option("--label", label, "A line of text to write into the picture");
+    app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
+    app.add_option("--output,-o", output, "The file to write")->required();
+    CLI11_PARSE(app, argc, argv);
+    try {
+        const cv::Mat rgba = render(scene, view, settings);
+        cv::Mat picture;
+        if (transparent)
+            cv::cvtColor(rgba, picture, cv::COLOR_RGBA2BGRA);
+        else
+            picture = over_checkerboard(rgba);
+        for (const auto &[colour, width] :
+             {std::pair(cv::Scalar(255, 255, 255, 255), 7), {cv::Scalar(0, 0, 0, 255), 2}})
+            if (!label.empty())
+                cv::putText(picture, label, {14, picture.rows / 14}, cv::FONT_HERSHEY_SIMPLEX, picture.rows / 550.0,
+                            colour, width, cv::LINE_AA);
+        if (!cv::imwrite(output, picture))
+            throw std::runtime_error(output + ": can't be written");
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "render-scene: %s\n", error.what());
+        return EXIT_FAILURE;
+    }
+}
