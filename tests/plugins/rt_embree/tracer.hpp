@@ -114,8 +114,8 @@ public:
         started_ = status == ARHOST_OK;
         return status;
     }
-    arhost_status try_render(const arhost_camera &camera, Picture &picture) {
-        const arhost_render_request request{sizeof request, 0, 0, 0, camera, nullptr};
+    arhost_status try_render(const arhost_camera &camera, Picture &picture, const arhost_motion *motion = nullptr) {
+        const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
         const arhost_image image = picture.image();
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What moves looks like what was built in that place.
+#include "scene/motion.hpp"
+#include "tracer.hpp"
+#include "tree_quality.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace arhost::test {
+namespace {
+
+using scene::ArenaBuilder;
+
+ArenaBuilder with_floor_and_light() {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0.3f);
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                       ARHOST_CATCHER);
+    builder.add_light(light(60, -20, 200, 0.7f));
+    return builder;
+}
+
+// A sheet of n×n squares over the floor, in waves.
+scene::TriangleMesh sheet(float height, unsigned n = 40) {
+    scene::TriangleMesh mesh;
+    for (unsigned y = 0; y <= n; ++y)
+        for (unsigned x = 0; x <= n; ++x) {
+            const float u = static_cast<float>(x) / static_cast<float>(n) - 0.5f, v = static_cast<float>(y) / static_cast<float>(n) - 0.5f;
+            mesh.positions.push_back({60 * u, 60 * v, 30 + height * std::sin(12 * u) * std::cos(9 * v)});
+            if (x < n && y < n) {
+                const unsigned a = y * (n + 1) + x, b = a + n + 1;
+                mesh.triangles.push_back({a, a + 1, b});
+                mesh.triangles.push_back({a + 1, b + 1, b});
+            }
+        }
+    return mesh;
+}
+
+Picture at_time(ArenaBuilder builder, double time_s) {
+    Tracer tracer(std::move(builder));
+    const arhost_camera view = from_the_side();
+    EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_OK);
+    scene::MotionEvaluator evaluator(tracer.scene());
+    Picture picture(view.intrinsics);
+    for (const double t : {0.0, 0.9, time_s}) { // not straight from the start
+        const arhost_motion motion = evaluator.at(t);
+        picture = Picture(view.intrinsics);
+        EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_OK);
+    }
+    return picture;
+}
+
+void expect_alike(const Picture &a, const Picture &b) {
+    int different = 0;
+    const std::vector<Pixel> these = a.pixels(), those = b.pixels();
+    for (std::size_t i = 0; i < these.size(); ++i)
+        for (std::size_t c = 0; c < 4; ++c)
+            different += std::abs(these[i][c] - those[i][c]) > 1;
+    EXPECT_LE(different, 20) << "of 120000 numbers: edges, by the last bit of a float";
+}
+
+rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
+    return {reinterpret_cast<const std::byte *>(mesh.positions.data()),
+            reinterpret_cast<const std::byte *>(mesh.triangles.data()), 12, 12,
+            static_cast<std::uint32_t>(mesh.triangles.size())};
+}
+
+} // namespace
+
+TEST(Moving, AnObjectIsWhereItsNodeIs) {
+    ArenaBuilder moving = with_floor_and_light();
+    moving.settings.duration_s = 1;
+    const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
+    moving.add_channel({.node = node, .times = {0, 1}, .values = {-40, 0, 0, 40, 20, 0}});
+    moving.add_object("box", moving.add_triangles(cube(10)), moving.add_material(shiny(0.5f, 0.4f, 30)), ARHOST_VIRTUAL,
+                      glm::mat4x3(1), {.moves = true, .node = node});
+    ArenaBuilder still = with_floor_and_light();
+    scene::TriangleMesh box = cube(10);
+    for (glm::vec3 &p : box.positions)
+        p += glm::vec3(20, 15, 0);
+    still.add_object("box", still.add_triangles(box), still.add_material(shiny(0.5f, 0.4f, 30)));
+    expect_alike(at_time(std::move(moving), 0.75), Tracer(std::move(still)).render(from_the_side()));
+}
+
+TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
+    ArenaBuilder deforming = with_floor_and_light();
+    deforming.settings.duration_s = 1;
+    const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
+    deforming.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+    scene::TriangleMesh mesh = sheet(0);
+    const scene::TriangleMesh waves = sheet(16);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+        mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
+    deforming.add_object("sheet", deforming.add_triangles(mesh), deforming.add_material(diffuse(0.2f, 0.4f, 0.8f)),
+                         ARHOST_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
+    ArenaBuilder still = with_floor_and_light();
+    still.add_object("sheet", still.add_triangles(sheet(8)), still.add_material(diffuse(0.2f, 0.4f, 0.8f)));
+    expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
+}
+
+TEST(TreeQuality, StaysWhileAMeshIsMovedScaledAndBent) {
+    scene::TriangleMesh mesh = sheet(4);
+    rt_embree::TreeQuality quality;
+    quality.built(view_of(mesh));
+    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-9);
+    for (glm::vec3 &p : mesh.positions)
+        p = p * 3.0f + glm::vec3(100, 0, 0);
+    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-3);
+    EXPECT_LT(quality.decay(view_of(sheet(5))), 1.3);
+}
+
+TEST(TreeQuality, DecaysWhereNeighboursPart) {
+    scene::TriangleMesh mesh = sheet(4);
+    rt_embree::TreeQuality quality;
+    quality.built(view_of(mesh));
+    std::shuffle(mesh.positions.begin(), mesh.positions.end(), std::minstd_rand(1));
+    EXPECT_GT(quality.decay(view_of(mesh)), 5);
+    quality.built(view_of(mesh));
+    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-9);
+}
+
+} // namespace arhost::test
