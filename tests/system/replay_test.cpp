@@ -36,7 +36,7 @@ const std::string replay_of_it = "version: 1\nsource: {plugin: source_synthetic,
 
 void expect_same_images(const ArhostRun &run, int frames) {
     for (int frame = 0; frame < frames; ++frame) {
-        char name[16];
+        char name[32];
         std::snprintf(name, sizeof name, "/%03d.png", frame);
         ASSERT_TRUE(run.exists(std::string("recorded") + name));
         ASSERT_TRUE(run.exists(std::string("replayed") + name));
