@@ -22,9 +22,6 @@ if(ARHOST_SANITIZE)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
 endif()
 
-# Where programs find arhost-images.so (core/scene/image_reader.hpp).
-set(CMAKE_BUILD_RPATH "$ORIGIN/../lib")
-
 set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost)
 add_custom_target(plugins COMMENT "All plugins")
 
@@ -66,5 +63,7 @@ function(arhost_add_test name)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-                       PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+                       PROPERTIES TIMEOUT ${ARG_TIMEOUT}
+                       ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0"
+                       LABELS "${ARG_LABELS}")
 endfunction()
