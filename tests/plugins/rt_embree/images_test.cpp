@@ -31,7 +31,8 @@ scene::Texture texture_of(std::uint32_t width, std::uint32_t height, const std::
 Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format format = ARHOST_TEXEL_SRGB8) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
-    scene::Texture texture = texture_of(2, 2, {{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}, {188, 188, 188, 255}});
+    scene::Texture texture =
+        texture_of(2, 2, {{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}, {188, 188, 188, 255}});
     texture.wrap_u = texture.wrap_v = wrap;
     texture.format = format;
     arhost_material material = flat(1, 1, 1);
@@ -92,7 +93,8 @@ TEST(Texture, LiesUprightAndIsLinearised) {
     EXPECT_TRUE(is_nearly(picture.at(130, 44), Pixel{0, 255, 0, 255}));
     EXPECT_TRUE(is_nearly(picture.at(70, 104), Pixel{0, 0, 255, 255}));
     EXPECT_NEAR(picture.at(130, 104)[0], 188, 3) << "decoded and encoded again";
-    EXPECT_NEAR(of_four_texels(ARHOST_WRAP_REPEAT, 1, ARHOST_TEXEL_RGBA8).at(130, 104)[0], shading::srgb8_exact(188 / 255.0), 3);
+    EXPECT_NEAR(of_four_texels(ARHOST_WRAP_REPEAT, 1, ARHOST_TEXEL_RGBA8).at(130, 104)[0],
+                shading::srgb8_exact(188 / 255.0), 3);
 }
 
 TEST(Texture, IsMixedBetweenTexelsInLinearLight) {

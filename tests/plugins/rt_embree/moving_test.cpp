@@ -29,7 +29,8 @@ scene::TriangleMesh sheet(float height, unsigned n = 40) {
     scene::TriangleMesh mesh;
     for (unsigned y = 0; y <= n; ++y)
         for (unsigned x = 0; x <= n; ++x) {
-            const float u = static_cast<float>(x) / static_cast<float>(n) - 0.5f, v = static_cast<float>(y) / static_cast<float>(n) - 0.5f;
+            const float u = static_cast<float>(x) / static_cast<float>(n) - 0.5f,
+                        v = static_cast<float>(y) / static_cast<float>(n) - 0.5f;
             mesh.positions.push_back({60 * u, 60 * v, 30 + height * std::sin(12 * u) * std::cos(9 * v)});
             if (x < n && y < n) {
                 const unsigned a = y * (n + 1) + x, b = a + n + 1;
@@ -76,8 +77,8 @@ TEST(Moving, AnObjectIsWhereItsNodeIs) {
     moving.settings.duration_s = 1;
     const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
     moving.add_channel({.node = node, .times = {0, 1}, .values = {-40, 0, 0, 40, 20, 0}});
-    moving.add_object("box", moving.add_triangles(cube(10)), moving.add_material(shiny(0.5f, 0.4f, 30)), ARHOST_VIRTUAL,
-                      glm::mat4x3(1), {.moves = true, .node = node});
+    moving.add_object("box", moving.add_triangles(cube(10)), moving.add_material(shiny(0.5f, 0.4f, 30)),
+                      ARHOST_VIRTUAL, glm::mat4x3(1), {.moves = true, .node = node});
     ArenaBuilder still = with_floor_and_light();
     scene::TriangleMesh box = cube(10);
     for (glm::vec3 &p : box.positions)
