@@ -4,12 +4,9 @@
 // shall load it (scene.json, and the mesh as raw numbers), then answers each line "CASE FRAMES" of its input
 // with the times of that many frames, as a line of JSON. Each case's last image is left in FOLDER as
 // ours-CASE.rgba. Built with COUNT_RAYS it tells how many rays a frame takes as well, and its times are void.
+#include "bunny.hpp"
 #include "renderer.hpp"
-#include "scene/mesh.hpp"
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/gtc/constants.hpp>
 #include <glm/trigonometric.hpp>
 
 #include <atomic>
@@ -79,53 +76,6 @@ constexpr float bunny_grey = 0.6f, ground_grey = 0.5f, mirror_grey = 0.9f;
 // A little is lost at each bounce, so that the picture shows how long its paths are.
 constexpr float glass_grey = 0.95f, glass_index = 1.5f;
 constexpr std::uint32_t mirror_depth = 8, glass_depth = 20; // bounces
-
-const arhost_host quiet_host = {
-    sizeof(arhost_host),
-    ARHOST_ABI_VERSION,
-    "rt-embree-peers",
-    "0",
-    nullptr,
-    [](const arhost_host *, arhost_severity, const char *text) { std::fprintf(stderr, "%s\n", text); },
-    [](const arhost_host *, double, const char *) {},
-    [](const arhost_host *) { return 0; },
-    [](const arhost_host *, const char *) -> const void * { return nullptr; }};
-
-// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
-TriangleMesh dented_ball() {
-    TriangleMesh mesh;
-    constexpr unsigned rings = 186, sides = 187;
-    for (unsigned ring = 0; ring <= rings; ++ring)
-        for (unsigned side = 0; side <= sides; ++side) {
-            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
-            const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
-            mesh.positions.push_back(
-                r * glm::vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
-            if (ring < rings && side < sides) {
-                const unsigned a = ring * (sides + 1) + side, b = a + sides + 1;
-                mesh.triangles.push_back({a, a + 1, b});
-                mesh.triangles.push_back({a + 1, b + 1, b});
-            }
-        }
-    mesh.normals = smooth_normals(mesh);
-    return mesh;
-}
-
-// The bunny, 100 mm high, on the ground.
-TriangleMesh bunny(std::string &name) {
-    const std::filesystem::path file = std::filesystem::path(ARHOST_SHARED_DATA) / "meshes/bunny_69451.ply.gz";
-    const bool there = std::filesystem::exists(file);
-    name = there ? "bunny" : "dented ball";
-    TriangleMesh mesh = there ? load_mesh(file, {.smooth = true}) : dented_ball();
-    glm::vec3 low = mesh.positions[0], high = low;
-    for (const glm::vec3 &p : mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    for (glm::vec3 &p : mesh.positions)
-        p = (p - glm::vec3((low.x + high.x) / 2, low.y, (low.z + high.z) / 2)) * (100 / (high.y - low.y));
-    return mesh;
-}
 
 TriangleMesh ground() {
     const float a = ground_half_side;
@@ -215,12 +165,13 @@ public:
     Trial(Case made)
         : case_(std::move(made)), pixels_(width * height * 4),
           renderer_({sizeof(arhost_raytracer_setup), width, height, 0, &case_.arena.scene(), &camera_.intrinsics},
-                    case_.settings, arhost::Host(&quiet_host)) {}
+                    case_.settings, arhost::Host(&host_)) {}
     void render() { renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data()}); }
     const std::vector<std::uint8_t> &pixels() const { return pixels_; }
     const rt_embree::Renderer &renderer() const { return renderer_; }
 
 private:
+    arhost_host host_ = arhost::bench::printing_host("rt-embree-peers");
     Case case_;
     arhost_camera camera_ = camera();
     std::vector<std::uint8_t> pixels_;
@@ -253,8 +204,7 @@ void write_scene(const std::filesystem::path &folder, const TriangleMesh &mesh, 
 }
 
 void serve(const std::filesystem::path &folder, unsigned threads) {
-    std::string mesh_name;
-    const TriangleMesh mesh = bunny(mesh_name);
+    const auto [mesh, mesh_name] = arhost::bench::bunny(ARHOST_SHARED_DATA);
     write_scene(folder, mesh, mesh_name);
     std::printf(R"({"name": "arhost rt_embree", "version": "Embree %d.%d"})"
                 "\n",

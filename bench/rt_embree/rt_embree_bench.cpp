@@ -2,12 +2,9 @@
 //
 // How long the Embree ray tracer takes for an image, and how much of what Embree could do at best is
 // left: `rt-embree-bench [threads [instruction_set]]`.
+#include "bunny.hpp"
 #include "renderer.hpp"
-#include "scene/mesh.hpp"
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/gtc/constants.hpp>
 #include <glm/trigonometric.hpp>
 
 #include <algorithm>
@@ -26,57 +23,6 @@ using namespace arhost::scene;
 
 constexpr std::uint32_t width = 800, height = 600;
 constexpr int rounds = 101;
-
-arhost_host quiet_host() {
-    return {sizeof(arhost_host),
-            ARHOST_ABI_VERSION,
-            "rt-embree-bench",
-            "0",
-            nullptr,
-            [](const arhost_host *, arhost_severity, const char *text) { std::printf("%s\n", text); },
-            [](const arhost_host *, double, const char *) {},
-            [](const arhost_host *) { return 0; },
-            [](const arhost_host *, const char *) -> const void * { return nullptr; }};
-}
-
-// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
-TriangleMesh dented_ball() {
-    TriangleMesh mesh;
-    constexpr unsigned rings = 186, sides = 187;
-    for (unsigned ring = 0; ring <= rings; ++ring)
-        for (unsigned side = 0; side <= sides; ++side) {
-            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
-            const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
-            mesh.positions.push_back(glm::vec3(0, 50, 0) + r * glm::vec3(std::sin(theta) * std::cos(phi),
-                                                                         std::cos(theta),
-                                                                         std::sin(theta) * std::sin(phi)));
-            if (ring < rings && side < sides) {
-                const unsigned a = ring * (sides + 1) + side, b = a + sides + 1;
-                mesh.triangles.push_back({a, a + 1, b});
-                mesh.triangles.push_back({a + 1, b + 1, b});
-            }
-        }
-    mesh.normals = smooth_normals(mesh);
-    return mesh;
-}
-
-// Brought to 100 mm of height on the plane y = 0.
-TriangleMesh bunny() {
-    const std::filesystem::path file = std::filesystem::path(ARHOST_SHARED_DATA) / "meshes/bunny_69451.ply.gz";
-    if (!std::filesystem::exists(file)) {
-        std::printf("%s is not here: a dented ball of 69564 triangles stands in for the bunny\n", file.c_str());
-        return dented_ball();
-    }
-    TriangleMesh mesh = load_mesh(file, {.smooth = true});
-    glm::vec3 low = mesh.positions[0], high = low;
-    for (const glm::vec3 &p : mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    for (glm::vec3 &p : mesh.positions)
-        p = (p - glm::vec3((low.x + high.x) / 2, low.y, (low.z + high.z) / 2)) * (100 / (high.y - low.y));
-    return mesh;
-}
 
 arhost_light lamp() {
     arhost_light light = make_light(ARHOST_POINT_LIGHT);
@@ -162,7 +108,7 @@ public:
     const rt_embree::Renderer &renderer() const { return renderer_; }
 
 private:
-    arhost_host host_ = quiet_host();
+    arhost_host host_ = arhost::bench::printing_host("rt-embree-bench");
     arhost_camera camera_ = camera();
     std::vector<std::uint8_t> pixels_;
     rt_embree::Renderer renderer_;
@@ -171,7 +117,7 @@ private:
 // Nothing but rtcIntersect16, or in packets of the width that the processor has, over rays that lie ready in
 // memory, in the same blocks, tiles and threads.
 Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settings, bool native_width) {
-    const arhost_host host = quiet_host();
+    const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
     rt_embree::ThreadPool threads(settings.threads);
     const rt_embree::RayTable table(intrinsics(), false, threads);
     const rt_embree::EmbreeScene scene(arena.scene(), threads.thread_count(), settings.robust, arhost::Host(&host));
@@ -230,7 +176,7 @@ int main(int argc, char **argv) {
     if (argc > 2)
         settings.instruction_set = argv[2];
 
-    const TriangleMesh mesh = bunny();
+    const auto [mesh, name] = arhost::bench::bunny(ARHOST_SHARED_DATA);
     arhost_material diffuse = make_material(ARHOST_DIFFUSE), mirror = make_material(ARHOST_MIRROR);
     for (int i = 0; i < 3; ++i) {
         diffuse.ambient[i] = diffuse.diffuse[i] = 0.7f - 0.1f * static_cast<float>(i);
@@ -244,8 +190,8 @@ int main(int argc, char **argv) {
     Trial visibility(unlit, settings);
     const Timing visible = visibility.time();
     std::printf(
-        "%zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; p50 of %d frames\n",
-        mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
+        "%s of %zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; p50 of %d frames\n",
+        name, mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
         visibility.renderer().kernel_name(), 100 * visibility.covered(), rounds);
     report("primary visibility", visible);
     const auto compare = [&](const char *what, const Timing &bare) {

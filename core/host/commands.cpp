@@ -208,13 +208,6 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Lau
     });
 
     const bool whole = pipeline.run();
-    // From here on signals end the process at once, should the terminal be halted while the last lines wait.
-    const auto let_signals_end_us = [&] {
-        signalfd_siginfo info;
-        while (::read(signal_fd.get(), &info, sizeof info) > 0) {
-        }
-        ::sigprocmask(SIG_UNBLOCK, &signals, nullptr);
-    };
     if (!whole)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const bool has_stats = configuration.stats && pipeline.statistics().frames_in > 0;
@@ -224,7 +217,11 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Lau
                          report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host())
                                  .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
                              "\n");
-    let_signals_end_us();
+    // From here on signals end the process at once, should the terminal be halted while the last lines wait.
+    signalfd_siginfo taken;
+    while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {
+    }
+    ::sigprocmask(SIG_UNBLOCK, &signals, nullptr);
     if (!written)
         return run_failed;
     if (!whole)

@@ -18,8 +18,7 @@ constexpr int block = 4; // px a side
 ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool active, bool &coloured) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
-    alignas(64) int lane[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const Paths paths{load(lane) + Int(first_pixel), first_pixel, white(), 0};
+    const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0};
     RTCRayHit16 rays;
     set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
     const Bool hit = trace(scene, make_query(Coherence::coherent), rays, active);
@@ -150,8 +149,7 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
 } // namespace
 
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
-    alignas(64) const int lane[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const Int column = load(lane) & Int(3), row = load(lane) >> Int(2);
+    const Int column = lane_numbers() & Int(3), row = lane_numbers() >> Int(2);
     const Rectangle &all = tile.pixels;
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();

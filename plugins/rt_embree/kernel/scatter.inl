@@ -202,8 +202,7 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
 ARHOST_INLINE void follow_packet(Work &work, std::uint32_t depth) {
     WaitingRays &waiting = work.scratch.waiting[depth];
     const std::int32_t first = waiting.count > lanes ? waiting.count - lanes : 0;
-    alignas(64) int number[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const Bool active = load(number) < Int(waiting.count - first);
+    const Bool active = lane_numbers() < Int(waiting.count - first);
     const auto row = [&](int i) __attribute__((always_inline)) {
         return load(waiting.numbers + i * waiting.capacity + first);
     };

@@ -16,6 +16,12 @@ ARHOST_INLINE Vec3 white() {
     return {Float(1.0f), Float(1.0f), Float(1.0f)};
 }
 
+// 0 to 15.
+ARHOST_INLINE Int lane_numbers() {
+    alignas(64) constexpr int numbers[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    return load(numbers);
+}
+
 // A vector that has been taken through a column-major 3×3 matrix.
 ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
     return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;

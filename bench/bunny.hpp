@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the ray tracer's benchmarks share: the mesh, and a host that only prints.
+#pragma once
+
+#include "scene/mesh.hpp"
+
+#include <arhost/plugin.h>
+
+#include <glm/common.hpp>
+#include <glm/gtc/constants.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+namespace arhost::bench {
+
+// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
+inline scene::TriangleMesh dented_ball() {
+    scene::TriangleMesh mesh;
+    constexpr unsigned rings = 186, sides = 187;
+    for (unsigned ring = 0; ring <= rings; ++ring)
+        for (unsigned side = 0; side <= sides; ++side) {
+            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
+            const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
+            mesh.positions.push_back(
+                r * glm::vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
+            if (ring < rings && side < sides) {
+                const unsigned a = ring * (sides + 1) + side, b = a + sides + 1;
+                mesh.triangles.push_back({a, a + 1, b});
+                mesh.triangles.push_back({a + 1, b + 1, b});
+            }
+        }
+    mesh.normals = scene::smooth_normals(mesh);
+    return mesh;
+}
+
+struct NamedMesh {
+    scene::TriangleMesh mesh;
+    const char *name;
+};
+
+// The bunny of `shared_data`, or a ball that stands in for it: 100 mm high, on the plane y = 0.
+inline NamedMesh bunny(const std::filesystem::path &shared_data) {
+    const std::filesystem::path file = shared_data / "meshes/bunny_69451.ply.gz";
+    const bool there = std::filesystem::exists(file);
+    NamedMesh named{there ? scene::load_mesh(file, {.smooth = true}) : dented_ball(),
+                    there ? "bunny" : "dented ball"};
+    std::vector<glm::vec3> &positions = named.mesh.positions;
+    glm::vec3 low = positions[0], high = low;
+    for (const glm::vec3 &p : positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    for (glm::vec3 &p : positions)
+        p = (p - glm::vec3((low.x + high.x) / 2, low.y, (low.z + high.z) / 2)) * (100 / (high.y - low.y));
+    return named;
+}
+
+// What it is told goes to stderr.
+inline arhost_host printing_host(const char *name) {
+    return {sizeof(arhost_host),
+            ARHOST_ABI_VERSION,
+            name,
+            "0",
+            nullptr,
+            [](const arhost_host *, arhost_severity, const char *text) { std::fprintf(stderr, "%s\n", text); },
+            [](const arhost_host *, double, const char *) {},
+            [](const arhost_host *) { return 0; },
+            [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+}
+
+} // namespace arhost::bench
