@@ -60,6 +60,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, longest_ms));
     component.limits.start =
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, longest_ms));
+    component.limits.stop =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, longest_ms));
     component.limits.restart = restart;
     return component;
 }

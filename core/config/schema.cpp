@@ -31,6 +31,7 @@ const std::vector<Key> &table() {
         {"source.options", free_map, false, "", "The plugin's own options: `arhost plugins --options`."},
         {"source.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"source.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
+        {"source.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
 
         {"trajectory", input_path, false, "", "Cameras from this file, not from the tracker (docs/trajectories.md)."},
 
@@ -65,6 +66,7 @@ const std::vector<Key> &table() {
         {"tracker.fallback", text, false, "", "The plugin to go on with when this one is given up."},
         {"tracker.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"tracker.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
+        {"tracker.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
 
         {"raytracer", map, false, "no overlay", "What draws the virtual objects."},
         {"raytracer.plugin", text, true, "", "A plugin's name (`rt_embree`), or a path to a `.so`."},
@@ -73,6 +75,7 @@ const std::vector<Key> &table() {
         {"raytracer.fallback", text, false, "", "The plugin to go on with when this one is given up."},
         {"raytracer.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"raytracer.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
+        {"raytracer.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
 
         {"coordinates", map, false, "from the scene's axes",
          "From the marker's axes to the scene's (docs/camera.md)."},
@@ -89,6 +92,7 @@ const std::vector<Key> &table() {
         {"outputs[].options", free_map, false, "", "The plugin's own options."},
         {"outputs[].deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
         {"outputs[].start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
+        {"outputs[].stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
 
         {"live", map, false, "", "Settings of mode live."},
         {"live.max_latency_ms", integer, false, "500",

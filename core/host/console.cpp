@@ -42,6 +42,8 @@ Console::Console(bool verbose)
 
 Console::~Console() {
     clear_line();
+    if (const std::size_t lost = thread_->overrun_counter())
+        log_->warn("{} lines were lost, since nobody took them from stderr", lost);
 }
 
 void Console::clear_line() {

@@ -366,7 +366,9 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     reads_.pop_front();
     if (command.sequence >= next_read_) // the frame before it failed, and comes first
         return;
-    if (result.status == ARHOST_END || (ended_ && result.status < 0)) {
+    if (result.status == ARHOST_END_CUT_SHORT && !ended_)
+        fail(configuration_.source->node.where() + ": source: its input is cut short; what there was is kept", false);
+    if (result.status >= ARHOST_END || (ended_ && result.status < 0)) {
         ended_ = true;
         return;
     }

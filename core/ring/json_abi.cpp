@@ -194,6 +194,8 @@ const char *status_text(arhost_status status) {
         return "ok";
     case ARHOST_END:
         return "end";
+    case ARHOST_END_CUT_SHORT:
+        return "end, cut short";
     case ARHOST_ERROR_INVALID_ARGUMENT:
         return "invalid argument";
     case ARHOST_ERROR_CONFIGURATION:

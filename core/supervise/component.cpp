@@ -196,7 +196,7 @@ void Component::stop_when_idle() {
 void Component::on_result(const Result &result) {
     if (in_flight_.empty() || result.ticket != in_flight_.front().ticket)
         return process_->end("broke the contract: it answered what it was not asked");
-    if (result.status == 0 || result.status > ARHOST_END || result.status < ARHOST_ERROR_INTERNAL)
+    if (result.status == 0 || result.status > ARHOST_END_CUT_SHORT || result.status < ARHOST_ERROR_INTERNAL)
         return process_->end("broke the contract: its status is " + std::to_string(result.status));
     const Command command = in_flight_.front();
     in_flight_.pop_front();

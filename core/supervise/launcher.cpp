@@ -180,6 +180,17 @@ void reap(int socket, std::set<pid_t> &spawned) {
     }
 }
 
+// The launcher's next word. One that somebody has stopped is made to go on: the host must not stand still.
+Reply receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
+    pollfd ready{socket, POLLIN, 0};
+    while (::poll(&ready, 1, 50) <= 0)
+        ::kill(launcher, SIGCONT);
+    Reply reply;
+    if (!receive_struct(socket, reply, fds))
+        throw std::runtime_error("the launcher is gone");
+    return reply;
+}
+
 } // namespace
 
 double cpu_seconds(const rusage &usage) {
@@ -229,10 +240,8 @@ Spawned Launcher::spawn(const std::filesystem::path &program) {
     if (!send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()}))
         throw std::runtime_error("the launcher is gone");
     for (;;) {
-        Reply reply;
         std::vector<UniqueFd> fds;
-        if (!receive_struct(socket_.get(), reply, fds))
-            throw std::runtime_error("the launcher is gone");
+        const Reply reply = receive_reply(socket_.get(), pid_, fds);
         if (reply.kind == Reply::exited) {
             exits_.push_back(reply.exit);
             continue;
@@ -255,10 +264,8 @@ Exit Launcher::wait_exit(pid_t pid) {
                 exits_.erase(it);
                 return found;
             }
-        Reply reply;
         std::vector<UniqueFd> fds;
-        if (!receive_struct(socket_.get(), reply, fds))
-            throw std::runtime_error("the launcher is gone");
+        const Reply reply = receive_reply(socket_.get(), pid_, fds);
         exits_.push_back(reply.exit);
     }
 }

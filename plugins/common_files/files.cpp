@@ -32,6 +32,15 @@ const char *mend(int error_number) {
     }
 }
 
+// Pipes and devices can neither be cut back after a restart nor replaced.
+void require_regular_file(int fd, const std::filesystem::path &path) {
+    struct stat status {};
+    if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
+        ::close(fd);
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "'" + path.string() + "' is no regular file: choose another path");
+    }
+}
+
 } // namespace
 
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number) {
@@ -49,6 +58,7 @@ void make_parent_folders(const std::filesystem::path &file) {
 
 void check_can_write(const std::filesystem::path &file) {
     if (const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK); fd >= 0) {
+        require_regular_file(fd, file);
         ::close(fd);
         return;
     }
@@ -79,12 +89,7 @@ File::File(std::filesystem::path path, int open_flags)
     : path_(std::move(path)), fd_(::open(path_.c_str(), open_flags | O_CLOEXEC | O_NONBLOCK, 0666)) {
     if (fd_ < 0)
         throw io_failure("can't open", path_, errno);
-    struct stat status {};
-    // Pipes and devices can neither be cut back after a restart nor replaced.
-    if (::fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode)) {
-        ::close(fd_);
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "'" + path_.string() + "' is no regular file: choose another path");
-    }
+    require_regular_file(fd_, path_);
 }
 
 File::~File() {

@@ -138,17 +138,19 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
 
 Kernel choose_kernel(const std::string &instruction_set) {
     const auto wanted = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
-#if defined(__x86_64__)
+#if defined(ARHOST_HAS_AVX512)
     if (wanted("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
         return {avx512::render_tile, "avx512"};
+#endif
+#if defined(__x86_64__)
     if (wanted("avx2") && __builtin_cpu_supports("avx2"))
         return {avx2::render_tile, "avx2"};
 #endif
     if (wanted("base"))
         return {base::render_tile, "base"};
     throw Failure(ARHOST_ERROR_UNSUPPORTED,
-                  "option 'instruction_set': this processor has no " + instruction_set + "; set it to 'auto'");
+                  "option 'instruction_set': this processor or build has no " + instruction_set + "; set it to 'auto'");
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) {
@@ -236,7 +238,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         still_camera_.reset(); // what has been summed up has holes
         throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
     }
-    history_samples_ += static_cast<std::uint32_t>(samples_.size());
+    if (!history_.empty())
+        history_samples_ += static_cast<std::uint32_t>(samples_.size());
     return drawn;
 }
 

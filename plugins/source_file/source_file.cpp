@@ -108,7 +108,7 @@ private:
             return ARHOST_END;
         for (;;) {
             const arhost_status status = reader_->go_to(round_frames_ ? frame % round_frames_ : frame);
-            if (status != ARHOST_END || !loop_ || round_frames_)
+            if (status < ARHOST_END || !loop_ || round_frames_)
                 return status;
             round_frames_ = reader_->frame_count(); // only the end tells a video's true length
             round_ns_ = reader_->end_ns();

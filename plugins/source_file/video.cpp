@@ -79,7 +79,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     const arhost_status first = next();
     if (first == ARHOST_ERROR_CANCELLED)
         throw Failure(ARHOST_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
-    if (first == ARHOST_END)
+    if (first >= ARHOST_END)
         throw refuse("not one picture of it can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
@@ -105,7 +105,7 @@ arhost_status Decoder::next() {
         else if (const arhost_status fed = feed(); fed != ARHOST_OK)
             return fed;
     }
-    return ARHOST_END;
+    return cut_short_.empty() ? ARHOST_END : ARHOST_END_CUT_SHORT;
 }
 
 // Gives the decoder the next packet, or tells it that there is none.

@@ -18,7 +18,7 @@ public:
     Decoder(const Decoder &) = delete; // libav holds its address
     Decoder &operator=(const Decoder &) = delete;
 
-    // Decodes the next picture: ARHOST_OK, ARHOST_END or ARHOST_ERROR_CANCELLED.
+    // Decodes the next picture: ARHOST_OK, ARHOST_END, ARHOST_END_CUT_SHORT or ARHOST_ERROR_CANCELLED.
     arhost_status next();
 
     const AVFrame &picture() const { return *frame_; }

@@ -12,6 +12,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <sys/wait.h>
 #include <thread>
@@ -51,7 +52,8 @@ public:
 
     // Starts `arhost ARGUMENTS`; output() and wait() follow. `prepare` is called in the child, which becomes arhost.
     void start(
-        std::vector<std::string> arguments = {"--config", "run.yaml"}, void (*prepare)() = [] {}) {
+        std::vector<std::string> arguments = {"--config", "run.yaml"},
+        const std::function<void()> &prepare = [] {}) {
         pid_ = ::fork();
         if (pid_ == 0) {
             if (::chdir(folder_.path().c_str()) != 0)
@@ -94,6 +96,10 @@ public:
     }
     std::string output() const { return read("output.txt"); }
     pid_t pid() const { return pid_; }
+    pid_t launcher() const {
+        const std::vector<pid_t> found = children(pid_);
+        return found.empty() ? 0 : found.front();
+    }
 
     // The worker that serves this plugin now (its process bears the plugin's id); 0 where there is none.
     pid_t worker(const std::string &plugin) const {

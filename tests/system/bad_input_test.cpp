@@ -107,6 +107,18 @@ const std::vector<Case> cases = {
      replaced(good, "rt_counter", "./run.yaml.so"),
      small_scene,
      {"run.yaml:5:", "there is no plugin"}},
+    {"PluginThatIsText",
+     replaced(good, "rt_counter", "./text.so"),
+     small_scene,
+     {"run.yaml:5:", "text.so", "invalid ELF header"}},
+    {"PluginThatIsCut",
+     replaced(good, "rt_counter", "./cut.so"),
+     small_scene,
+     {"run.yaml:5:", "cut.so", "too short"}},
+    {"PluginThatNeedsASymbolThatNobodyHas",
+     replaced(good, "rt_counter", "broken_undefined"),
+     small_scene,
+     {"run.yaml:5:", "broken_undefined.so", "undefined symbol: arhost_test_nowhere"}},
     {"NoSceneFile",
      replaced(good, "scene.yaml", "none.yaml"),
      small_scene,
@@ -178,6 +190,8 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
     run.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
     run.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
     run.write("empty.obj", "v 0 0 0\n");
+    run.write("text.so", "This is no shared object, whatever its name says, and it is longer than an ELF header.\n");
+    run.write("cut.so", "\177ELF");
     ASSERT_EQ(::mkfifo(run.path("fifo.obj").c_str(), 0600), 0);
     EXPECT_EQ(run.run(), 2) << run.output();
     const std::string output = run.output();

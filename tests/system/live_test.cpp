@@ -44,6 +44,34 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
 
+// The real plugins at 30 frames a second; at 64 samples a pixel no machine's ray tracer keeps up.
+TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
+    const std::string yaml =
+        "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
+        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: 80}]}\n"
+        "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY
+        "/config/scenes/demo.yaml, options: {samples: 64}, deadline_ms: 60000}\n"
+        "outputs: [{plugin: sink_images, path: \"%04d.png\"}]\nlive: {max_latency_ms: 60000}\nstats: stats.json\n";
+    ArhostRun live(yaml), lockstep(yaml);
+    ASSERT_EQ(live.run({"--config", "run.yaml", "--set", "mode=live"}), 0) << live.output();
+    const auto stats = live.stats();
+    std::uint64_t shown = 0, dropped = 0;
+    for (const auto &[stage, count] : stats["frames"]["dropped"].items())
+        dropped += count.get<std::uint64_t>();
+    EXPECT_GT(stats["frames"]["dropped"]["raytracer"], 0) << stats.dump(1);
+    ASSERT_EQ(lockstep.run({"--config", "run.yaml", "--set", "source.fps=0"}), 0) << lockstep.output();
+    for (int frame = 0; frame < 45; ++frame) {
+        char name[16];
+        std::snprintf(name, sizeof name, "%04d.png", frame);
+        if (!live.exists(name))
+            continue;
+        ++shown;
+        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay is another frame's";
+    }
+    EXPECT_EQ(shown + dropped, 45u) << stats.dump(1);
+    EXPECT_GT(shown, 2u);
+}
+
 TEST(Live, TheVideoGoesOnWhileABackendHangs) {
     ArhostRun run(counting("live", "frames: 90", "", "hang_at: 20", "live: {max_latency_ms: 150}\n"));
     run.write("scene.yaml", small_scene);

@@ -31,9 +31,21 @@ TEST(Run, TakesEveryFrameThroughAllStagesInOrder) {
     EXPECT_EQ(stats["frames"]["in"], 300);
     EXPECT_EQ(stats["frames"]["tracked"], 300);
     EXPECT_EQ(stats["frames"]["composited"], 300);
-    EXPECT_EQ(stats["stages"]["raytracer"]["count"], 300);
+    for (const char *stage : {"source", "tracker", "raytracer", "composite", "latency"}) {
+        const auto &times = stats["stages"][stage];
+        EXPECT_EQ(times["count"], 300) << stage;
+        EXPECT_GT(times["p50_ms"], 0.0) << stage;
+        EXPECT_LE(times["p50_ms"], times["p95_ms"]) << stage;
+        EXPECT_LE(times["p95_ms"], times["p99_ms"]) << stage;
+        EXPECT_LE(times["p99_ms"], times["max_ms"]) << stage;
+    }
     EXPECT_EQ(stats["restarts"]["tracker"], 0);
-    EXPECT_GT(stats["cpu_seconds"]["host"], 0.0);
+    double sum = 0;
+    for (const char *process : {"host", "source", "tracker", "raytracer", "sink_counter"}) {
+        EXPECT_GT(stats["cpu_seconds"][process], 0.0) << process;
+        sum += stats["cpu_seconds"][process].get<double>();
+    }
+    EXPECT_NEAR(stats["cpu_seconds"]["total"], sum, 1e-9);
     EXPECT_GT(stats["fps"], 0.0);
 }
 
@@ -246,6 +258,34 @@ TEST(Run, ShowsItsProgressInPlainLinesWhereThereIsNoTerminal) {
     ASSERT_EQ(run.run(), 0);
     EXPECT_THAT(run.output(), HasSubstr("frame 5/5"));
     EXPECT_THAT(run.output(), testing::Not(HasSubstr("\033")));
+}
+
+TEST(Run, DrawsItsProgressAnewOnATerminal) {
+    ArhostRun run(counting("lockstep", "frames: 60, delay_ms: 10", "", ""));
+    run.write("scene.yaml", small_scene);
+    const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    ASSERT_GE(terminal, 0);
+    ASSERT_EQ(::grantpt(terminal), 0);
+    ASSERT_EQ(::unlockpt(terminal), 0);
+    const std::string name = ::ptsname(terminal);
+    const int kept_open = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // else a read may fail before the start
+    run.start({"--config", "run.yaml"}, [&] { ::dup2(::open(name.c_str(), O_RDWR | O_NOCTTY), STDERR_FILENO); });
+    ::fcntl(terminal, F_SETFL, O_NONBLOCK);
+    std::string shown;
+    for (bool ended = false; !ended;) { // once more after the end
+        ended = !run.running();
+        char bytes[4096];
+        for (ssize_t count; (count = ::read(terminal, bytes, sizeof bytes)) > 0;)
+            shown.append(bytes, static_cast<std::size_t>(count));
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    ::close(kept_open);
+    ::close(terminal);
+    EXPECT_EQ(run.wait(), 0);
+    EXPECT_THAT(shown, HasSubstr("\r\033[Kframe ")); // over the line before it
+    EXPECT_THAT(shown, HasSubstr("frame 60/60"));
+    EXPECT_TRUE(shown.ends_with("\r\033[K")) << "the line was to be cleared";
+    EXPECT_EQ(shown.find('\n'), std::string::npos) << shown;
 }
 
 TEST(CommandLine, TellsVersionHelpAndPlugins) {

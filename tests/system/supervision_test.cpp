@@ -346,6 +346,47 @@ TEST(Supervision, AWorkerThatDiesAfterItHasFinishedIsLeftAtThat) {
     EXPECT_THAT(run.output(), HasSubstr("after it had finished"));
 }
 
+TEST(Supervision, AStartMayTakeLongerThanItsDeadlineAsLongAsItTellsProgress) {
+    ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 20, start_step_ms: 100", ""));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.start_deadline_ms=1000"}), 0) << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+    expect_all_frames_in_order(run, 5);
+}
+
+TEST(Supervision, AStartWithoutAWordOfProgressIsAHang) {
+    ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 1, start_step_ms: 60000", "",
+                           "restart: {quarantine_after: 2, first_delay_ms: 1}\n"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.start_deadline_ms=500"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("did not start within 500 ms"));
+    EXPECT_THAT(run.output(), HasSubstr("it failed 2 times in a row"));
+    EXPECT_FALSE(run.exists("counted.txt"));
+}
+
+TEST(Supervision, AnOutputThatHangsInItsStopIsEndedAndTheOthersAreFinished) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 20}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: second.txt, options: {hang_in_stop: true}, "
+                  "stop_deadline_ms: 300}\n- {plugin: sink_counter, path: counted.txt}\n");
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("did not stop within 300 ms"));
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    EXPECT_FALSE(run.exists("second.txt.done"));
+    expect_all_frames_in_order(run, 20);
+}
+
+TEST(Supervision, AStoppedLauncherIsMadeToGoOn) {
+    ArhostRun run(counting("lockstep", "frames: 120, delay_ms: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    wait_for_frames(run, 20);
+    ::kill(run.launcher(), SIGSTOP);
+    ::kill(run.worker("tracker_counter"), SIGKILL);
+    ASSERT_EQ(run.wait(std::chrono::seconds(20)), 0) << run.output();
+    expect_all_frames_in_order(run, 120);
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
+}
+
 TEST(Supervision, TheRunEndsWhenNoOutputIsLeft) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000}}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt, options: {error_at: 5}}]\n");

@@ -119,6 +119,11 @@ TEST(Files, RemovingWhatIsNotThereIsNoError) {
     EXPECT_THAT(message, HasSubstr("can't delete"));
 }
 
+TEST(Files, CheckingRefusesWhatIsNoRegularFile) {
+    EXPECT_THROW(check_can_write("/dev/full"), arhost::Failure);
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
 TEST(Files, CheckingThatOneCanBeWrittenChangesNothing) {
     const test::ScratchFolder folder;
     const auto file = folder.path() / "log.txt", link = folder.path() / "link.txt",

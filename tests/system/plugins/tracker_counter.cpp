@@ -21,7 +21,8 @@ public:
     Counter(const Host &host, const Options &options)
         : host_(host), faults_(options), seal_(options.text("seal")),
           crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")),
-          lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")) {}
+          lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")),
+          start_steps_(options.integer("start_steps")), start_step_ms_(options.real("start_step_ms")) {}
 
     ~Counter() {
         if (crash_in_destroy_) {
@@ -39,6 +40,10 @@ public:
     }
 
     void start(const arhost_tracker_setup &setup) {
+        for (std::int64_t step = 0; step < start_steps_; ++step) {
+            host_.progress(static_cast<float>(step) / static_cast<float>(start_steps_), "starting");
+            std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(start_step_ms_));
+        }
         id_ = setup.markers[0].id;
         if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // in its first life alone
             seal_output();
@@ -91,7 +96,8 @@ private:
     test::Faults faults_;
     std::string seal_;
     bool crash_in_destroy_;
-    std::int64_t lost_from_, lost_to_, nan_at_;
+    std::int64_t lost_from_, lost_to_, nan_at_, start_steps_;
+    double start_step_ms_;
     std::int32_t id_ = 0;
 };
 
@@ -102,6 +108,8 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
+    option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Starts in so many steps, each told as progress"),
+    option(ARHOST_OPTION_REAL, "start_step_ms", "0", "Time of such a step, in ms", 0, 60000),
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,

@@ -64,8 +64,8 @@ typedef struct arhost_source {
                            arhost_source_properties *properties);
 
     /* [worker] The next frame; waits for it, asking host->cancelled meanwhile. ARHOST_OK, ARHOST_END
-     * (and again ARHOST_END if asked again), or an error. A file that is cut short gives ARHOST_END
-     * after what could be read, and a log message of severity WARNING. */
+     * (and the same if asked again), or an error. A file that is cut short gives ARHOST_END_CUT_SHORT
+     * after what could be read, and a log message of severity WARNING that says where. */
     arhost_status (*read)(arhost_instance *instance, const arhost_frame_buffer *buffer, arhost_frame_info *info);
 
     /* [worker] Once before destroy, if start succeeded. */

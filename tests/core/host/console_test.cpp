@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/console.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fcntl.h>
+#include <thread>
+#include <unistd.h>
+
+using namespace arhost::host;
+using testing::HasSubstr;
+
+namespace {
+
+// This process's stderr as a pipe.
+class Stderr {
+public:
+    Stderr() : before_(::dup(STDERR_FILENO)) {
+        if (::pipe2(ends_, O_CLOEXEC) != 0)
+            std::abort();
+        ::dup2(ends_[1], STDERR_FILENO);
+    }
+    ~Stderr() {
+        restore();
+        ::close(ends_[0]);
+    }
+    Stderr(const Stderr &) = delete;
+    Stderr &operator=(const Stderr &) = delete;
+
+    void restore() {
+        if (before_ < 0)
+            return;
+        ::dup2(before_, STDERR_FILENO);
+        ::close(before_);
+        ::close(ends_[1]);
+        before_ = -1;
+    }
+    // What has been written, up to the restoring.
+    std::string read_all() {
+        std::string text;
+        char bytes[4096];
+        for (ssize_t count; (count = ::read(ends_[0], bytes, sizeof bytes)) > 0;)
+            text.append(bytes, static_cast<std::size_t>(count));
+        return text;
+    }
+
+private:
+    int before_, ends_[2] = {};
+};
+
+} // namespace
+
+TEST(Console, KeepsWhateverAComponentSaysToOneLine) {
+    Stderr stream;
+    {
+        Console console(false);
+        console.log(ARHOST_SEVERITY_WARNING, "tracker", "two\nlines\033[2J");
+        console.log(ARHOST_SEVERITY_DEBUG, "tracker", "not asked for");
+        console.log(ARHOST_SEVERITY_PLUGIN_MISBEHAVING, "source", "no frame");
+    }
+    stream.restore();
+    EXPECT_EQ(stream.read_all(), "warning: tracker: two lines [2J\nerror: source: the plugin misbehaves: no frame\n");
+}
+
+TEST(Console, NeverHaltsWhoLogsAndTellsWhatWasLost) {
+    Stderr stream;
+    std::string text;
+    std::thread reader;
+    {
+        Console console(true);
+        const std::string long_line(200, 'x');
+        for (int i = 0; i < 5000; ++i) // a pipe holds 64 KiB: who waited for it would wait for ever
+            console.log(ARHOST_SEVERITY_INFO, "tracker", long_line);
+        reader = std::thread([&] { text = stream.read_all(); });
+    }
+    stream.restore();
+    reader.join();
+    EXPECT_THAT(text, HasSubstr(" lines were lost, since nobody took them from stderr\n"));
+}

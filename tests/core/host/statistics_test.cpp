@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/statistics.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace arhost::host;
+
+TEST(Timing, GivesNearestRanksWithinHalfAPercent) {
+    Timing timing;
+    for (int ms = 1000; ms >= 1; --ms)
+        timing.add(std::chrono::milliseconds(ms));
+    EXPECT_EQ(timing.count(), 1000u);
+    EXPECT_NEAR(timing.percentile_ms(0.50), 500, 2.5);
+    EXPECT_NEAR(timing.percentile_ms(0.95), 950, 4.75);
+    EXPECT_NEAR(timing.percentile_ms(0.99), 990, 4.95);
+    EXPECT_DOUBLE_EQ(timing.max_ms(), 1000);
+    EXPECT_LE(timing.percentile_ms(1), timing.max_ms());
+}
+
+TEST(Timing, TellsARareLongFrameFromTheUsualOnes) {
+    Timing timing;
+    for (int i = 0; i < 995; ++i)
+        timing.add(std::chrono::microseconds(10));
+    for (int i = 0; i < 5; ++i)
+        timing.add(std::chrono::seconds(2));
+    const auto json = timing.to_json();
+    EXPECT_NEAR(json["p99_ms"], 0.01, 0.0001);
+    EXPECT_DOUBLE_EQ(json["max_ms"], 2000);
+}
+
+TEST(Timing, OfNothingOrNoTimeIsHarmless) {
+    Timing timing;
+    EXPECT_EQ(timing.percentile_ms(0.5), 0);
+    timing.add(std::chrono::nanoseconds(0));
+    timing.add(std::chrono::nanoseconds(-5)); // a clock that was set back
+    EXPECT_EQ(timing.count(), 2u);
+    EXPECT_LE(timing.percentile_ms(0.99), 1e-5);
+}
+
+TEST(Statistics, CountFramesASecondBetweenTheFirstAndTheLast) {
+    Statistics statistics;
+    EXPECT_EQ(statistics.fps(), 0);
+    statistics.composited = 31;
+    statistics.first_frame = std::chrono::steady_clock::time_point(std::chrono::seconds(10));
+    statistics.last_frame = std::chrono::steady_clock::time_point(std::chrono::seconds(11));
+    EXPECT_DOUBLE_EQ(statistics.fps(), 30);
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The demonstration, and films that the real plugins write and read.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include <sched.h>
+#include <sys/mount.h>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+int frames_of(const std::filesystem::path &film) {
+    cv::VideoCapture video(film.string());
+    cv::Mat picture;
+    int count = 0;
+    while (video.read(picture))
+        ++count;
+    return count;
+}
+
+std::string film_yaml(const std::string &outputs) {
+    return "version: 1\nsource: {plugin: source_synthetic, options: {frames: 40, width: 160, height: 120}}\n"
+           "outputs:\n" +
+           outputs;
+}
+
+} // namespace
+
+TEST(Demo, LeavesItsFourFiles) {
+    ArhostRun run;
+    std::filesystem::copy(ARHOST_SOURCE_DIRECTORY "/config", run.path("config"),
+                          std::filesystem::copy_options::recursive);
+    ASSERT_EQ(run.run({"--config", "config/demo.yaml", "--frames", "42"}), 0) << run.output();
+    EXPECT_EQ(frames_of(run.path("out/demo.mp4")), 42);
+    const cv::Mat picture = cv::imread(run.path("out/demo.png").string());
+    ASSERT_EQ(picture.size(), cv::Size(1280, 720));
+    cv::Mat red; // nothing on the desk is as red as the virtual sphere
+    cv::inRange(picture, cv::Scalar(0, 0, 120), cv::Scalar(60, 60, 255), red);
+    EXPECT_GT(cv::countNonZero(red), 500);
+    std::istringstream poses(run.read("out/demo.poses.jsonl"));
+    int lines = 0;
+    for (std::string line; std::getline(poses, line); ++lines)
+        EXPECT_EQ(nlohmann::json::parse(line)["markers"][0]["id"], 0) << line;
+    EXPECT_EQ(lines, 42);
+    const auto stats = nlohmann::json::parse(run.read("out/demo.stats.json"));
+    EXPECT_EQ(stats["frames"]["augmented"], 42);
+}
+
+TEST(Film, CutShortIsKeptAndTheExitStatusTells) {
+    ArhostRun run(film_yaml("- {plugin: sink_video, path: film.mkv}\n"));
+    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(frames_of(run.path("film.mkv")), 40);
+    const std::string film = run.read("film.mkv");
+    run.write("film.mkv", film.substr(0, film.size() * 6 / 10));
+    run.write("again.yaml", "version: 1\nsource: {plugin: source_file, path: film.mkv}\n"
+                            "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
+    EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("film.mkv' is cut short: it ends after frame "));
+    EXPECT_THAT(run.output(), HasSubstr("again.yaml:2:9: source: its input is cut short; what there was is kept"));
+    const std::string poses = run.read("poses.jsonl");
+    const auto kept = std::count(poses.begin(), poses.end(), '\n');
+    EXPECT_GT(kept, 10);
+    EXPECT_LT(kept, 40);
+    EXPECT_EQ(run.stats()["frames"]["composited"], kept);
+}
+
+TEST(Film, OnAFullDiskIsGivenUpAndTheOtherOutputsGoOn) {
+    ArhostRun run(film_yaml("- {plugin: sink_video, path: full/film.mp4}\n"
+                            "- {plugin: sink_images, path: \"full/%04d.png\"}\n"
+                            "- {plugin: sink_images, path: \"%04d.png\"}\n"));
+    std::filesystem::create_directory(run.path("full"));
+    constexpr int no_mount = 99;
+    run.start({"--config", "run.yaml"}, [] {
+        if (::unshare(CLONE_NEWNS) != 0 || ::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+            ::mount("none", "full", "tmpfs", 0, "size=64k") != 0)
+            ::_exit(no_mount);
+    });
+    const int status = run.wait();
+    if (status == no_mount)
+        GTEST_SKIP() << "this user may not mount a small disk";
+    EXPECT_EQ(status, 1);
+    EXPECT_THAT(run.output(), HasSubstr("full/.%04d.png.partial': No space left"));
+    EXPECT_THAT(run.output(), HasSubstr("sink_video"));
+    EXPECT_THAT(run.output(), HasSubstr("No space left on device (free some space, or choose another path)"));
+    EXPECT_TRUE(run.exists("0039.png"));
+}

@@ -1,0 +1,7 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A plugin whose library was left out when it was linked. */
+#include <arhost/arhost.h>
+
+extern arhost_status arhost_test_nowhere(const arhost_offer *offer, arhost_answer *answer);
+
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), arhost_test_nowhere};
