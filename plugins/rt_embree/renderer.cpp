@@ -149,8 +149,8 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #endif
     if (wanted("base"))
         return {base::render_tile, "base"};
-    throw Failure(ARHOST_ERROR_UNSUPPORTED,
-                  "option 'instruction_set': this processor or build has no " + instruction_set + "; set it to 'auto'");
+    throw Failure(ARHOST_ERROR_UNSUPPORTED, "option 'instruction_set': this processor or build has no " +
+                                                instruction_set + "; set it to 'auto'");
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) {

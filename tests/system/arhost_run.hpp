@@ -52,8 +52,7 @@ public:
 
     // Starts `arhost ARGUMENTS`; output() and wait() follow. `prepare` is called in the child, which becomes arhost.
     void start(
-        std::vector<std::string> arguments = {"--config", "run.yaml"},
-        const std::function<void()> &prepare = [] {}) {
+        std::vector<std::string> arguments = {"--config", "run.yaml"}, const std::function<void()> &prepare = [] {}) {
         pid_ = ::fork();
         if (pid_ == 0) {
             if (::chdir(folder_.path().c_str()) != 0)

@@ -48,7 +48,8 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
 TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
-        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: 80}]}\n"
+        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+        "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY
         "/config/scenes/demo.yaml, options: {samples: 64}, deadline_ms: 60000}\n"
         "outputs: [{plugin: sink_images, path: \"%04d.png\"}]\nlive: {max_latency_ms: 60000}\nstats: stats.json\n";

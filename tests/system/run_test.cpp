@@ -268,7 +268,8 @@ TEST(Run, DrawsItsProgressAnewOnATerminal) {
     ASSERT_EQ(::grantpt(terminal), 0);
     ASSERT_EQ(::unlockpt(terminal), 0);
     const std::string name = ::ptsname(terminal);
-    const int kept_open = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // else a read may fail before the start
+    const int kept_open =
+        ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // else a read may fail before the start
     run.start({"--config", "run.yaml"}, [&] { ::dup2(::open(name.c_str(), O_RDWR | O_NOCTTY), STDERR_FILENO); });
     ::fcntl(terminal, F_SETFL, O_NONBLOCK);
     std::string shown;

@@ -42,7 +42,7 @@ extern "C" {
 typedef int32_t arhost_status;
 enum {
     ARHOST_OK = 1,
-    ARHOST_END = 2, /* no failure, but no more: a source has no further frame, a sink's window was closed */
+    ARHOST_END = 2,           /* no failure, but no more: a source has no further frame, a sink's window was closed */
     ARHOST_END_CUT_SHORT = 3, /* a source's input ends before its time; what could be read was given */
 
     ARHOST_ERROR_INVALID_ARGUMENT = -1, /* the caller broke this ABI's contract */
