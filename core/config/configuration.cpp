@@ -175,11 +175,14 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         configuration.max_latency =
             std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
     }
-    if (const auto node = root.find("stats"))
-        configuration.stats = std::filesystem::absolute(node->text()).lexically_normal();
-    if (configuration.stats && (files.contains(*configuration.stats) ||
-                                *configuration.stats == std::filesystem::absolute(root.file()).lexically_normal()))
-        root.require("stats").fail("the file is in use already");
+    files.insert(std::filesystem::absolute(root.file()).lexically_normal());
+    for (const auto &[key, file] :
+         {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
+        if (const auto node = root.find(key)) {
+            *file = std::filesystem::absolute(node->text()).lexically_normal();
+            if (!files.insert(**file).second && !std::filesystem::is_character_file(**file))
+                node->fail("the file is in use already");
+        }
     return configuration;
 }
 

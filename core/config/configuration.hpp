@@ -56,7 +56,7 @@ struct Configuration {
     std::optional<camera::Coordinates> coordinates{};
     std::vector<ComponentConfiguration> outputs{};
     std::chrono::milliseconds max_latency{500};
-    std::optional<std::filesystem::path> stats{}; // absolute
+    std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
 };
 
 // The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind

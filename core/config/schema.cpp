@@ -107,6 +107,7 @@ const std::vector<Key> &table() {
         {"restart.longest_delay_ms", integer, false, "10000", "Longest wait, in ms."},
 
         {"stats", output_path, false, "", "Where the statistics are written at the end (JSON)."},
+        {"timeline", output_path, false, "", "Where the times of each frame are written at the end (CSV)."},
     };
     return keys;
 }

@@ -124,6 +124,8 @@ config::Configuration replay_configuration(const Arguments &arguments, const Rep
     }
     if (!replay.stats.empty())
         root.override_text("stats", replay.stats, "--stats");
+    if (!replay.timeline.empty())
+        root.override_text("timeline", replay.timeline, "--timeline");
     config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
         throw yaml::Error("--width, --height: " + replay.trajectory + " tells its own image size; leave them out");
@@ -135,6 +137,8 @@ config::Configuration replay_configuration(const Arguments &arguments, const Rep
     }
     if (replay.stats.empty())
         configuration.stats.reset();
+    if (replay.timeline.empty())
+        configuration.timeline.reset();
     configuration.mode = config::Mode::lockstep;
     return configuration;
 }
@@ -151,13 +155,13 @@ double cpu_seconds_of_host() {
 }
 
 // Whole under its name, or not there: written beside it and renamed.
-bool write_statistics(const fs::path &file, Console &console, const std::string &text) {
+bool write_statistics(const fs::path &file, const char *key, Console &console, const std::string &text) {
     std::error_code ignored;
     if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) { // /dev/null, say
         std::ofstream stream(file);
         if (stream << text << std::flush)
             return true;
-        console.log(ARHOST_SEVERITY_ERROR, "stats", "can't write " + file.string() + ": " + std::strerror(errno));
+        console.log(ARHOST_SEVERITY_ERROR, key, "can't write " + file.string() + ": " + std::strerror(errno));
         return false;
     }
     fs::create_directories(file.parent_path(), ignored);
@@ -167,7 +171,7 @@ bool write_statistics(const fs::path &file, Console &console, const std::string 
     stream.close();
     if (stream && ::rename(temporary.c_str(), file.c_str()) == 0)
         return true;
-    console.log(ARHOST_SEVERITY_ERROR, "stats", "can't write " + file.string() + ": " + std::strerror(errno));
+    console.log(ARHOST_SEVERITY_ERROR, key, "can't write " + file.string() + ": " + std::strerror(errno));
     fs::remove(temporary, ignored);
     return false;
 }
@@ -210,13 +214,15 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Lau
     const bool whole = pipeline.run();
     if (!whole)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
-    const bool has_stats = configuration.stats && pipeline.statistics().frames_in > 0;
-    const bool written =
-        !has_stats ||
-        write_statistics(*configuration.stats, console,
-                         report(pipeline.statistics(), pipeline.components(), cpu_seconds_of_host())
-                                 .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                             "\n");
+    const Statistics &statistics = pipeline.statistics();
+    bool written = true;
+    if (configuration.stats && statistics.frames_in > 0)
+        written = write_statistics(*configuration.stats, "stats", console,
+                                   report(statistics, pipeline.components(), cpu_seconds_of_host())
+                                           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                                       "\n");
+    if (configuration.timeline && statistics.frames_in > 0)
+        written &= write_statistics(*configuration.timeline, "timeline", console, timeline_csv(statistics));
     // From here on signals end the process at once, should the terminal be halted while the last lines wait.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {

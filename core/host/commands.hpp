@@ -27,8 +27,8 @@ struct Arguments {
 
 // `arhost replay`.
 struct ReplayArguments {
-    std::string trajectory, scene, raytracer, output, stats; // "": not given
-    std::optional<std::uint32_t> width, height;              // px
+    std::string trajectory, scene, raytracer, output, stats, timeline; // "": not given
+    std::optional<std::uint32_t> width, height;                        // px
     bool with_pipeline = false;
 };
 

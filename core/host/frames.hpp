@@ -5,6 +5,7 @@
 
 #include "compositor/lens_warp.hpp"
 #include "host/slots.hpp"
+#include "host/statistics.hpp"
 
 #include <arhost/sink.h>
 
@@ -36,6 +37,7 @@ struct Frame {
     std::shared_ptr<LensWarp> warp; // what the overlay is yet to be bent by; NULL: nothing
     arhost_record record{};
     Clock::time_point received;
+    FrameTimes times; // but for `shown` and `latency`
 
     bool in_worker() const { return stage == Stage::tracking || stage == Stage::rendering; }
 };

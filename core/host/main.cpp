@@ -86,6 +86,8 @@ int main(int argc, char **argv) {
         ->type_name("FILE|none");
     replay_command->add_option("--stats", replay_arguments.stats, "Where the statistics are written (JSON)")
         ->type_name("FILE");
+    replay_command->add_option("--timeline", replay_arguments.timeline, "Where each frame's times are written (CSV)")
+        ->type_name("FILE");
     add_configuration_options(*replay_command);
 
     CLI::App *check_command =

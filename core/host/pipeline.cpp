@@ -388,6 +388,7 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     }
     last_capture_ns_ = result.frame.capture_ns;
     frame->pixels = std::move(pixels);
+    frame->times.source = std::chrono::nanoseconds(result.busy_ns);
     statistics_.dropped["source"] += result.frame.skipped;
     statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
     begin(std::move(frame));
@@ -469,6 +470,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         pass(frame, "tracker");
         return tracker_->end_process(std::string("broke the contract: ") + problem);
     }
+    frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
     take_camera_of_markers(frame);
     on_camera_known(frame);
 }
@@ -549,6 +551,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
         return;
     Frame &frame = *answered;
     frame.render = result.render;
+    frame.times.raytracer = std::chrono::nanoseconds(result.busy_ns);
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
 }
@@ -642,7 +645,14 @@ bool Pipeline::compose() {
     statistics_.composited += shown_somewhere;
     statistics_.augmented += shown_somewhere && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
     statistics_.last_frame = Clock::now();
-    statistics_.stages["latency"].add(statistics_.last_frame - ready->second->received);
+    const Clock::duration latency = statistics_.last_frame - ready->second->received;
+    statistics_.stages["latency"].add(latency);
+    if (configuration_.timeline && shown_somewhere) {
+        FrameTimes &times = statistics_.timeline.emplace_back(ready->second->times);
+        times.frame = shown;
+        times.shown = statistics_.last_frame;
+        times.latency = latency;
+    }
     frames_.erase(ready);
     if (live_)
         forget_overtaken(shown);
@@ -650,7 +660,7 @@ bool Pipeline::compose() {
     return true;
 }
 
-void Pipeline::compose(const Frame &frame, std::span<std::byte> slot) {
+void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
     const Clock::time_point begin = Clock::now();
     const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
@@ -673,7 +683,8 @@ void Pipeline::compose(const Frame &frame, std::span<std::byte> slot) {
     composite(*format_, planes, overlay, region,
               {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
                OutputSlot::stride(format_->width)});
-    statistics_.stages["composite"].add(Clock::now() - begin);
+    frame.times.composite = Clock::now() - begin;
+    statistics_.stages["composite"].add(frame.times.composite);
 }
 
 void Pipeline::forget_overtaken(std::uint64_t shown) {

@@ -64,7 +64,7 @@ private:
     bool track();
     bool render();
     bool compose();
-    void compose(const Frame &frame, std::span<std::byte> slot);
+    void compose(Frame &frame, std::span<std::byte> slot);
     void stop_components();
 
     void on_read(const ring::Command &command, const ring::Result &result);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace arhost::host {
 
@@ -42,6 +43,20 @@ Json Timing::to_json() const {
 double Statistics::fps() const {
     const double seconds = std::chrono::duration<double>(last_frame - first_frame).count();
     return composited > 1 && seconds > 0 ? static_cast<double>(composited - 1) / seconds : 0;
+}
+
+std::string timeline_csv(const Statistics &statistics) {
+    std::string text = "frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms\n";
+    for (const FrameTimes &times : statistics.timeline) {
+        const double shown = std::chrono::duration<double>(times.shown - statistics.first_frame).count();
+        char line[160];
+        std::snprintf(line, sizeof line, "%llu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n",
+                      static_cast<unsigned long long>(times.frame), shown, 1e-6 * double(times.source.count()),
+                      1e-6 * double(times.tracker.count()), 1e-6 * double(times.raytracer.count()),
+                      1e-6 * double(times.composite.count()), 1e-6 * double(times.latency.count()));
+        text += line;
+    }
+    return text;
 }
 
 Json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,

@@ -30,6 +30,13 @@ private:
     std::int64_t max_ns_ = 0;
 };
 
+// One frame that was sent to the outputs. Times of stages that it did not pass are 0.
+struct FrameTimes {
+    std::uint64_t frame = 0;
+    std::chrono::steady_clock::time_point shown{};
+    std::chrono::nanoseconds source{}, tracker{}, raytracer{}, composite{}, latency{};
+};
+
 struct Statistics {
     std::uint64_t frames_in = 0;                  // given by the source
     std::uint64_t tracked = 0;                    // with at least one marker
@@ -39,9 +46,14 @@ struct Statistics {
     std::map<std::string, std::uint64_t> passed;  // went on unaugmented since this stage failed
     std::map<std::string, Timing> stages;         // by name: source, tracker, raytracer, composite, latency, …
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
+    std::vector<FrameTimes> timeline; // kept only where the configuration asks for it
 
     double fps() const;
 };
+
+// A header and a line a frame: frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms.
+// shown_s counts from the first frame's arrival.
+std::string timeline_csv(const Statistics &statistics);
 
 nlohmann::ordered_json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
                               double host_cpu_seconds);

@@ -35,9 +35,10 @@ unsigned mask_of(const Object &object) {
                                                     : opaque_mask;
 }
 
-// The inverse of a column-major 3×3 matrix, transposed: the cofactors. Normals get their length later, so
-// that only the determinant's sign counts: it keeps a mirrored object's outside outside.
-void make_normal_transform(const float *m, float *to) {
+// Normals get their length later, so that of the inverse, which is the cofactors by the determinant, only the
+// latter's sign counts: it keeps a mirrored object's outside outside.
+void place(Object &object, const float *m) {
+    std::copy_n(m, 9, object.transform);
     double cofactor[9];
     for (int column = 0; column < 3; ++column) {
         const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
@@ -51,7 +52,7 @@ void make_normal_transform(const float *m, float *to) {
         largest = std::max(largest, std::abs(value));
     const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
     for (int i = 0; i < 9; ++i)
-        to[i] = static_cast<float>(cofactor[i] / (determinant < 0 ? -largest : largest));
+        object.normal_transform[i] = static_cast<float>(cofactor[i] / (determinant < 0 ? -largest : largest));
 }
 
 Object make_object(const arhost_scene &arena, const arhost_object &from) {
@@ -59,12 +60,14 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.material = &elements<arhost_material>(arena, arena.materials)[from.material];
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
-    make_normal_transform(from.world_from_object, object.normal_transform);
+    place(object, from.world_from_object);
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
     if (geometry.type == ARHOST_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
             return buffer.count ? reinterpret_cast<const float *>(bytes(arena) + buffer.offset) : nullptr;
         };
+        object.positions = floats(geometry.positions);
+        object.position_stride = geometry.positions.stride;
         object.normals = floats(geometry.normals);
         object.normal_stride = geometry.normals.stride;
         object.texcoords = floats(geometry.texcoords);
@@ -116,20 +119,6 @@ Box transformed(const Box &local, const float *m) {
     return world;
 }
 
-// Primary rays pass through a catcher from behind: a room that is looked into from outside.
-void cull_facing_away(const RTCFilterFunctionNArguments *arguments) {
-    if (!query_of(*arguments).cull_catchers_facing_away)
-        return;
-    const unsigned count = arguments->N;
-    for (unsigned i = 0; i < count; ++i) {
-        const float along = RTCHitN_Ng_x(arguments->hit, count, i) * RTCRayN_dir_x(arguments->ray, count, i) +
-                            RTCHitN_Ng_y(arguments->hit, count, i) * RTCRayN_dir_y(arguments->ray, count, i) +
-                            RTCHitN_Ng_z(arguments->hit, count, i) * RTCRayN_dir_z(arguments->ray, count, i);
-        if (along >= 0)
-            arguments->valid[i] = 0;
-    }
-}
-
 bool report_build(void *host, double fraction) {
     const auto &h = *static_cast<const arhost::Host *>(host);
     h.progress(fraction, "building the acceleration structure");
@@ -163,6 +152,11 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     if (anything_moves)
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
     view_.has_instances = anything_moves;
+    for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
+        textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
+                             static_cast<std::int32_t>(texture.height), texture.format, texture.wrap_u,
+                             texture.wrap_v});
+    view_.textures = textures_.data();
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
@@ -178,10 +172,9 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
             attach(root_.get(), new_instance(deforming_scene(number), object.world_from_object), number);
         } else if (object.moves || objects_.back().has_transform) {
             view_.has_instances = true;
-            attach(root_.get(), new_instance(instanced_scene(object.geometry, object.role), object.world_from_object),
-                   number);
+            attach(root_.get(), new_instance(instanced_scene(number), object.world_from_object), number);
         } else {
-            attach(static_ ? static_.get() : root_.get(), new_geometry(object.geometry, object.role), number);
+            attach(static_ ? static_.get() : root_.get(), new_geometry(number), number);
         }
     }
     view_.static_instance = -2;
@@ -208,11 +201,6 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.shadow_alpha_opaque = arena.shadow_alpha_opaque;
     view_.shadow_alpha_translucent = arena.shadow_alpha_translucent;
     view_.coloured_shadows = arena.coloured_shadows != 0;
-    for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
-        textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
-                             static_cast<std::int32_t>(texture.height), texture.format, texture.wrap_u,
-                             texture.wrap_v});
-    view_.textures = textures_.data();
     for (int code = 0; code < 256; ++code)
         linear_of_srgb8_.push_back(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));
     view_.linear_of_srgb8 = linear_of_srgb8_.data();
@@ -232,7 +220,7 @@ void EmbreeScene::move(const arhost_motion &motion) {
         const arhost_moved_object &moved = motion.moved[i];
         Object &object = objects_[moved.object];
         object.has_transform = true;
-        make_normal_transform(moved.world_from_object, object.normal_transform);
+        place(object, moved.world_from_object);
         if (object.role != ARHOST_OCCLUDER)
             visible_boxes_[moved.object] = transformed(local_boxes_[moved.object], moved.world_from_object);
         const RTCGeometry instance = rtcGetGeometry(root_.get(), moved.object);
@@ -248,6 +236,8 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     // From here a tree costs rays more than building a new one does, by trial (docs/performance.md).
     constexpr double tolerable_decay = 1.5;
     Object &object = objects_[deformed.object];
+    object.positions = deformed.positions;
+    object.position_stride = 3 * sizeof(float);
     object.normals = deformed.normals;
     object.normal_stride = 3 * sizeof(float);
     const arhost_object &from = elements<arhost_object>(arena_, arena_.objects)[deformed.object];
@@ -304,7 +294,7 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     Deforming &own = deforming_[number];
     own.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
-    own.geometry = new_geometry(object.geometry, object.role);
+    own.geometry = new_geometry(number);
     rtcSetGeometryMask(own.geometry.get(), all_masks);
     rtcSetGeometryBuildQuality(own.geometry.get(), RTC_BUILD_QUALITY_MEDIUM);
     rtcCommitGeometry(own.geometry.get());
@@ -315,8 +305,9 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     return own.scene.get();
 }
 
-GeometryHandle EmbreeScene::new_geometry(std::uint32_t number, arhost_role role) const {
-    const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[number];
+GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
+    const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
+    const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     const bool spheres = from.type == ARHOST_SPHERES;
     GeometryHandle geometry(
         rtcNewGeometry(device_.get(), spheres ? RTC_GEOMETRY_TYPE_SPHERE_POINT : RTC_GEOMETRY_TYPE_TRIANGLE));
@@ -327,23 +318,24 @@ GeometryHandle EmbreeScene::new_geometry(std::uint32_t number, arhost_role role)
     share(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
     if (!spheres)
         share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
-    if (role == ARHOST_CATCHER)
-        rtcSetGeometryIntersectFilterFunction(geometry.get(), cull_facing_away);
+    if (const HitFilter filter = hit_filter_of(objects_[number], textures_.data()); filter.is_needed())
+        set_hit_filter(geometry.get(), *hit_filters_.emplace_back(std::make_unique<HitFilter>(filter)));
     return geometry;
 }
 
-RTCScene EmbreeScene::instanced_scene(std::uint32_t number, arhost_role role) {
-    const bool of_catchers = role == ARHOST_CATCHER; // with the filter function
+RTCScene EmbreeScene::instanced_scene(std::uint32_t number) {
+    const std::uint32_t shape = elements<arhost_object>(arena_, arena_.objects)[number].geometry;
+    const HitFilter filter = hit_filter_of(objects_[number], textures_.data());
     for (const Instanced &known : instanced_)
-        if (known.geometry == number && known.of_catchers == of_catchers)
+        if (known.geometry == shape && known.filter == filter)
             return known.scene.get();
     SceneHandle scene = new_scene(RTC_SCENE_FLAG_NONE);
-    const GeometryHandle geometry = new_geometry(number, role);
+    const GeometryHandle geometry = new_geometry(number);
     rtcSetGeometryMask(geometry.get(), all_masks);
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene.get(), geometry.get());
     commit(scene.get());
-    instanced_.push_back({number, of_catchers, std::move(scene)});
+    instanced_.push_back({shape, filter, std::move(scene)});
     return instanced_.back().scene.get();
 }
 

@@ -3,7 +3,7 @@
 // The arena as Embree sees it. Embree's buffers lie in the arena; nothing is copied.
 #pragma once
 
-#include "kernel.hpp"
+#include "holes.hpp"
 #include "tree_quality.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -49,8 +49,9 @@ private:
         TreeQuality quality;
     };
     SceneHandle new_scene(RTCSceneFlags flags) const;
-    GeometryHandle new_geometry(std::uint32_t geometry, arhost_role role) const;
-    RTCScene instanced_scene(std::uint32_t geometry, arhost_role role);
+    // Of an object, by its number.
+    GeometryHandle new_geometry(std::uint32_t object);
+    RTCScene instanced_scene(std::uint32_t object);
     RTCScene deforming_scene(std::uint32_t object);
     GeometryHandle new_instance(RTCScene of, const float *world_from_object) const;
     void attach(RTCScene to, const GeometryHandle &geometry, std::uint32_t number) const;
@@ -61,10 +62,11 @@ private:
     const arhost_scene &arena_;
     arhost::Host host_;
     bool robust_;
+    std::vector<std::unique_ptr<HitFilter>> hit_filters_; // Embree holds their addresses
     DeviceHandle device_;
     struct Instanced {
         std::uint32_t geometry;
-        bool of_catchers;
+        HitFilter filter;
         SceneHandle scene;
     };
     std::vector<Instanced> instanced_;

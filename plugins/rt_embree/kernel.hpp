@@ -29,12 +29,13 @@ struct Object {
     const arhost_material *material;
     arhost_role role;
     bool has_transform;
-    // Takes normals from the object to the world: the inverse transposed, column-major.
-    float normal_transform[9];
+    // Column-major, from the object to the world: of directions, and of normals (its inverse transposed).
+    float transform[9], normal_transform[9];
     const int *indices;     // of triangles
+    const float *positions; // of their corners
     const float *normals;   // NULL where the object is flat or a sphere
     const float *texcoords; // NULL where there are none
-    std::uint32_t normal_stride, index_stride, texcoord_stride;
+    std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
 };
 
 struct Texture {

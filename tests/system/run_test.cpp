@@ -49,6 +49,33 @@ TEST(Run, TakesEveryFrameThroughAllStagesInOrder) {
     EXPECT_GT(stats["fps"], 0.0);
 }
 
+TEST(Run, WritesTheTimesOfEachFrame) {
+    ArhostRun run(counting("lockstep", "frames: 20", "lost_from: 5, lost_to: 8", "", "timeline: times.csv\n"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    std::istringstream lines(run.read("times.csv"));
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_EQ(line, "frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms");
+    double before = 0;
+    unsigned long long count = 0;
+    for (; std::getline(lines, line); ++count) {
+        unsigned long long frame = 0;
+        double shown, source, tracker, raytracer, composite, latency;
+        ASSERT_EQ(std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf,%lf,%lf", &frame, &shown, &source, &tracker,
+                              &raytracer, &composite, &latency),
+                  7)
+            << line;
+        EXPECT_EQ(frame, count);
+        EXPECT_GT(shown, before);
+        before = shown;
+        EXPECT_GT(tracker, 0) << line;
+        EXPECT_EQ(raytracer > 0, frame < 5 || frame >= 8) << line;
+        EXPECT_GE(latency, composite) << line;
+    }
+    EXPECT_EQ(count, 20u);
+}
+
 TEST(Run, StopsAfterTheFramesThatAreAskedFor) {
     ArhostRun run(counting("lockstep", "frames: 300", "", ""));
     run.write("scene.yaml", small_scene);

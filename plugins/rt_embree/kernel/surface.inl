@@ -46,6 +46,40 @@ ARHOST_INLINE Texel textured(const Scene &scene, const Object &object, std::uint
     return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
 }
 
+// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own
+// (E. Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2012, section 7.8), brought into the
+// plane across the normal; the texture's green points against v, as in glTF 2.0, section 3.9.3.
+ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 normal, const RTCHit16 &hit, Bool here) {
+    const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
+    Vec3 position[3];
+    Float u[3], v[3];
+    for (int number = 0; number < 3; ++number) {
+        const Int vertex = gather(object.indices + number, corner);
+        const Int at = vertex * Int(static_cast<int>(object.position_stride / 4));
+        position[number] = {gather(object.positions, at), gather(object.positions + 1, at),
+                            gather(object.positions + 2, at)};
+        const Int texel = vertex * Int(static_cast<int>(object.texcoord_stride / 4));
+        u[number] = gather(object.texcoords, texel);
+        v[number] = gather(object.texcoords + 1, texel);
+    }
+    const Vec3 edge_1 = position[1] - position[0], edge_2 = position[2] - position[0];
+    const Float u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
+    const Float turn = select(u1 * v2 < u2 * v1, Float(-1.0f), Float(1.0f));
+    Vec3 along_u = (edge_1 * v2 - edge_2 * v1) * turn, along_v = (edge_2 * u1 - edge_1 * u2) * turn;
+    if (object.has_transform) {
+        along_u = transform(object.transform, along_u);
+        along_v = transform(object.transform, along_v);
+    }
+    const Vec3 n = normalize(normal), across = along_u - n * dot(n, along_u);
+    const Vec3 right = normalize(across), side = cross(n, right);
+    const Vec3 up = select(dot(side, along_v) > Float(0.0f), -side, side);
+    const Vec3 texel = textured(scene, object, object.material->normal_texture, hit, here).colour;
+    const Vec3 asked = right * (texel.x * Float(2.0f) - Float(1.0f)) + up * (texel.y * Float(2.0f) - Float(1.0f)) +
+                       n * (texel.z * Float(2.0f) - Float(1.0f));
+    const Bool is_possible = (dot(across, across) > Float(0.0f)) & (dot(asked, n) > Float(0.0f));
+    return select(is_possible, asked, normal);
+}
+
 ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
     const RTCHit16 &hit = rays.hit;
     const Vec3 direction = direction_of(rays.ray);
@@ -69,6 +103,9 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             geometric = transform(object.normal_transform, geometric);
             normal = transform(object.normal_transform, normal);
         }
+        if (object.material->model == ARHOST_METALLIC_ROUGHNESS && object.material->normal_texture != ARHOST_NONE &&
+            object.texcoords)
+            normal = bent(scene, object, normal, hit, here);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
         if (object.role != ARHOST_VIRTUAL)

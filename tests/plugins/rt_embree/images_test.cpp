@@ -111,6 +111,133 @@ TEST(Texture, RepeatsClampsAndMirrors) {
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_MIRROR, 3).at(89, 24), Pixel{0, 255, 0, 255}));
 }
 
+// ---- Holes -----------------------------------------------------------------------------------------
+
+// A square of 60 mm half a side whose texture is solid on its left half and has a hole on its right one.
+arhost_material half_a_hole(ArenaBuilder &builder, float cutoff) {
+    scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
+    texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
+    arhost_material material = flat(1, 1, 1);
+    material.colour_texture = builder.add_texture("half", std::move(texture));
+    material.alpha_cutoff = cutoff;
+    return material;
+}
+scene::TriangleMesh textured_square(float half_side, float z) {
+    scene::TriangleMesh mesh = square(half_side, z);
+    mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    return mesh;
+}
+
+TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
+    for (const bool instanced : {false, true}) {
+        ArenaBuilder builder;
+        builder.settings.ambient = glm::vec3(1);
+        const auto material = builder.add_material(half_a_hole(builder, 0.5f));
+        const auto whole = builder.add_material(half_a_hole(builder, 0));
+        const auto mesh = builder.add_triangles(textured_square(60, 0));
+        // The same mesh twice: one object has holes, the other has none.
+        const glm::mat4x3 lower(1, 0, 0, 0, 1, 0, 0, 0, 1, instanced ? 30 : 0, 0, -50);
+        builder.add_object("holed", mesh, material, ARHOST_VIRTUAL,
+                           instanced ? glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 0) : glm::mat4x3(1));
+        if (instanced)
+            builder.add_object("whole", mesh, whole, ARHOST_VIRTUAL, lower);
+        const Picture picture = Tracer(std::move(builder)).render(from_above());
+        EXPECT_EQ(picture.alpha(70, 74), 255);
+        EXPECT_EQ(picture.alpha(130, 74), instanced ? 255 : 0) << "the whole one lies behind the hole";
+        if (!instanced) {
+            EXPECT_EQ(picture.alpha(97, 74), 255) << "alpha is ½ half way between the texels";
+            EXPECT_EQ(picture.alpha(102, 74), 0);
+        }
+    }
+}
+
+TEST(Holes, LetLightThrough) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.add_light(light(0, 0, 1000, 1));
+    const auto material = builder.add_material(half_a_hole(builder, 0.5f));
+    builder.add_object("holed", builder.add_triangles(textured_square(60, 100)), material);
+    builder.add_object("floor", builder.add_triangles(square(300)), builder.add_material(flat(1, 1, 1)),
+                       ARHOST_CATCHER);
+    const Picture picture = Tracer(std::move(builder)).render(camera({0, -40, 60}, {0, 0, 0}, {0, 1, 0}));
+    EXPECT_EQ(picture.alpha(60, 60), 153) << "shadow of the solid half";
+    EXPECT_EQ(picture.alpha(140, 60), 0) << "light through the hole";
+}
+
+TEST(Holes, OfACatcherTakeNoShadow) {
+    ArenaBuilder builder;
+    builder.add_light(light(0, 0, 1000, 1));
+    builder.add_object("roof", builder.add_triangles(square(20, 300)), builder.add_material(flat(1, 1, 1)));
+    builder.add_object("floor", builder.add_triangles(textured_square(60, 0)),
+                       builder.add_material(half_a_hole(builder, 0.5f)), ARHOST_CATCHER);
+    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    EXPECT_EQ(picture.alpha(90, 74), 153);
+    EXPECT_EQ(picture.alpha(110, 74), 0);
+}
+
+// ---- Normal textures -------------------------------------------------------------------------------
+
+struct Tilt {
+    glm::vec3 tangent_space; // what the texture says
+    glm::vec3 world;         // what that is on the square
+    bool mirrored = false;   // u runs to the left
+};
+
+Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    set3(sun.direction, -0.6f, 0, -0.8f);
+    builder.add_light(sun);
+    arhost_material material = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    set3(material.diffuse, 0.6f, 0.6f, 0.6f);
+    material.metallic = 0;
+    material.roughness = 0.7f;
+    scene::TriangleMesh mesh = textured_square(60, 0);
+    if (tilt.mirrored)
+        mesh.texcoords = {{1, 1}, {0, 1}, {0, 0}, {1, 0}};
+    if (by_texture) {
+        scene::Texture texture;
+        texture.format = ARHOST_TEXEL_RGBA32F;
+        texture.width = texture.height = 1;
+        const glm::vec3 t = 0.5f * glm::normalize(tilt.tangent_space) + 0.5f;
+        const float texel[4] = {t.x, t.y, t.z, 1};
+        texture.texels.size = sizeof texel;
+        texture.texels.bytes = std::make_unique<std::byte[]>(sizeof texel);
+        std::memcpy(texture.texels.bytes.get(), texel, sizeof texel);
+        material.normal_texture = builder.add_texture("tilt", std::move(texture));
+    } else {
+        mesh.normals.assign(4, glm::normalize(tilt.world));
+    }
+    glm::mat4x3 place(1);
+    if (turned) // a quarter about z, and flattened: tangents and normals go different ways
+        place = glm::mat4x3(0, 2, 0, -2, 0, 0, 0, 0, 0.5f, 0, 0, 0);
+    builder.add_object("square", builder.add_triangles(std::move(mesh)), builder.add_material(material),
+                       ARHOST_VIRTUAL, place);
+    return Tracer(std::move(builder)).render(from_above());
+}
+
+TEST(NormalTexture, BendsNormalsAsIfTheVerticesHadThem) {
+    for (const Tilt &tilt :
+         {Tilt{{0, 0, 1}, {0, 0, 1}}, Tilt{{0.6f, 0, 0.8f}, {0.6f, 0, 0.8f}}, Tilt{{0, 0.5f, 0.8f}, {0, 0.5f, 0.8f}},
+          Tilt{{-0.3f, -0.5f, 0.8f}, {-0.3f, -0.5f, 0.8f}}, Tilt{{0.6f, 0.3f, 0.8f}, {-0.6f, 0.3f, 0.8f}, true}}) {
+        const auto expected = lit_square(tilt, false, false).pixels(), got = lit_square(tilt, true, false).pixels();
+        for (std::size_t i = 0; i < got.size(); ++i)
+            for (std::size_t c = 0; c < 4; ++c)
+                ASSERT_NEAR(got[i][c], expected[i][c], 1) << i;
+    }
+}
+
+TEST(NormalTexture, TurnsWithItsObject) {
+    // Turned a quarter, the texture's right is the world's +y, its up −x; bent in the world, the tilt is not
+    // flattened with the object as a vertex normal would be.
+    const Tilt tilt{{0, -0.6f, 0.8f}, {}};
+    const auto turned = lit_square(tilt, true, true).pixels();
+    const auto expected = lit_square({{0.6f, 0, 0.8f}, {}}, true, false).pixels();
+    ASSERT_NEAR(turned[74 * 200 + 99][0], expected[74 * 200 + 99][0], 1);
+    EXPECT_GT(turned[74 * 200 + 99][0], lit_square({{0, 0, 1}, {}}, true, true).pixels()[74 * 200 + 99][0] + 5);
+}
+
 TEST(Environment, LightsADiffusePlaneByItsMean) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);

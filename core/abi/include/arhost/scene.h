@@ -40,7 +40,7 @@ enum {
 typedef struct arhost_geometry {
     arhost_geometry_type type;
     uint32_t reserved;
-    arhost_buffer positions; /* stride 12 (FLOAT3) or 16 (FLOAT4) */
+    arhost_buffer positions; /* stride 12 (FLOAT3) or 16 (FLOAT4); of a skinned mesh: as its skin takes them */
     arhost_buffer normals;   /* one a vertex, unit length: smooth shading; absent: flat */
     arhost_buffer texcoords; /* one a vertex; (0, 0) is a texture's left top corner, (1, 1) its right bottom one */
     arhost_buffer indices;   /* stride 12; each < positions.count */
@@ -86,7 +86,8 @@ enum {
 };
 
 /* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; what a
- * texture gives is multiplied with the number beside it. Fields that a model does not name are ignored. */
+ * texture gives is multiplied with the number beside it; on a geometry without texcoords it counts as 1.
+ * Fields that a model does not name are ignored: mirror and glass have neither colour nor emission. */
 typedef struct arhost_material {
     arhost_material_model model;
     uint32_t colour_texture; /* of ambient and diffuse; its alpha against alpha_cutoff */
@@ -101,7 +102,7 @@ typedef struct arhost_material {
     /* Metallic-roughness. */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
-    uint32_t normal_texture;             /* tangent space, u and v as the texture's */
+    uint32_t normal_texture;             /* tangent space: R along u, G against v, B out; each 2t − 1 */
     uint32_t emission_texture;
 
     /* Glass. Its reflectance at an angle of cosine c (on the outside, c of the refracted ray) is
@@ -233,7 +234,7 @@ typedef struct arhost_scene {
     float ambient[3];    /* light from everywhere */
     float background[3]; /* seen by secondary rays that hit nothing where there is no environment; primary
                             rays: alpha 0 */
-    float bounds_min[3], bounds_max[3];                  /* of all objects, world, at time 0 */
+    float bounds_min[3], bounds_max[3]; /* of all objects, world, at time 0; what moves or deforms may leave them */
     float shadow_alpha_opaque, shadow_alpha_translucent; /* on catchers: 0.6 and 0.3 */
     uint32_t coloured_shadows;                           /* non-zero: shadows of glass on catchers take its colour */
     float duration_s; /* of the motion, which then begins again; 0: nothing moves */

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "holes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rt_embree {
+namespace {
+
+std::int32_t wrapped(std::int32_t i, std::int32_t size, arhost_wrap wrap) {
+    if (wrap == ARHOST_WRAP_CLAMP)
+        return std::clamp(i, 0, size - 1);
+    const std::int32_t period = wrap == ARHOST_WRAP_MIRROR ? 2 * size : size;
+    const std::int32_t within = (i % period + period) % period;
+    return within < size ? within : period - 1 - within;
+}
+
+float alpha_of_texel(const Texture &texture, std::int32_t x, std::int32_t y) {
+    const std::size_t at = 4 * (std::size_t(y) * std::size_t(texture.width) + std::size_t(x)) + 3;
+    return texture.format == ARHOST_TEXEL_RGBA32F
+               ? static_cast<const float *>(texture.texels)[at]
+               : static_cast<float>(static_cast<const std::uint8_t *>(texture.texels)[at]) / 255;
+}
+
+// A coordinate in texels, of which far outside only the fraction counts.
+float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
+    const float near = wrap == ARHOST_WRAP_CLAMP ? std::clamp(t, -1.0f, 2.0f) : t - 2 * std::floor(t / 2);
+    return near * static_cast<float>(size) - 0.5f;
+}
+
+bool is_hole(const HitFilter &filter, unsigned triangle, float u, float v) {
+    const Object &shape = filter.shape;
+    const int *corners = shape.indices + std::size_t{triangle} * (shape.index_stride / 4);
+    const float share[3] = {1 - u - v, u, v};
+    float s = 0, t = 0;
+    for (int i = 0; i < 3; ++i) {
+        const float *at = shape.texcoords + std::size_t(corners[i]) * (shape.texcoord_stride / 4);
+        s += share[i] * at[0];
+        t += share[i] * at[1];
+    }
+    return sampled_alpha(*filter.colour, s, t) < filter.alpha_cutoff;
+}
+
+void reject_holes(const HitFilter &filter, const RTCFilterFunctionNArguments *arguments) {
+    const unsigned count = arguments->N;
+    for (unsigned i = 0; i < count; ++i)
+        if (arguments->valid[i] &&
+            is_hole(filter, RTCHitN_primID(arguments->hit, count, i), RTCHitN_u(arguments->hit, count, i),
+                    RTCHitN_v(arguments->hit, count, i)))
+            arguments->valid[i] = 0;
+}
+
+void reject_facing_away(const RTCFilterFunctionNArguments *arguments) {
+    const unsigned count = arguments->N;
+    for (unsigned i = 0; i < count; ++i) {
+        const float along = RTCHitN_Ng_x(arguments->hit, count, i) * RTCRayN_dir_x(arguments->ray, count, i) +
+                            RTCHitN_Ng_y(arguments->hit, count, i) * RTCRayN_dir_y(arguments->ray, count, i) +
+                            RTCHitN_Ng_z(arguments->hit, count, i) * RTCRayN_dir_z(arguments->ray, count, i);
+        if (along >= 0)
+            arguments->valid[i] = 0;
+    }
+}
+
+void on_hit(const RTCFilterFunctionNArguments *arguments) {
+    const auto &filter = *static_cast<const HitFilter *>(arguments->geometryUserPtr);
+    if (filter.is_catcher && query_of(*arguments).cull_catchers_facing_away)
+        reject_facing_away(arguments);
+    if (filter.alpha_cutoff > 0)
+        reject_holes(filter, arguments);
+}
+
+} // namespace
+
+HitFilter hit_filter_of(const Object &object, const Texture *textures) {
+    HitFilter filter;
+    filter.is_catcher = object.role == ARHOST_CATCHER;
+    const arhost_material &material = *object.material;
+    const bool has_colour = material.model != ARHOST_MIRROR && material.model != ARHOST_GLASS;
+    if (has_colour && material.colour_texture != ARHOST_NONE && object.texcoords) {
+        filter.alpha_cutoff = material.alpha_cutoff;
+        filter.colour = &textures[material.colour_texture];
+        filter.shape = object;
+    }
+    return filter;
+}
+
+void set_hit_filter(RTCGeometry geometry, const HitFilter &filter) {
+    rtcSetGeometryUserData(geometry, const_cast<HitFilter *>(&filter));
+    rtcSetGeometryIntersectFilterFunction(geometry, on_hit);
+    if (filter.alpha_cutoff > 0)
+        rtcSetGeometryOccludedFilterFunction(geometry, on_hit);
+}
+
+float sampled_alpha(const Texture &texture, float u, float v) {
+    const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
+    const float left = std::floor(x), top = std::floor(y);
+    const auto at = [&](int right, int low) {
+        return alpha_of_texel(texture, wrapped(static_cast<std::int32_t>(left) + right, texture.width, texture.wrap_u),
+                              wrapped(static_cast<std::int32_t>(top) + low, texture.height, texture.wrap_v));
+    };
+    return std::lerp(std::lerp(at(0, 0), at(1, 0), x - left), std::lerp(at(0, 1), at(1, 1), x - left), y - top);
+}
+
+} // namespace rt_embree
