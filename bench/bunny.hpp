@@ -16,13 +16,14 @@
 
 namespace arhost::bench {
 
-// A ball of about as many triangles as the bunny, dented so that it hides parts of itself.
-inline scene::TriangleMesh dented_ball() {
+// A ball of about so many triangles, dented so that it hides parts of itself.
+inline scene::TriangleMesh dented_ball(unsigned triangles) {
     scene::TriangleMesh mesh;
-    constexpr unsigned rings = 186, sides = 187;
+    const auto rings = static_cast<unsigned>(std::lround(std::sqrt(triangles / 2.0))), sides = rings + 1;
     for (unsigned ring = 0; ring <= rings; ++ring)
         for (unsigned side = 0; side <= sides; ++side) {
-            const float theta = glm::pi<float>() * ring / rings, phi = glm::two_pi<float>() * side / sides;
+            const float theta = glm::pi<float>() * static_cast<float>(ring) / static_cast<float>(rings),
+                        phi = glm::two_pi<float>() * static_cast<float>(side) / static_cast<float>(sides);
             const float r = 50 + 6 * std::sin(9 * theta) * std::cos(8 * phi);
             mesh.positions.push_back(
                 r * glm::vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
@@ -45,7 +46,7 @@ struct NamedMesh {
 inline NamedMesh bunny(const std::filesystem::path &shared_data) {
     const std::filesystem::path file = shared_data / "meshes/bunny_69451.ply.gz";
     const bool there = std::filesystem::exists(file);
-    NamedMesh named{there ? scene::load_mesh(file, {.smooth = true}) : dented_ball(),
+    NamedMesh named{there ? scene::load_mesh(file, {.smooth = true}) : dented_ball(69'451),
                     there ? "bunny" : "dented ball"};
     std::vector<glm::vec3> &positions = named.mesh.positions;
     glm::vec3 low = positions[0], high = low;

@@ -44,9 +44,8 @@ bool is_hole(const HitFilter &filter, unsigned triangle, float u, float v) {
 void reject_holes(const HitFilter &filter, const RTCFilterFunctionNArguments *arguments) {
     const unsigned count = arguments->N;
     for (unsigned i = 0; i < count; ++i)
-        if (arguments->valid[i] &&
-            is_hole(filter, RTCHitN_primID(arguments->hit, count, i), RTCHitN_u(arguments->hit, count, i),
-                    RTCHitN_v(arguments->hit, count, i)))
+        if (arguments->valid[i] && is_hole(filter, RTCHitN_primID(arguments->hit, count, i),
+                                           RTCHitN_u(arguments->hit, count, i), RTCHitN_v(arguments->hit, count, i)))
             arguments->valid[i] = 0;
 }
 
@@ -95,7 +94,8 @@ float sampled_alpha(const Texture &texture, float u, float v) {
     const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
     const float left = std::floor(x), top = std::floor(y);
     const auto at = [&](int right, int low) {
-        return alpha_of_texel(texture, wrapped(static_cast<std::int32_t>(left) + right, texture.width, texture.wrap_u),
+        return alpha_of_texel(texture,
+                              wrapped(static_cast<std::int32_t>(left) + right, texture.width, texture.wrap_u),
                               wrapped(static_cast<std::int32_t>(top) + low, texture.height, texture.wrap_v));
     };
     return std::lerp(std::lerp(at(0, 0), at(1, 0), x - left), std::lerp(at(0, 1), at(1, 1), x - left), y - top);

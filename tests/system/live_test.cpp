@@ -46,6 +46,9 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
 
 // The real plugins at 30 frames a second; at 64 samples a pixel no machine's ray tracer keeps up.
 TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
+#if defined(__SANITIZE_ADDRESS__)
+    GTEST_SKIP() << "takes minutes under a sanitizer";
+#endif
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
         "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "

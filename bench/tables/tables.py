@@ -1,0 +1,246 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The dissertation's tables 3 and 4 and figures 23 and 26, with our figures beside the author's, and what arhost adds
+to the CPU time of its plugins: tables.py [--quick] [overhead] [tables] [figures]
+
+Each scene is traced twice on the same cameras, by the ray tracer alone (arhost replay, the dissertation's "pure"
+mode) and in the whole chain (--with-pipeline: one preloaded image again and again, tracker_aruco, sink_null).
+Leaves build/tables/tables.json, figure-23.svg and figure-26.svg."""
+import csv
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+from scene_views import VIEWS  # noqa: E402
+
+BUILD = ROOT / "build/release"
+OUT = ROOT / "build/tables"
+FRAME = OUT / "frame.png"
+WIDTH, HEIGHT = 800, 600
+
+# Dissertation's name → scene, view, frames a second with the middleware and of the ray tracer alone (GTX 1060;
+# its camera gave 30 a second).
+FAR, CLOSE = 0, 1
+TABLES = {
+    "Table 3 (OptiX)": {
+        "CS": ("optix-cs", FAR, 29.99, 60.0), "B": ("optix-b", FAR, 30.0, 59.99), "HB": ("optix-hb", FAR, 29.99, 59.97),
+        "GL": ("optix-gl", FAR, 29.99, 51.21), "CGL": ("optix-gl", CLOSE, 14.20, 14.43),
+        "GD": ("optix-gd", FAR, 29.99, 37.81), "CGD": ("optix-gd", CLOSE, 10.16, 10.13)},
+    "Table 4 (VKRay)": {
+        "CS": ("vkray-cs", FAR, 30.19, 59.79), "B": ("vkray-b", FAR, 30.15, 59.75),
+        "HB": ("vkray-hb", FAR, 30.07, 29.99), "HBF": ("vkray-hbf", FAR, 30.32, 59.51),
+        "MD": ("vkray-md", FAR, 15.16, 15.01), "CMD": ("vkray-md", CLOSE, 5.73, 5.98)}}
+# File → title; the scenes that the camera approaches; what the dissertation measured at either end stands in the table.
+FIGURES = {
+    "figure-23.svg": ("Figure 23: the camera approaches, OptiX scenes", "Table 3 (OptiX)", [("GL", "CGL"), ("GD", "CGD")]),
+    "figure-26.svg": ("Figure 26: the camera approaches, VKRay scenes", "Table 4 (VKRay)", [("CS", None), ("MD", "CMD")])}
+
+
+def scene_file(scene):
+    return ROOT / f"config/scenes/{scene}.yaml"
+
+
+def write_trajectory(file, eyes_and_targets, y_up):
+    """Eyes and points looked at, in mm, one a frame at 30 a second, through the dissertation's lens of 45 degrees."""
+    focal = HEIGHT / 2 / 0.41421356237309503
+    header = {"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 30,
+              "camera": {"width": WIDTH, "height": HEIGHT, "fx": focal, "fy": focal, "cx": (WIDTH - 1) / 2,
+                         "cy": (HEIGHT - 1) / 2}}
+    lines = [header]
+    for number, (eye, look_at) in enumerate(eyes_and_targets):
+        lines.append({"frame": number, "capture_ns": number * 1_000_000_000 // 30, "eye": list(eye),
+                      "look_at": list(look_at), "up": [0, 1, 0] if y_up else [0, 0, 1]})
+    file.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def replay(scene, trajectory, frames, with_pipeline):
+    """A run's statistics and its timeline."""
+    stats, timeline = OUT / "stats.json", OUT / "timeline.csv"
+    command = [BUILD / "bin/arhost", "replay", "--trajectory", trajectory, "--scene", scene_file(scene),
+               "--frames", str(frames), "--stats", stats, "--timeline", timeline,
+               "--set", "raytracer.start_deadline_ms=120000", "--set", "raytracer.deadline_ms=60000"]
+    if with_pipeline:
+        command += ["--with-pipeline", "--set",
+                    f"source={{plugin: source_file, path: {FRAME}, options: {{frames: {frames}}}}}"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    with open(timeline, encoding="utf-8") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    return json.loads(stats.read_text()), rows, done.stderr
+
+
+def frames_a_second(rows):
+    """Over the later part of a run: the first frames meet cold caches and an empty pipeline."""
+    rows = rows[len(rows) // 5:]
+    return (len(rows) - 1) / (rows[-1]["shown_s"] - rows[0]["shown_s"])
+
+
+def make_frame():
+    (OUT / "frame.yaml").write_text(f"""version: 1
+source: {{plugin: source_synthetic, options: {{frames: 1, width: {WIDTH}, height: {HEIGHT}}}}}
+outputs: [{{plugin: sink_images, path: {FRAME}}}]
+""")
+    subprocess.run([BUILD / "bin/arhost", "--config", OUT / "frame.yaml"], check=True, stderr=subprocess.DEVNULL)
+
+
+def print_tables(seconds):
+    results = {}
+    for title, scenes in TABLES.items():
+        print(f"{title}: {WIDTH}x{HEIGHT}, frames a second\n"
+              f"  {'scene':6} {'dissertation':^24}   {'arhost with rt_embree, ' + str(os.cpu_count()) + ' cores':^34}\n"
+              f"  {'':6} {'whole':>7} {'alone':>7} {'ratio':>7}   {'whole':>8} {'alone':>8} {'ratio':>7}  tracer's ms")
+        for name, (scene, view, whole, alone) in scenes.items():
+            trajectory = OUT / "still.jsonl"
+            write_trajectory(trajectory, [VIEWS[scene][view]] * 2000, scene.startswith("vkray"))
+            probe = frames_a_second(replay(scene, trajectory, 12, False)[1])
+            frames = max(12, min(2000, int(seconds * probe)))
+            _, rows_alone, said = replay(scene, trajectory, frames, False)
+            _, rows_whole, _ = replay(scene, trajectory, frames, True)
+            ours_alone, ours_whole = frames_a_second(rows_alone), frames_a_second(rows_whole)
+            tracer = [statistics.median(row["raytracer_ms"] for row in rows) for rows in (rows_whole, rows_alone)]
+            stand_in = "   a stand-in for the scan" if "stand" in said else ""
+            print(f"  {name:6} {whole:7.2f} {alone:7.2f} {whole / alone:7.3f}   {ours_whole:8.2f} {ours_alone:8.2f} "
+                  f"{ours_whole / ours_alone:7.3f}  {tracer[0]:.2f} / {tracer[1]:.2f}{stand_in}", flush=True)
+            results[f"{title}, {name}"] = {
+                "dissertation": {"whole": whole, "alone": alone}, "frames": frames,
+                "arhost": {"whole": ours_whole, "alone": ours_alone, "raytracer_ms_whole": tracer[0],
+                           "raytracer_ms_alone": tracer[1]}, "stand_in": bool(stand_in)}
+        print()
+    return results
+
+
+def approach(scene, frames):
+    """From far to close, at a steady speed."""
+    (eye, at), (near_eye, near_at) = VIEWS[scene] if scene != "vkray-cs" else (VIEWS[scene][0], ((0, 75, 130), (0, 40, 0)))
+    for i in range(frames):
+        share = i / (frames - 1)
+        yield tuple(tuple(a + share * (b - a) for a, b in zip(p, q)) for p, q in ((eye, near_eye), (at, near_at)))
+
+
+def smoothed(rows):
+    """(Position along the trajectory 0 to 1, frames a second over nine frames about it.)"""
+    points = []
+    for i in range(4, len(rows) - 4):
+        points.append((i / (len(rows) - 1), 8 / (rows[i + 4]["shown_s"] - rows[i - 4]["shown_s"])))
+    return points
+
+
+def draw(file, title, curves, marks):
+    """curves: (label, colour, dashed, points); marks: (label, colour, x, frames a second). Frames a second are drawn
+    on a logarithmic axis."""
+    import math
+    left, top, width, height = 60, 50, 620, 330
+    values = [y for _, _, _, points in curves for _, y in points] + [y for _, _, _, y in marks]
+    low, high = math.floor(math.log2(min(values))), math.ceil(math.log2(max(values)))
+
+    def place(x, y):
+        return left + x * width, top + height * (1 - (math.log2(y) - low) / (high - low))
+
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 440" font-family="sans-serif" font-size="13">',
+           '<rect width="900" height="440" fill="white"/>', f'<text x="{left}" y="28" font-size="16">{title}</text>',
+           f'<text x="{left + width / 2}" y="425" text-anchor="middle">along the trajectory: from far to close</text>',
+           f'<text transform="translate(18 {top + height / 2}) rotate(-90)" text-anchor="middle">frames a second</text>']
+    for power in range(low, high + 1):
+        _, y = place(0, 2.0 ** power)
+        svg.append(f'<path d="M{left} {y:.1f}h{width}" stroke="#ddd"/>'
+                   f'<text x="{left - 8}" y="{y + 4:.1f}" text-anchor="end">{2.0 ** power:g}</text>')
+    legend = []
+    for label, colour, dashed, points in curves:
+        path = "M" + "L".join("{:.1f} {:.1f}".format(*place(*point)) for point in points)
+        dash = ' stroke-dasharray="6 4"' if dashed else ""
+        svg.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
+        legend.append((f'<path d="M{left + width + 16} {{y}}h26" stroke="{colour}" stroke-width="2"{dash}/>', label))
+    for label, colour, x, value in marks:
+        px, py = place(x, value)
+        svg.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5" fill="none" stroke="{colour}" stroke-width="2"/>')
+    for label, colour in dict.fromkeys((label, colour) for label, colour, _, _ in marks):
+        legend.append((f'<circle cx="{left + width + 29}" cy="{{y}}" r="5" fill="none" stroke="{colour}" '
+                       f'stroke-width="2"/>', label))
+    for number, (sign, label) in enumerate(legend):
+        y = top + 14 + 24 * number
+        svg.append(sign.format(y=y) + f'<text x="{left + width + 50}" y="{y + 4}">{label}</text>')
+    file.write_text("\n".join(svg) + "\n</svg>\n")
+
+
+def draw_figures(frames):
+    results = {}
+    for file, (title, table, scenes) in FIGURES.items():
+        curves, marks = [], []
+        for (far, close), (strong, pale) in zip(scenes, (("#c0392b", "#e6a79f"), ("#1f6fb2", "#9cc3e2"))):
+            scene = TABLES[table][far][0]
+            trajectory = OUT / "approach.jsonl"
+            write_trajectory(trajectory, list(approach(scene, frames)), scene.startswith("vkray"))
+            whole, alone = (replay(scene, trajectory, frames, chain)[1] for chain in (True, False))
+            curves += [(f"{far}, whole chain", strong, False, smoothed(whole)), (f"{far}, tracer alone", strong, True, smoothed(alone))]
+            for name, x in ((far, 0), (close, 1)):
+                if name:
+                    marks += [(f"{far}, dissertation, alone", pale, x, TABLES[table][name][3])]
+            ratio = frames_a_second(whole) / frames_a_second(alone)
+            results[f"{title}: {far}"] = {"whole_to_alone": ratio, "whole": smoothed(whole), "alone": smoothed(alone)}
+            print(f"  {title.split(':')[0]}, {far}: {smoothed(alone)[0][1]:.1f} to {smoothed(alone)[-1][1]:.1f} frames a second "
+                  f"alone, whole to alone {ratio:.3f}", flush=True)
+        draw(OUT / file, title, curves, marks)
+        print(f"  {(OUT / file).relative_to(ROOT)}", flush=True)
+    print()
+    return results
+
+
+def cpu_ms_a_frame(scene, trajectory, frames, with_pipeline):
+    """Of each component: the difference between a long run and a short one, which leaves out start and scene. Both are
+    whole rounds of the trajectory."""
+    short = 10
+    a, b = (replay(scene, trajectory, count, with_pipeline)[0]["cpu_seconds"] for count in (short, short + frames))
+    return {name: 1e3 * (b[name] - a[name]) / frames for name in b}
+
+
+def print_overhead(frames, rounds):
+    """What the middleware adds: CPU time, which other programs on the machine disturb less than wall time."""
+    results, missed = {}, []
+    print(f"What arhost adds, by CPU time a frame, {WIDTH}x{HEIGHT}, medians of {rounds} rounds in turn (targets 1.03):\n"
+          f"  {'scene':8} {'tracer: whole, alone, ratio':^32}   {'all: whole, sum of parts, ratio':^34}")
+    for scene in ("optix-cs", "optix-b", "vkray-b"):
+        trajectory = OUT / "approach.jsonl"
+        write_trajectory(trajectory, list(approach(scene, 10)) * 100, scene.startswith("vkray"))
+        rows = []
+        for _ in range(rounds):
+            parts = json.loads(subprocess.run(
+                [BUILD / "bin/plugins-alone", scene_file(scene), trajectory, FRAME, str(frames)],
+                capture_output=True, text=True, check=True).stdout)
+            alone = cpu_ms_a_frame(scene, trajectory, frames, False)
+            whole = cpu_ms_a_frame(scene, trajectory, frames, True)
+            rows.append((whole["raytracer"], alone["raytracer"], whole["total"], sum(parts.values())))
+        tracer_whole, tracer_alone, total, parts = (statistics.median(column) for column in zip(*rows))
+        tracer_ratio = statistics.median(row[0] / row[1] for row in rows)
+        total_ratio = statistics.median(row[2] / row[3] for row in rows)
+        print(f"  {scene:8} {tracer_whole:9.2f} {tracer_alone:9.2f} {tracer_ratio:9.3f}       {total:9.2f} {parts:9.2f} {total_ratio:9.3f}",
+              flush=True)
+        results[scene] = {"tracer": tracer_ratio, "total": total_ratio}
+        missed += [f"{scene}: {what} {ratio:.3f}" for what, ratio in (("tracer", tracer_ratio), ("whole", total_ratio)) if ratio > 1.03]
+    print()
+    return results, missed
+
+
+def main():
+    quick = "--quick" in sys.argv[1:]
+    parts = [word for word in sys.argv[1:] if word != "--quick"] or ["overhead", "tables", "figures"]
+    OUT.mkdir(parents=True, exist_ok=True)
+    make_frame()
+    results, missed = {}, []
+    if "overhead" in parts:
+        results["overhead"], missed = print_overhead(30 if quick else 100, 1 if quick else 15)
+    if "tables" in parts:
+        results["tables"] = print_tables(0.5 if quick else 8)
+    if "figures" in parts:
+        results["figures"] = draw_figures(20 if quick else 120)
+    (OUT / "tables.json").write_text(json.dumps(results, indent=1) + "\n")
+    if missed and not quick:
+        raise SystemExit("missed: " + "; ".join(missed))
+
+
+main()
