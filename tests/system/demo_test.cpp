@@ -53,6 +53,37 @@ TEST(Demo, LeavesItsFourFiles) {
     EXPECT_EQ(stats["frames"]["augmented"], 42);
 }
 
+// What moves is at its place of the frame's own time, through host, worker and ray tracer.
+TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
+    const std::string yaml =
+        "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
+        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: 80}]}\n"
+        "raytracer: {plugin: rt_embree, scene: scene.yaml}\noutputs: [{plugin: sink_images, path: \"%04d.png\"}]\n";
+    const auto scene = [](const std::string &object) {
+        return "version: 1\naxes: z-up\nambient: 0.5\nmaterials: {m: {model: diffuse, diffuse: \"#20a0f0\"}}\n"
+               "lights: [{position: [-100, -100, 300], intensity: 0.6, falloff: none}]\n"
+               "objects:\n  - {plane: {size: 300}, material: m, role: catcher}\n  - {cuboid: {size: [20, 20, 30]}, "
+               "material: m, " +
+               object + "}\n";
+    };
+    ArhostRun moving(yaml), still(yaml);
+    moving.write("scene.yaml",
+                 scene("motion: {keys: [{at_s: 0}, {at_s: 2, translate: [60, 0, 40]}, {at_s: 3, translate: [0, 0, 0]}]}"));
+    still.write("scene.yaml", scene("transform: [{translate: [30, 0, 20]}]")); // as at 1 s
+    ASSERT_EQ(moving.run(), 0) << moving.output();
+    ASSERT_EQ(still.run(), 0) << still.output();
+    const auto different_pixels = [&](const char *name) {
+        const cv::Mat a = cv::imread(moving.path(name).string()), b = cv::imread(still.path(name).string());
+        cv::Mat difference, grey;
+        cv::absdiff(a, b, difference);
+        cv::cvtColor(difference, grey, cv::COLOR_BGR2GRAY);
+        return cv::countNonZero(grey > 8);
+    };
+    EXPECT_LT(different_pixels("0030.png"), 20) << "silhouettes may step, for one is moved as an instance";
+    EXPECT_GT(different_pixels("0000.png"), 500);
+    EXPECT_GT(different_pixels("0020.png"), 200);
+}
+
 TEST(Film, CutShortIsKeptAndTheExitStatusTells) {
     ArhostRun run(film_yaml("- {plugin: sink_video, path: film.mkv}\n"));
     ASSERT_EQ(run.run(), 0) << run.output();

@@ -375,6 +375,18 @@ TEST(Mirror, TakesTheBackgroundOfTheWindowOnlyByReflection) {
     EXPECT_EQ(picture.at(99, 74), (Pixel{255, 255, 255, 255})) << "the default background is white";
 }
 
+TEST(Mirror, LosesNoLight) {
+    ArenaBuilder builder;
+    builder.settings.background = glm::vec3(0.6f);
+    builder.settings.max_depth = 100;
+    builder.add_object("balls", builder.add_spheres({{-30, 0, 20, 20}, {30, 0, 20, 20}, {0, 40, 20, 20}}),
+                       builder.add_material(mirror(1)));
+    for (const Pixel &pixel : Tracer(std::move(builder)).render(from_the_side()).pixels())
+        if (pixel[3] == 255) {
+            ASSERT_TRUE(is_code_of(pixel[0], 0.6, 1e-4));
+        }
+}
+
 TEST(Mirror, FollowsAtMostMaxDepthBounces) {
     // Between two parallel mirrors, each bounce leaves 0.5; the ray leaves after the third.
     const auto brightness = [](std::uint32_t max_depth) {
@@ -635,6 +647,25 @@ TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
     EXPECT_LT(far, 10);
 }
 
+TEST(Sameness, SoupLooksLikeTheIndexedMesh) {
+    const scene::TriangleMesh indexed = cube(25);
+    scene::TriangleMesh soup;
+    for (const auto &triangle : indexed.triangles) {
+        const auto first = static_cast<std::uint32_t>(soup.positions.size());
+        for (int corner = 0; corner < 3; ++corner)
+            soup.positions.push_back(indexed.positions[triangle[corner]]);
+        soup.triangles.push_back({first, first + 1, first + 2});
+    }
+    const auto build = [](const scene::TriangleMesh &mesh) {
+        ArenaBuilder builder;
+        builder.settings.ambient = glm::vec3(0.1f);
+        builder.add_object("box", builder.add_triangles(mesh), builder.add_material(diffuse(0.8f, 0.6f, 0.4f)));
+        builder.add_light(light(100, -100, 200, 0.8f));
+        return Tracer(std::move(builder)).render(from_the_side()).pixels();
+    };
+    EXPECT_TRUE(build(soup) == build(indexed));
+}
+
 TEST(Sameness, RobustTraversalGivesThePictureOfTheFastOne) {
     EXPECT_LT(share_that_differs(Tracer(busy_scene(), {{"robust", "true"}}).render(from_the_side()),
                                  Tracer(busy_scene()).render(from_the_side())),
@@ -743,6 +774,27 @@ TEST(OddScenes, ACameraInsideAnObjectSeesItsInside) {
     EXPECT_EQ(picture.alphas(), (std::map<int, int>{{255, 200 * 150}}));
     EXPECT_EQ(picture.info.region_width, 200u);
     EXPECT_EQ(picture.info.region_height, 150u);
+}
+
+TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
+    // Inside a ball about the eye every ray leaves along its own direction, and light is lost at the one surface only.
+    for (const char *way : {"tree", "path"}) {
+        ArenaBuilder builder;
+        builder.settings.background = glm::vec3(0.5f);
+        builder.settings.max_depth = 40;
+        arhost_material glass = scene::make_material(ARHOST_GLASS);
+        glass.index = 1.5f;
+        set3(glass.reflectivity, 1, 1, 1);
+        set3(glass.refraction, 1, 1, 1);
+        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f);
+        glass.reflection_depth = glass.refraction_depth = 40;
+        builder.add_object("ball", builder.add_spheres({{0, 0, 0, 50}}), builder.add_material(glass));
+        const Picture picture = Tracer(std::move(builder), {{"glass", way}}).render(opencv_axes(pinhole()));
+        for (const Pixel &pixel : picture.pixels()) {
+            ASSERT_EQ(pixel[3], 255) << way;
+            ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << way;
+        }
+    }
 }
 
 // ---- Refusals --------------------------------------------------------------------------------------

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Pictures as they were found right by eye. A pixel whose neighbours are of its own alpha class, and nearly of its
+// colour, is a probe of that class: alpha exact, colour to a code. What lies on an edge may step to the other
+// side, since Embree's own code differs from processor to processor.
+//
+// After a change that is meant: ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
+#include "scene/loader.hpp"
+#include "tracer.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include <cstdlib>
+
+namespace arhost::test {
+namespace {
+
+const std::filesystem::path folder = ARHOST_SOURCE_DIRECTORY "/tests/plugins/rt_embree/golden";
+
+struct View {
+    const char *name, *scene;
+    std::array<double, 3> eye, look_at, up;
+    std::vector<int> classes; // of alpha, each probed in a hundred pixels or more
+};
+
+void PrintTo(const View &view, std::ostream *stream) {
+    *stream << view.name;
+}
+
+class Golden : public testing::TestWithParam<View> {};
+
+cv::Mat render(const View &view) {
+    const std::filesystem::path scene = std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
+    const Picture picture = Tracer(scene::load_scene(scene)).render(camera(view.eye, view.look_at, view.up));
+    cv::Mat image(static_cast<int>(picture.height), static_cast<int>(picture.width), CV_8UC4);
+    for (int y = 0; y < image.rows; ++y)
+        for (int x = 0; x < image.cols; ++x) {
+            const Pixel p = picture.at(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+            const bool nothing = p[3] == 0; // whose colour is nobody's business
+            for (int i = 0; i < 4; ++i)
+                image.at<cv::Vec4b>(y, x)[i] =
+                    nothing ? std::uint8_t{0} : static_cast<std::uint8_t>(p[static_cast<std::size_t>(i < 3 ? 2 - i : 3)]);
+        }
+    return image;
+}
+
+int largest_difference(const cv::Vec4b &a, const cv::Vec4b &b) {
+    int largest = 0;
+    for (int i = 0; i < 4; ++i)
+        largest = std::max(largest, std::abs(a[i] - b[i]));
+    return largest;
+}
+
+bool is_probe(const cv::Mat &image, int x, int y) {
+    const auto &here = image.at<cv::Vec4b>(y, x);
+    for (int v = y - 1; v <= y + 1; ++v)
+        for (int u = x - 1; u <= x + 1; ++u) {
+            const auto &there = image.at<cv::Vec4b>(v, u);
+            if (there[3] != here[3] || largest_difference(there, here) > 24)
+                return false;
+        }
+    return true;
+}
+
+} // namespace
+
+TEST_P(Golden, PictureIsAsItWas) {
+    const std::filesystem::path file = folder / (std::string(GetParam().name) + ".png");
+    const cv::Mat got = render(GetParam());
+    if (std::getenv("ARHOST_UPDATE_GOLDEN"))
+        cv::imwrite(file.string(), got);
+    const cv::Mat expected = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(expected.size(), got.size()) << file;
+    ASSERT_EQ(expected.type(), got.type());
+    std::map<int, int> probes;
+    int others = 0, others_off = 0;
+    for (int y = 1; y < got.rows - 1; ++y)
+        for (int x = 1; x < got.cols - 1; ++x) {
+            const auto &a = got.at<cv::Vec4b>(y, x), &b = expected.at<cv::Vec4b>(y, x);
+            if (is_probe(expected, x, y)) {
+                ++probes[b[3]];
+                ASSERT_EQ(a[3], b[3]) << "alpha at " << x << ", " << y;
+                ASSERT_LE(largest_difference(a, b), 1) << "colour at " << x << ", " << y;
+            } else {
+                ++others;
+                others_off += largest_difference(a, b) > 1;
+            }
+        }
+    EXPECT_LE(others_off, others / 100);
+    for (const int alpha : GetParam().classes)
+        EXPECT_GE(probes[alpha], 100) << "of alpha " << alpha;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Views, Golden,
+    testing::Values(View{"classes",
+                         "tests/plugins/rt_embree/golden/classes.yaml",
+                         {10, -150, 120},
+                         {0, -2, 8},
+                         {0, 0, 1},
+                         {0, 77, 153, 255}},
+                    View{"demo", "config/scenes/demo.yaml", {20, -150, 110}, {0, 0, 15}, {0, 0, 1}, {0, 153, 255}},
+                    View{"optix-cs", "config/scenes/optix-cs.yaml", {0, -330, 150}, {0, 0, 60}, {0, 0, 1}, {0, 255}},
+                    View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}}),
+    [](const auto &info) {
+        std::string name = info.param.name;
+        std::replace(name.begin(), name.end(), '-', '_');
+        return name;
+    });
+
+} // namespace arhost::test
