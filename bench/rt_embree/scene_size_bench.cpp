@@ -207,10 +207,11 @@ bool measure(const std::string &name, TriangleMesh mesh) {
 } // namespace
 
 int main(int argc, char **argv) try {
-    std::printf("best of %d, %d threads; frames: diffuse, one light with shadows, 1 sample; MB resident, the arena among "
-                "them\n%-18s %9s %9s %9s %7s %8s %8s %7s %8s %8s %8s\n",
-                repetitions, threads, "mesh", "triangles", "commit ms", "1st fr.ms", "ratio", "bare MB", "ours MB",
-                "ratio", "400x300", "800x600", "1600x1200");
+    std::printf(
+        "best of %d, %d threads; frames: diffuse, one light with shadows, 1 sample; MB resident, the arena among "
+        "them\n%-18s %9s %9s %9s %7s %8s %8s %7s %8s %8s %8s\n",
+        repetitions, threads, "mesh", "triangles", "commit ms", "1st fr.ms", "ratio", "bare MB", "ours MB", "ratio",
+        "400x300", "800x600", "1600x1200");
     bool met = true;
     if (argc > 1)
         for (int i = 1; i < argc; ++i)

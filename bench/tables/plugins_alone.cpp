@@ -88,7 +88,8 @@ struct Traced {
     double raytracer_ms, composite_ms;
 };
 
-Traced raytracer_and_composite(const std::string &picture, const std::string &scene, const arhost::camera::Trajectory &trajectory, int frames) {
+Traced raytracer_and_composite(const std::string &picture, const std::string &scene,
+                               const arhost::camera::Trajectory &trajectory, int frames) {
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(scene)).build();
     PluginUnderTest plugin("rt_embree");
     require(plugin.create(), plugin);

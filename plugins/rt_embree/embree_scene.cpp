@@ -233,8 +233,8 @@ void EmbreeScene::move(const arhost_motion &motion) {
 }
 
 void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
-    // From here a tree costs rays more than building a new one does, by trial (docs/performance.md).
-    constexpr double tolerable_decay = 1.5;
+    // From here on a tree costs the rays of a few frames more than building a new one does (rt-embree-refit).
+    constexpr double tolerable_decay = 1.3;
     Object &object = objects_[deformed.object];
     object.positions = deformed.positions;
     object.position_stride = 3 * sizeof(float);
@@ -294,6 +294,8 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     Deforming &own = deforming_[number];
     own.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
+    // Only then Embree gives the geometry a tree of its own, and only such a tree can be refitted.
+    rtcSetSceneBuildQuality(own.scene.get(), RTC_BUILD_QUALITY_LOW);
     own.geometry = new_geometry(number);
     rtcSetGeometryMask(own.geometry.get(), all_masks);
     rtcSetGeometryBuildQuality(own.geometry.get(), RTC_BUILD_QUALITY_MEDIUM);

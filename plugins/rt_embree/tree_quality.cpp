@@ -8,7 +8,7 @@
 namespace rt_embree {
 namespace {
 
-constexpr std::size_t group = 32; // triangles
+constexpr std::size_t group = 16, sample = 4096; // triangles
 
 struct Bounds {
     float low[3], high[3];
@@ -53,50 +53,52 @@ std::uint32_t spread(std::uint32_t bits) {
     return (bits | bits << 2) & 0x09249249;
 }
 
-} // namespace
-
-void TreeQuality::built(const MeshView &mesh) {
+// Of every so many a triangle, along a Morton curve.
+std::vector<std::uint32_t> neighbours(const MeshView &mesh) {
+    const auto stride = std::max<std::uint32_t>(1, static_cast<std::uint32_t>(mesh.triangle_count / sample));
     std::vector<Bounds> boxes;
-    boxes.reserve(mesh.triangle_count);
     Bounds all;
-    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+    for (std::uint32_t i = 0; i < mesh.triangle_count; i += stride) {
         boxes.push_back(bounds_of(mesh, i));
         all.include(boxes.back());
     }
     std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed;
-    keyed.reserve(boxes.size());
-    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+    for (std::uint32_t i = 0; i < boxes.size(); ++i) {
         std::uint32_t key = 0;
         for (int axis = 0; axis < 3; ++axis) {
             const float extent = all.high[axis] - all.low[axis];
             const float middle = (boxes[i].low[axis] + boxes[i].high[axis]) / 2 - all.low[axis];
             key |= spread(extent > 0 ? static_cast<std::uint32_t>(middle / extent * 1023) : 0) << axis;
         }
-        keyed.emplace_back(key, i);
+        keyed.emplace_back(key, i * stride);
     }
     std::sort(keyed.begin(), keyed.end());
-    order_.clear();
+    std::vector<std::uint32_t> order;
     for (const auto &[key, triangle] : keyed)
-        order_.push_back(triangle);
-    area_when_built_ = relative_area(mesh);
+        order.push_back(triangle);
+    return order;
+}
+
+double area_of_groups(const MeshView &mesh, const std::vector<std::uint32_t> &order) {
+    double sum = 0;
+    for (std::size_t first = 0; first < order.size(); first += group) {
+        Bounds box;
+        for (std::size_t i = first; i < std::min(first + group, order.size()); ++i)
+            box.include(bounds_of(mesh, order[i]));
+        sum += box.half_area();
+    }
+    return sum;
+}
+
+} // namespace
+
+void TreeQuality::built(const MeshView &mesh) {
+    order_ = neighbours(mesh);
 }
 
 double TreeQuality::decay(const MeshView &mesh) const {
-    return relative_area(mesh) / area_when_built_;
-}
-
-double TreeQuality::relative_area(const MeshView &mesh) const {
-    double sum = 0;
-    Bounds all;
-    for (std::size_t first = 0; first < order_.size(); first += group) {
-        Bounds box;
-        for (std::size_t i = first; i < std::min(first + group, order_.size()); ++i)
-            box.include(bounds_of(mesh, order_[i]));
-        sum += box.half_area();
-        all.include(box);
-    }
-    const double whole = all.half_area();
-    return whole > 0 ? std::max(sum / whole, 1e-12) : 1;
+    const double now = area_of_groups(mesh, order_), anew = area_of_groups(mesh, neighbours(mesh));
+    return anew > 0 ? now / anew : 1;
 }
 
 } // namespace rt_embree

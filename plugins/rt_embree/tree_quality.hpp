@@ -16,20 +16,18 @@ struct MeshView {
 };
 
 // What rays pay for boxes is the boxes' area (MacDonald and Booth, Heuristics for Ray Tracing Using Space
-// Subdivision, 1990). Embree's own boxes can't be seen, so this measures boxes of its own: round groups of
-// triangles that were neighbours when the tree was built, against the whole's.
+// Subdivision, 1990). Embree's own boxes can't be seen, so this measures boxes of its own, round groups of
+// triangles that were neighbours when the tree was built, against groups of those that are neighbours now: what a
+// new tree would have. It looks at some thousand triangles, so that it costs little however large the mesh is.
 class TreeQuality {
 public:
     // Takes the triangles' present neighbourhood for that of a tree that is built now.
     void built(const MeshView &mesh);
-    // How much more the groups' area has become, as a share of the whole's, since then: 1 when nothing changed.
+    // How many times as large as a new tree's the groups' area has become since then; about 1 when nothing changed.
     double decay(const MeshView &mesh) const;
 
 private:
-    double relative_area(const MeshView &mesh) const;
-
     std::vector<std::uint32_t> order_; // of triangles, along a Morton curve
-    double area_when_built_ = 1;
 };
 
 } // namespace rt_embree

@@ -57,7 +57,8 @@ TEST(Demo, LeavesItsFourFiles) {
 TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
-        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: 80}]}\n"
+        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+        "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: scene.yaml}\noutputs: [{plugin: sink_images, path: \"%04d.png\"}]\n";
     const auto scene = [](const std::string &object) {
         return "version: 1\naxes: z-up\nambient: 0.5\nmaterials: {m: {model: diffuse, diffuse: \"#20a0f0\"}}\n"
@@ -67,8 +68,9 @@ TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
                object + "}\n";
     };
     ArhostRun moving(yaml), still(yaml);
-    moving.write("scene.yaml",
-                 scene("motion: {keys: [{at_s: 0}, {at_s: 2, translate: [60, 0, 40]}, {at_s: 3, translate: [0, 0, 0]}]}"));
+    moving.write(
+        "scene.yaml",
+        scene("motion: {keys: [{at_s: 0}, {at_s: 2, translate: [60, 0, 40]}, {at_s: 3, translate: [0, 0, 0]}]}"));
     still.write("scene.yaml", scene("transform: [{translate: [30, 0, 20]}]")); // as at 1 s
     ASSERT_EQ(moving.run(), 0) << moving.output();
     ASSERT_EQ(still.run(), 0) << still.output();

@@ -40,7 +40,8 @@ cv::Mat render(const View &view) {
             const bool nothing = p[3] == 0; // whose colour is nobody's business
             for (int i = 0; i < 4; ++i)
                 image.at<cv::Vec4b>(y, x)[i] =
-                    nothing ? std::uint8_t{0} : static_cast<std::uint8_t>(p[static_cast<std::size_t>(i < 3 ? 2 - i : 3)]);
+                    nothing ? std::uint8_t{0}
+                            : static_cast<std::uint8_t>(p[static_cast<std::size_t>(i < 3 ? 2 - i : 3)]);
         }
     return image;
 }

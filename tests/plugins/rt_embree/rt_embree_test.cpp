@@ -777,7 +777,8 @@ TEST(OddScenes, ACameraInsideAnObjectSeesItsInside) {
 }
 
 TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
-    // Inside a ball about the eye every ray leaves along its own direction, and light is lost at the one surface only.
+    // Inside a ball about the eye every ray leaves along its own direction, and light is lost at the one surface
+    // only.
     for (const char *way : {"tree", "path"}) {
         ArenaBuilder builder;
         builder.settings.background = glm::vec3(0.5f);
