@@ -180,7 +180,7 @@ def draw_figures(frames):
             curves += [(f"{far}, whole chain", strong, False, smoothed(whole)), (f"{far}, tracer alone", strong, True, smoothed(alone))]
             for name, x in ((far, 0), (close, 1)):
                 if name:
-                    marks += [(f"{far}, dissertation, alone", pale, x, TABLES[table][name][3])]
+                    marks += [(f"{far}, dissertation (GTX 1060)", pale, x, TABLES[table][name][3])]
             ratio = frames_a_second(whole) / frames_a_second(alone)
             results[f"{title}: {far}"] = {"whole_to_alone": ratio, "whole": smoothed(whole), "alone": smoothed(alone)}
             print(f"  {title.split(':')[0]}, {far}: {smoothed(alone)[0][1]:.1f} to {smoothed(alone)[-1][1]:.1f} frames a second "
