@@ -7,11 +7,11 @@
 //   plugins-alone SCENE TRAJECTORY PICTURE FRAMES
 #include "camera/trajectory.hpp"
 #include "compositor/compositor.hpp"
+#include "pixels/grey.hpp"
 #include "scene/loader.hpp"
 
 #include <common_planar_pose/tracker_support.hpp>
 
-#include <opencv2/imgproc.hpp>
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -78,17 +78,39 @@ double tracker_alone(const std::string &picture, const arhost_intrinsics &camera
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
 }
 
-double grey_alone(const std::string &picture, int frames) {
-    const cv::Mat bgr = cv::imread(picture);
-    cv::Mat grey;
-    return cpu_ms_of(frames, [&](int) { cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY); });
+// A picture as a frame, BGR8.
+struct VideoFrame {
+    explicit VideoFrame(const std::string &picture) : slot(layout(picture)) {
+        for (int y = 0; y < bgr.rows; ++y)
+            std::memcpy(slot.data() + std::size_t{format.stride[0]} * static_cast<std::size_t>(y), bgr.ptr(y),
+                        static_cast<std::size_t>(bgr.cols) * 3);
+    }
+    std::size_t layout(const std::string &picture) {
+        bgr = cv::imread(picture);
+        format.struct_size = sizeof format;
+        format.pixel_format = ARHOST_BGR8;
+        format.width = static_cast<std::uint32_t>(bgr.cols);
+        format.height = static_cast<std::uint32_t>(bgr.rows);
+        if (!arhost_frame_layout(&format))
+            throw std::runtime_error("can't read " + picture);
+        return format.byte_size;
+    }
+    cv::Mat bgr;
+    arhost_frame_format format{};
+    GuardedBuffer slot;
+};
+
+double grey_alone(const VideoFrame &video, int frames) {
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {video.slot.data()};
+    return cpu_ms_of(
+        frames, [&](int) { arhost::fill_grey(video.format, planes, video.slot.data() + video.format.grey_offset); });
 }
 
 struct Traced {
     double raytracer_ms, composite_ms;
 };
 
-Traced raytracer_and_composite(const std::string &picture, const std::string &scene,
+Traced raytracer_and_composite(const VideoFrame &video, const std::string &scene,
                                const arhost::camera::Trajectory &trajectory, int frames) {
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(scene)).build();
     PluginUnderTest plugin("rt_embree");
@@ -109,20 +131,10 @@ Traced raytracer_and_composite(const std::string &picture, const std::string &sc
         require(raytracer.render(plugin.instance(), &request, &image, &info), plugin);
     });
     raytracer.stop(plugin.instance());
-    const cv::Mat bgr = cv::imread(picture);
-    std::vector<std::uint8_t> output(bgr.total() * 3);
-    arhost_frame_format format{};
-    format.struct_size = sizeof format;
-    format.pixel_format = ARHOST_BGR8;
-    format.width = camera.width;
-    format.height = camera.height;
-    arhost_frame_layout(&format);
-    const GuardedBuffer video(format.byte_size);
-    for (int y = 0; y < bgr.rows; ++y)
-        std::memcpy(video.data() + std::size_t{format.stride[0]} * static_cast<std::size_t>(y), bgr.ptr(y), bgr.step);
-    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {video.data()};
+    std::vector<std::uint8_t> output(std::size_t{3} * camera.width * camera.height);
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {video.slot.data()};
     const double composite_ms = cpu_ms_of(frames, [&](int) {
-        arhost::composite(format, planes, {slot.data(), 4 * camera.width},
+        arhost::composite(video.format, planes, {slot.data(), 4 * camera.width},
                           {info.region_x, info.region_y, info.region_width, info.region_height},
                           {output.data(), 3 * camera.width});
     });
@@ -140,9 +152,10 @@ int main(int argc, char **argv) try {
     const arhost::camera::Trajectory trajectory = arhost::camera::read_trajectory(argv[2]);
     if (!trajectory.intrinsics)
         throw std::runtime_error("the trajectory must tell its intrinsics");
-    const double source = source_alone(argv[3], frames), grey = grey_alone(argv[3], frames);
+    const VideoFrame video(argv[3]);
+    const double source = source_alone(argv[3], frames), grey = grey_alone(video, frames);
     const double tracker = tracker_alone(argv[3], *trajectory.intrinsics, frames);
-    const Traced traced = raytracer_and_composite(argv[3], argv[1], trajectory, frames);
+    const Traced traced = raytracer_and_composite(video, argv[1], trajectory, frames);
     std::printf("{\"source\": %.4f, \"grey\": %.4f, \"tracker\": %.4f, \"raytracer\": %.4f, \"composite\": %.4f}\n",
                 source, grey, tracker, traced.raytracer_ms, traced.composite_ms);
     return 0;

@@ -66,7 +66,7 @@ def replay(scene, trajectory, frames, with_pipeline):
                "--set", "raytracer.start_deadline_ms=120000", "--set", "raytracer.deadline_ms=60000"]
     if with_pipeline:
         command += ["--with-pipeline", "--set",
-                    f"source={{plugin: source_file, path: {FRAME}, options: {{frames: {frames}}}}}"]
+                    f"source={{plugin: source_file, path: \"{FRAME}\", options: {{frames: {frames}}}}}"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr}")
@@ -84,7 +84,7 @@ def frames_a_second(rows):
 def make_frame():
     (OUT / "frame.yaml").write_text(f"""version: 1
 source: {{plugin: source_synthetic, options: {{frames: 1, width: {WIDTH}, height: {HEIGHT}}}}}
-outputs: [{{plugin: sink_images, path: {FRAME}}}]
+outputs: [{{plugin: sink_images, path: "{FRAME}"}}]
 """)
     subprocess.run([BUILD / "bin/arhost", "--config", OUT / "frame.yaml"], check=True, stderr=subprocess.DEVNULL)
 
@@ -104,7 +104,7 @@ def print_tables(seconds):
             _, rows_whole, _ = replay(scene, trajectory, frames, True)
             ours_alone, ours_whole = frames_a_second(rows_alone), frames_a_second(rows_whole)
             tracer = [statistics.median(row["raytracer_ms"] for row in rows) for rows in (rows_whole, rows_alone)]
-            stand_in = "   a stand-in for the scan" if "stand" in said else ""
+            stand_in = "   a stand-in for the scan" if "stands in for it" in said else ""
             print(f"  {name:6} {whole:7.2f} {alone:7.2f} {whole / alone:7.3f}   {ours_whole:8.2f} {ours_alone:8.2f} "
                   f"{ours_whole / ours_alone:7.3f}  {tracer[0]:.2f} / {tracer[1]:.2f}{stand_in}", flush=True)
             results[f"{title}, {name}"] = {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <map>
 #include <set>
 
 namespace arhost::config {
@@ -87,6 +88,29 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plu
     return tracker;
 }
 
+// That no file is written which the run reads, or writes elsewhere.
+class FilesInUse {
+public:
+    void read(const std::filesystem::path &file) { files_.try_emplace(real(file), false); }
+    void write(const yaml::Node &path) {
+        const auto [found, fresh] = files_.try_emplace(real(path.text()), true);
+        if (!fresh && found->second)
+            path.fail("another output writes '" + path.text() + "' already; choose another path");
+        if (!fresh)
+            path.fail("'" + path.text() + "' is a file that this run reads; choose another path");
+    }
+
+private:
+    // The same for all paths to it, links included.
+    static std::filesystem::path real(const std::filesystem::path &file) {
+        std::error_code error;
+        const std::filesystem::path canonical =
+            std::filesystem::weakly_canonical(std::filesystem::absolute(file), error);
+        return error ? std::filesystem::absolute(file).lexically_normal() : canonical;
+    }
+    std::map<std::filesystem::path, bool> files_; // whether it is written
+};
+
 } // namespace
 
 std::vector<ring::OptionValue> options_for(const ring::PluginDescription &plugin, arhost_kind kind,
@@ -160,28 +184,27 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", plugin_path, restart));
-    std::set<std::filesystem::path> files;
-    for (const ComponentConfiguration &output : configuration.outputs) {
-        const auto path = output.path || !output.options ? output.path : output.options->find("path");
-        if (path && !files.insert(std::filesystem::absolute(path->text()).lexically_normal()).second)
-            path->fail("another output writes '" + path->text() + "' already");
-    }
-    if (trajectory_node && files.contains(trajectory_node->input_path()))
-        trajectory_node->fail("an output of this run writes this very file; choose another path for it");
-    if (trajectory_node)
-        files.insert(trajectory_node->input_path());
+    FilesInUse files;
+    files.read(root.file());
+    for (const auto &node : {configuration.source ? configuration.source->path : std::nullopt,
+                             configuration.raytracer ? configuration.raytracer->node.find("scene") : std::nullopt,
+                             root.find("camera") ? root.find("camera")->find("file") : std::nullopt, trajectory_node})
+        if (node)
+            files.read(node->input_path());
+    for (const ComponentConfiguration &output : configuration.outputs)
+        if (const auto path = output.path || !output.options ? output.path : output.options->find("path"))
+            files.write(*path);
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =
             std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
     }
-    files.insert(std::filesystem::absolute(root.file()).lexically_normal());
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
             *file = std::filesystem::absolute(node->text()).lexically_normal();
-            if (!files.insert(**file).second && !std::filesystem::is_character_file(**file))
-                node->fail("the file is in use already");
+            if (!std::filesystem::is_character_file(**file)) // /dev/null takes both
+                files.write(*node);
         }
     return configuration;
 }

@@ -155,7 +155,7 @@ double cpu_seconds_of_host() {
 }
 
 // Whole under its name, or not there: written beside it and renamed.
-bool write_statistics(const fs::path &file, const char *key, Console &console, const std::string &text) {
+bool write_whole(const fs::path &file, const char *key, Console &console, const std::string &text) {
     std::error_code ignored;
     if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) { // /dev/null, say
         std::ofstream stream(file);
@@ -217,12 +217,12 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Lau
     const Statistics &statistics = pipeline.statistics();
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
-        written = write_statistics(*configuration.stats, "stats", console,
-                                   report(statistics, pipeline.components(), cpu_seconds_of_host())
-                                           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                                       "\n");
+        written = write_whole(*configuration.stats, "stats", console,
+                              report(statistics, pipeline.components(), cpu_seconds_of_host())
+                                      .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                                  "\n");
     if (configuration.timeline && statistics.frames_in > 0)
-        written &= write_statistics(*configuration.timeline, "timeline", console, timeline_csv(statistics));
+        written &= write_whole(*configuration.timeline, "timeline", console, timeline_csv(statistics));
     // From here on signals end the process at once, should the terminal be halted while the last lines wait.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {

@@ -8,6 +8,18 @@ namespace arhost::supervise {
 
 using namespace ring;
 
+namespace {
+
+bool may_answer(arhost_kind kind, arhost_status status) {
+    if (status == ARHOST_END)
+        return kind == ARHOST_KIND_SOURCE || kind == ARHOST_KIND_SINK;
+    if (status == ARHOST_END_CUT_SHORT)
+        return kind == ARHOST_KIND_SOURCE;
+    return status == ARHOST_OK || (status < 0 && status >= ARHOST_ERROR_INTERNAL);
+}
+
+} // namespace
+
 RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
     auto region = std::make_shared<Region>();
     region->memory = SharedMemory::create(name, layout.byte_size());
@@ -196,7 +208,7 @@ void Component::stop_when_idle() {
 void Component::on_result(const Result &result) {
     if (in_flight_.empty() || result.ticket != in_flight_.front().ticket)
         return process_->end("broke the contract: it answered what it was not asked");
-    if (result.status == 0 || result.status > ARHOST_END_CUT_SHORT || result.status < ARHOST_ERROR_INTERNAL)
+    if (!may_answer(description_.kind, result.status))
         return process_->end("broke the contract: its status is " + std::to_string(result.status));
     const Command command = in_flight_.front();
     in_flight_.pop_front();

@@ -183,8 +183,11 @@ void reap(int socket, std::set<pid_t> &spawned) {
 // The launcher's next word. One that somebody has stopped is made to go on: the host must not stand still.
 Reply receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
     pollfd ready{socket, POLLIN, 0};
-    while (::poll(&ready, 1, 50) <= 0)
+    for (int count; (count = ::poll(&ready, 1, 50)) <= 0;) {
+        if (count < 0 && errno != EINTR)
+            ring::throw_errno("poll of the launcher");
         ::kill(launcher, SIGCONT);
+    }
     Reply reply;
     if (!receive_struct(socket, reply, fds))
         throw std::runtime_error("the launcher is gone");
@@ -217,7 +220,10 @@ Launcher::Launcher() {
 
 Launcher::~Launcher() {
     socket_.reset();
-    ::waitpid(pid_, nullptr, 0);
+    while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
+        ::kill(pid_, SIGCONT); // should somebody have stopped it
+        ::usleep(1000);
+    }
 }
 
 Spawned Launcher::spawn(const std::filesystem::path &program) {

@@ -160,10 +160,10 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
-        local_boxes_.push_back(local_box(arena, object));
-        visible_boxes_.push_back(object.role == ARHOST_OCCLUDER
-                                     ? empty_box()
-                                     : transformed(local_boxes_.back(), object.world_from_object));
+        places_.push_back({local_box(arena, object), {}});
+        std::copy_n(object.world_from_object, 12, places_.back().world_from_object.begin());
+        visible_boxes_.push_back(empty_box());
+        update_visible_box(number);
         view_.has_catchers |= object.role == ARHOST_CATCHER;
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
@@ -221,8 +221,8 @@ void EmbreeScene::move(const arhost_motion &motion) {
         Object &object = objects_[moved.object];
         object.has_transform = true;
         place(object, moved.world_from_object);
-        if (object.role != ARHOST_OCCLUDER)
-            visible_boxes_[moved.object] = transformed(local_boxes_[moved.object], moved.world_from_object);
+        std::copy_n(moved.world_from_object, 12, places_[moved.object].world_from_object.begin());
+        update_visible_box(moved.object);
         const RTCGeometry instance = rtcGetGeometry(root_.get(), moved.object);
         rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, moved.world_from_object);
         rtcCommitGeometry(instance);
@@ -260,9 +260,13 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     }
     const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
     rtcCommitGeometry(instance); // its bounds have changed
-    local_boxes_[deformed.object] = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
-    if (object.role != ARHOST_OCCLUDER)
-        visible_boxes_[deformed.object] = local_boxes_[deformed.object];
+    places_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
+    update_visible_box(deformed.object);
+}
+
+void EmbreeScene::update_visible_box(std::uint32_t object) {
+    if (objects_[object].role != ARHOST_OCCLUDER)
+        visible_boxes_[object] = transformed(places_[object].local, places_[object].world_from_object.data());
 }
 
 SceneHandle EmbreeScene::new_scene(RTCSceneFlags flags) const {

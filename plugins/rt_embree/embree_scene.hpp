@@ -9,6 +9,7 @@
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <type_traits>
@@ -72,8 +73,14 @@ private:
     std::vector<Instanced> instanced_;
     std::map<std::uint32_t, Deforming> deforming_; // by object
     SceneHandle static_, root_;                    // the former only where something moves
+    struct Place {
+        Box local;
+        std::array<float, 12> world_from_object;
+    };
+    void update_visible_box(std::uint32_t object);
     std::vector<Object> objects_;
-    std::vector<Box> local_boxes_, visible_boxes_;
+    std::vector<Place> places_;
+    std::vector<Box> visible_boxes_;
     std::uint64_t rebuilds_ = 0;
     std::vector<Texture> textures_;
     std::unique_ptr<const arhost::shading::Srgb8Table> srgb8_;

@@ -28,13 +28,24 @@ float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
     return near * static_cast<float>(size) - 0.5f;
 }
 
+// Between the four texels round (u, v), as the kernel's sample_texture.
+float sampled_alpha(const Texture &texture, float u, float v) {
+    const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
+    const float left = std::floor(x), top = std::floor(y);
+    const auto at = [&](int right, int low) {
+        return alpha_of_texel(texture,
+                              wrapped(static_cast<std::int32_t>(left) + right, texture.width, texture.wrap_u),
+                              wrapped(static_cast<std::int32_t>(top) + low, texture.height, texture.wrap_v));
+    };
+    return std::lerp(std::lerp(at(0, 0), at(1, 0), x - left), std::lerp(at(0, 1), at(1, 1), x - left), y - top);
+}
+
 bool is_hole(const HitFilter &filter, unsigned triangle, float u, float v) {
-    const Object &shape = filter.shape;
-    const int *corners = shape.indices + std::size_t{triangle} * (shape.index_stride / 4);
+    const int *corners = filter.indices + std::size_t{triangle} * (filter.index_stride / 4);
     const float share[3] = {1 - u - v, u, v};
     float s = 0, t = 0;
     for (int i = 0; i < 3; ++i) {
-        const float *at = shape.texcoords + std::size_t(corners[i]) * (shape.texcoord_stride / 4);
+        const float *at = filter.texcoords + std::size_t(corners[i]) * (filter.texcoord_stride / 4);
         s += share[i] * at[0];
         t += share[i] * at[1];
     }
@@ -75,10 +86,13 @@ HitFilter hit_filter_of(const Object &object, const Texture *textures) {
     filter.is_catcher = object.role == ARHOST_CATCHER;
     const arhost_material &material = *object.material;
     const bool has_colour = material.model != ARHOST_MIRROR && material.model != ARHOST_GLASS;
-    if (has_colour && material.colour_texture != ARHOST_NONE && object.texcoords) {
+    if (has_colour && material.alpha_cutoff > 0 && material.colour_texture != ARHOST_NONE && object.texcoords) {
         filter.alpha_cutoff = material.alpha_cutoff;
         filter.colour = &textures[material.colour_texture];
-        filter.shape = object;
+        filter.indices = object.indices;
+        filter.texcoords = object.texcoords;
+        filter.index_stride = object.index_stride;
+        filter.texcoord_stride = object.texcoord_stride;
     }
     return filter;
 }
@@ -88,17 +102,6 @@ void set_hit_filter(RTCGeometry geometry, const HitFilter &filter) {
     rtcSetGeometryIntersectFilterFunction(geometry, on_hit);
     if (filter.alpha_cutoff > 0)
         rtcSetGeometryOccludedFilterFunction(geometry, on_hit);
-}
-
-float sampled_alpha(const Texture &texture, float u, float v) {
-    const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
-    const float left = std::floor(x), top = std::floor(y);
-    const auto at = [&](int right, int low) {
-        return alpha_of_texel(texture,
-                              wrapped(static_cast<std::int32_t>(left) + right, texture.width, texture.wrap_u),
-                              wrapped(static_cast<std::int32_t>(top) + low, texture.height, texture.wrap_v));
-    };
-    return std::lerp(std::lerp(at(0, 0), at(1, 0), x - left), std::lerp(at(0, 1), at(1, 1), x - left), y - top);
 }
 
 } // namespace rt_embree

@@ -157,6 +157,22 @@ const std::vector<Case> cases = {
      replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, options: {path: counted.txt}}"),
      small_scene,
      {"run.yaml:6:", "another output writes 'counted.txt' already"}},
+    {"StatisticsOverTheScene",
+     good.substr(0, good.find("stats:")) + "stats: ./scene.yaml\n",
+     small_scene,
+     {"run.yaml:7:8: stats: './scene.yaml' is a file that this run reads; choose another path"}},
+    {"TimelineOverTheConfiguration",
+     good + "timeline: run.yaml\n",
+     small_scene,
+     {"run.yaml:8:11: timeline: 'run.yaml' is a file that this run reads"}},
+    {"TimelineOverTheStatistics",
+     good + "timeline: stats.json\n",
+     small_scene,
+     {"run.yaml:8:11: timeline: another output writes 'stats.json' already"}},
+    {"OutputOverTheScene",
+     replaced(good, "path: counted.txt", "path: linked.yaml"),
+     small_scene,
+     {"run.yaml:6:", "'linked.yaml' is a file that this run reads"}},
     {"SceneThatIsAFifo",
      replaced(good, "scene.yaml", "fifo.obj"),
      small_scene,
@@ -192,6 +208,7 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
     run.write("empty.obj", "v 0 0 0\n");
     run.write("text.so", "This is no shared object, whatever its name says, and it is longer than an ELF header.\n");
     run.write("cut.so", "\177ELF");
+    std::filesystem::create_symlink("scene.yaml", run.path("linked.yaml"));
     ASSERT_EQ(::mkfifo(run.path("fifo.obj").c_str(), 0600), 0);
     EXPECT_EQ(run.run(), 2) << run.output();
     const std::string output = run.output();

@@ -387,6 +387,28 @@ TEST(Supervision, AStoppedLauncherIsMadeToGoOn) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
 }
 
+TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
+    ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 5", "start_steps: 1, start_step_ms: 3000", ""));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    while (run.running() && run.worker("tracker_counter") == 0)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(run.launcher(), SIGSTOP);
+    ::kill(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
+}
+
+TEST(Supervision, OnlySourcesAndOutputsMayEndTheRun) {
+    for (const char *status : {"2", "3", "4"}) {
+        ArhostRun run(counting("lockstep", "frames: 30", "", std::string("answer: ") + status,
+                               "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
+        run.write("scene.yaml", small_scene);
+        EXPECT_EQ(run.run(), 1) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(std::string("broke the contract: its status is ") + status));
+        expect_all_frames_in_order(run, 30);
+    }
+}
+
 TEST(Supervision, TheRunEndsWhenNoOutputIsLeft) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000}}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt, options: {error_at: 5}}]\n");

@@ -166,7 +166,8 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     EnvironmentSample sample;
     sample.in = incidence_along(s, way, far_away, Float(1.0f) / max(density * Float(3.14159265f), Float(1e-12f)));
     sample.in.from_environment = true;
-    sample.light = sample_texture(scene, image, u, v).colour * Float(environment.intensity);
+    // The texel's own, as the density is: between texels the mixed light would be too much for the darker one's.
+    sample.light = texel_at(scene, image, column, row).colour * Float(environment.intensity);
     return sample;
 }
 
@@ -234,7 +235,7 @@ ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &
                                          const Random &random) {
     const Scene &scene = frame.scene;
     const Surface s = surface_at(scene, rays, active);
-    Float irradiance = 0.0f, weighted = 0.0f;
+    Float irradiance = 0.0f, hidden_part = 0.0f, tinted_part = 0.0f;
     Vec3 weighted_colour = black(); // by channel, with coloured shadows
     for_each_light(frame, s, random, [&](const Incidence &in, Vec3 intensity, float share) {
         const Bool facing = active & (in.cosine > Float(0.0f));
@@ -245,22 +246,22 @@ ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &
         const Passage way = passage(scene, in, s, facing);
         const Bool hidden = facing & ~way.open;
         irradiance = irradiance + weight;
-        const Float alpha = shadow_alpha(hidden, way.is_tinted, Float(scene.shadow_alpha_opaque),
-                                         Float(scene.shadow_alpha_translucent));
-        weighted = weighted + weight * alpha;
+        hidden_part = hidden_part + select(hidden, weight, Float(0.0f));
+        tinted_part = tinted_part + select(facing & way.is_tinted, weight, Float(0.0f)); // never hidden, too
         if (scene.coloured_shadows) {
             const Vec3 opaque = white() * Float(scene.shadow_alpha_opaque);
             const Vec3 through = select(way.is_tinted, opaque * (white() - way.tint), black());
             weighted_colour = weighted_colour + select(hidden, opaque, through) * weight;
         }
     });
-    CaughtShadow shadow{select(active, mean_shadow_alpha(weighted, irradiance), Float(0.0f)), black()};
+    const Float alpha = shadow_alpha(share_of_light(hidden_part, irradiance), share_of_light(tinted_part, irradiance),
+                                     Float(scene.shadow_alpha_opaque), Float(scene.shadow_alpha_translucent));
+    CaughtShadow shadow{select(active, alpha, Float(0.0f)), black()};
     if (scene.coloured_shadows) {
         // Each channel's own alpha; the colour makes up for what the common one takes too much, over a video
         // of middle grey.
-        const Vec3 own{mean_shadow_alpha(weighted_colour.x, irradiance),
-                       mean_shadow_alpha(weighted_colour.y, irradiance),
-                       mean_shadow_alpha(weighted_colour.z, irradiance)};
+        const Vec3 own{share_of_light(weighted_colour.x, irradiance), share_of_light(weighted_colour.y, irradiance),
+                       share_of_light(weighted_colour.z, irradiance)};
         shadow.alpha = select(active, largest(own), Float(0.0f));
         const Vec3 encoded = (white() * shadow.alpha - own) * (Float(0.5f) / max(shadow.alpha, Float(1e-6f)));
         shadow.colour = {srgb_decode(encoded.x), srgb_decode(encoded.y), srgb_decode(encoded.z)};

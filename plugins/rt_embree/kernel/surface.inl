@@ -49,7 +49,8 @@ ARHOST_INLINE Texel textured(const Scene &scene, const Object &object, std::uint
 // The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own
 // (E. Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2012, section 7.8), brought into the
 // plane across the normal; the texture's green points against v, as in glTF 2.0, section 3.9.3.
-ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 normal, const RTCHit16 &hit, Bool here) {
+ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal, const RTCHit16 &hit,
+                        Bool here) {
     const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
     Vec3 position[3];
     Float u[3], v[3];
@@ -76,7 +77,9 @@ ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 normal, c
     const Vec3 texel = textured(scene, object, object.material->normal_texture, hit, here).colour;
     const Vec3 asked = right * (texel.x * Float(2.0f) - Float(1.0f)) + up * (texel.y * Float(2.0f) - Float(1.0f)) +
                        n * (texel.z * Float(2.0f) - Float(1.0f));
-    const Bool is_possible = (dot(across, across) > Float(0.0f)) & (dot(asked, n) > Float(0.0f));
+    // One that points into the facet would be taken for the back's.
+    const Vec3 outwards = select(dot(facet, n) < Float(0.0f), -facet, facet);
+    const Bool is_possible = (dot(across, across) > Float(0.0f)) & (dot(asked, outwards) > Float(0.0f));
     return select(is_possible, asked, normal);
 }
 
@@ -105,7 +108,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         }
         if (object.material->model == ARHOST_METALLIC_ROUGHNESS && object.material->normal_texture != ARHOST_NONE &&
             object.texcoords)
-            normal = bent(scene, object, normal, hit, here);
+            normal = bent(scene, object, geometric, normal, hit, here);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
         if (object.role != ARHOST_VIRTUAL)

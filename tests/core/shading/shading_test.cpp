@@ -46,15 +46,17 @@ TEST(Light, FallsOffWithTheSquareOfTheDistanceOrNotAtAll) {
 }
 
 TEST(Alpha, ClassesGiveTheirCodes) {
-    EXPECT_EQ(code_8bit(shadow_alpha(false, false, 0.6, 0.3)), 0);
-    EXPECT_EQ(code_8bit(shadow_alpha(true, false, 0.6f, 0.3f)), 153);
-    EXPECT_EQ(code_8bit(shadow_alpha(false, true, 0.6f, 0.3f)), 77);
-    EXPECT_EQ(code_8bit(shadow_alpha(true, true, 0.6f, 0.3f)), 153) << "the stronger wins";
+    EXPECT_EQ(code_8bit(shadow_alpha(0, 0, 0.6, 0.3)), 0);
+    EXPECT_EQ(code_8bit(shadow_alpha(1, 0, 0.6f, 0.3f)), 153);
+    EXPECT_EQ(code_8bit(shadow_alpha(0, 1, 0.6f, 0.3f)), 77);
+    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "to the last bit: 76.5 is rounded";
 }
 
 TEST(Alpha, SeveralLightsAreWeighedByTheirIrradiance) {
-    EXPECT_DOUBLE_EQ(mean_shadow_alpha(3 * 0.6, 3 + 1), 0.45);
-    EXPECT_EQ(mean_shadow_alpha(0, 0), 0) << "no light, no shadow";
+    EXPECT_DOUBLE_EQ(share_of_light(3, 3 + 1), 0.75);
+    EXPECT_EQ(share_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
+    EXPECT_EQ(share_of_light(0, 0), 0) << "no light, no shadow";
+    EXPECT_DOUBLE_EQ(shadow_alpha(0.5, 0.25, 0.6, 0.3), 0.375);
 }
 
 TEST(Srgb, EncodesTheStandardsLandmarks) {

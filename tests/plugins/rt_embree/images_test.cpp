@@ -250,6 +250,19 @@ TEST(Environment, LightsADiffusePlaneByItsMean) {
     EXPECT_NEAR(sum / (200 * 150), 0.5 * 0.6, 0.003);
 }
 
+TEST(Environment, LightsByAFewBrightTexelsAsMuchAsTheyGive) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
+    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(diffuse(0.5f, 0.5f, 0.5f)));
+    const Picture picture = Tracer(std::move(builder), {{"light_samples", "256"}}).render(from_above());
+    // kd/π ∫ L cos θ dω over an eighth of the half space: 0.5/π · 4 · (2π/8) · ½.
+    double sum = 0;
+    for (const Pixel &pixel : picture.pixels())
+        sum += shading::srgb_decode(pixel[0] / 255.0);
+    EXPECT_NEAR(sum / static_cast<double>(picture.pixels().size()), 0.25, 0.004);
+}
+
 TEST(Environment, IsSeenInMirrorsWhereItStands) {
     ArenaBuilder builder;
     // Blue towards +x, red towards −x.

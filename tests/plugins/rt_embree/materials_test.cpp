@@ -198,6 +198,18 @@ TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
     EXPECT_GT(counts.at(153), 100);
 }
 
+TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
+    ArenaBuilder builder;
+    builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
+                       ARHOST_CATCHER);
+    builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
+                       builder.add_material(clear_glass()));
+    for (const float x : {-70.0f, 13.0f, 90.0f})
+        builder.add_light(light(x, 2 * x, 500, 0.3f + 0.001f * x));
+    const auto counts = Tracer(std::move(builder)).render(from_above()).alphas();
+    EXPECT_EQ(counts, (std::map<int, int>{{77, 200 * 150}}));
+}
+
 TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
     const auto shadow = [](bool coloured) {
         ArenaBuilder builder;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What moves looks like what was built in that place.
+#include "embree_scene.hpp"
 #include "scene/motion.hpp"
 #include "tracer.hpp"
 #include "tree_quality.hpp"
@@ -114,6 +115,28 @@ TEST(TreeQuality, StaysWhileAMeshIsMovedScaledAndBent) {
     EXPECT_LT(quality.decay(view_of(sheet(5))), 1.3);
 }
 
+// Without a skin, glTF's meshes move and deform at once.
+TEST(Moving, AMeshMayMoveAndDeform) {
+    ArenaBuilder both = with_floor_and_light();
+    both.settings.duration_s = 1;
+    const std::uint32_t node = both.add_node({.animated = true, .morph_weights = {0}});
+    both.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+    both.add_channel({.node = node, .times = {0, 1}, .values = {500, 0, 0, 540, 0, 0}});
+    scene::TriangleMesh mesh = sheet(0), there = sheet(8);
+    const scene::TriangleMesh waves = sheet(16);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
+        mesh.positions[i].x -= 500; // far out of view, were it not moved
+        there.positions[i].x += 20;
+    }
+    const arhost_material blue = diffuse(0.2f, 0.4f, 0.8f);
+    both.add_object("sheet", both.add_triangles(mesh), both.add_material(blue), ARHOST_VIRTUAL, glm::mat4x3(1),
+                    {.moves = true, .deforms = true, .node = node});
+    ArenaBuilder still = with_floor_and_light();
+    still.add_object("sheet", still.add_triangles(there), still.add_material(blue));
+    expect_alike(at_time(std::move(both), 0.5), Tracer(std::move(still)).render(from_the_side()));
+}
+
 // Strips of a sheet that are pushed along themselves, each further than the one before.
 scene::TriangleMesh sheared(float amount) {
     scene::TriangleMesh mesh = sheet(4);
@@ -130,6 +153,45 @@ TEST(TreeQuality, DecaysWhereNeighboursPart) {
     EXPECT_GT(quality.decay(view_of(torn)), 1.3);
     quality.built(view_of(torn));
     EXPECT_NEAR(quality.decay(view_of(torn)), 1, 1e-9);
+}
+
+// A deforming sheet of 80,000 triangles, of which the measure takes a sample.
+TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
+    const auto sheet_sheared_by = [](float amount) {
+        scene::TriangleMesh mesh = sheet(4, 200);
+        for (glm::vec3 &p : mesh.positions)
+            p.x += amount * std::round(p.y / 3);
+        mesh.positions.resize(mesh.positions.size() + 2); // spare bytes behind the last
+        return mesh.positions;
+    };
+    scene::TriangleMesh mesh = sheet(4, 200);
+    const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
+    ArenaBuilder builder;
+    builder.settings.duration_s = 1;
+    const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
+    builder.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+    mesh.morph_positions.resize(mesh.positions.size());
+    builder.add_object("sheet", builder.add_triangles(mesh), builder.add_material(flat(1, 1, 1)), ARHOST_VIRTUAL,
+                       glm::mat4x3(1), {.deforms = true, .node = node});
+    const scene::Arena arena = std::move(builder).build();
+    const arhost_host host = {sizeof host,
+                              ARHOST_ABI_VERSION,
+                              "test",
+                              "0",
+                              nullptr,
+                              [](const arhost_host *, arhost_severity, const char *) {},
+                              [](const arhost_host *, double, const char *) {},
+                              [](const arhost_host *) { return 0; },
+                              [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+    rt_embree::EmbreeScene scene(arena.scene(), 1, false, Host(&host));
+    std::vector<std::uint64_t> rebuilds;
+    for (const float amount : {0.1f, 40.0f, 40.0f, 0.1f}) {
+        const std::vector<glm::vec3> positions = sheet_sheared_by(amount);
+        const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
+        scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
+        rebuilds.push_back(scene.rebuilds());
+    }
+    EXPECT_EQ(rebuilds, (std::vector<std::uint64_t>{0, 1, 1, 2}));
 }
 
 // No tree is good then, and a new one is no better.

@@ -13,7 +13,7 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int64_t crash_at, hang_at, error_at;
+    int64_t crash_at, hang_at, error_at, answer;
     double delay_ms;
 };
 
@@ -31,6 +31,8 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
             self->hang_at = options[i].integer;
         else if (!strcmp(options[i].key, "error_at"))
             self->error_at = options[i].integer;
+        else if (!strcmp(options[i].key, "answer"))
+            self->answer = options[i].integer;
         else if (!strcmp(options[i].key, "delay_ms"))
             self->delay_ms = options[i].real;
         else if (!strcmp(options[i].key, "refuse") && options[i].integer) {
@@ -86,7 +88,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
         }
     info->has_region = 1;
     info->region_width = info->region_height = 16;
-    return ARHOST_OK;
+    return (arhost_status)self->answer;
 }
 
 static void stop(arhost_instance *self) {
@@ -99,6 +101,7 @@ static const arhost_option_descriptor options[] = {
      "Never returns from this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
      "Returns an error for this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "The status of each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL,
      "Sleeps so long in each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},

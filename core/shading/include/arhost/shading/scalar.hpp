@@ -8,7 +8,7 @@
 //   Float, Bool, Vec3      a number, the result of comparing two, three numbers; one lane or many
 //   vec3(x, y, z), select(b, yes, no), min, max, floor, pow, sqrt, dot
 //   cosine_of_turn(t), sine_of_turn(t)   of an angle of t full turns, 0 to 1
-// so that the same formulas serve scalars (here), SIMD packets (plugins/rt_embree/packet.hpp) and shaders.
+// so that the same formulas serve scalars (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders.
 #pragma once
 
 #include "vec3.hpp"

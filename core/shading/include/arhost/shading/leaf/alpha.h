@@ -7,17 +7,17 @@
 //   a catcher shadowed by something opaque                        153   0.6
 //   a virtual object                                              255   1
 
-// The alpha that one light's shadow gives a catcher. The stronger wins where both fall.
-ARHOST_LEAF Float shadow_alpha(Bool behind_opaque, Bool behind_translucent, Float alpha_opaque,
-                               Float alpha_translucent) {
-    return max(select(behind_opaque, alpha_opaque, Float(0.0)),
-               select(behind_translucent, alpha_translucent, Float(0.0)));
+// The part of the irradiance that lights would give which is hidden, `part` and `whole` being sums over the lights:
+// 1 exactly where all of it is. No light that could be hidden: none is.
+ARHOST_LEAF Float share_of_light(Float part, Float whole) {
+    return select(whole > Float(0.0), part / max(whole, Float(1e-30)), Float(0.0));
 }
 
-// Several lights: each one's alpha weighted by the irradiance that it would give, `weighted_alpha` and
-// `irradiance` being the sums over the lights. No light that could be hidden: no shadow.
-ARHOST_LEAF Float mean_shadow_alpha(Float weighted_alpha, Float irradiance) {
-    return select(irradiance > Float(0.0), weighted_alpha / max(irradiance, Float(1e-30)), Float(0.0));
+// A catcher's alpha, by the shares of light that opaque and that translucent objects hide. Where one share is 1 it is
+// that class's alpha to the last bit, as its code must be.
+ARHOST_LEAF Float shadow_alpha(Float opaque_share, Float translucent_share, Float alpha_opaque,
+                               Float alpha_translucent) {
+    return opaque_share * alpha_opaque + translucent_share * alpha_translucent;
 }
 
 // 0 to 1 as an 8-bit code, still as a Float: round to nearest.
