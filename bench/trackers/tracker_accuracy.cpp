@@ -12,7 +12,12 @@ namespace {
 
 using namespace arhost::test;
 
-RbtSequence::Frames measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
+struct Measured {
+    RbtSequence::Frames frames;
+    bool met; // 99 % found, corners to 0.3 px, distances to 1 %
+};
+
+Measured measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
     Tracker tracker(plugin, options);
     if (tracker.created() != ARHOST_OK)
         throw std::runtime_error(plugin + ": " + tracker.log());
@@ -22,7 +27,8 @@ RbtSequence::Frames measure(const RbtSequence &sequence, const std::string &plug
     std::printf("%-18s %6.2f %% (%d of %d) %8.3f %8.3f %10.3f %% %8.2f\n", plugin.c_str(),
                 100 * accuracy.found_share(), accuracy.found, accuracy.listed, mean(accuracy.corner_px),
                 percentile(accuracy.corner_px, 0.95), 100 * percentile(accuracy.distance, 0.5), percentile(ms, 0.5));
-    return frames;
+    return {frames, accuracy.found_share() >= 0.99 && mean(accuracy.corner_px) <= 0.3 &&
+                        percentile(accuracy.distance, 0.5) <= 0.01};
 }
 
 } // namespace
@@ -50,9 +56,9 @@ int main(int argc, char **argv) try {
                 "found", "px mean", "px p95", "dist. p50", "ms p50");
     const auto a = measure(sequence, "tracker_aruco", aruco);
     const auto b = measure(sequence, "tracker_apriltag", april_tag);
-    std::printf("corners of the two trackers apart: p95 %.3f px\n",
-                percentile(RbtSequence::disagreement_px(a, b), 0.95));
-    return 0;
+    const double apart = percentile(RbtSequence::disagreement_px(a.frames, b.frames), 0.95);
+    std::printf("corners of the two trackers apart: p95 %.3f px\n", apart);
+    return a.met && b.met && apart <= 0.5 ? 0 : 1;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "tracker-accuracy: %s\n", error.what());
     return 1;

@@ -202,8 +202,16 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = std::filesystem::absolute(node->text()).lexically_normal();
-            if (!std::filesystem::is_character_file(**file)) // /dev/null takes both
+            // Where a link leads to: what is written in its place must not replace the link.
+            std::error_code error;
+            *file = std::filesystem::weakly_canonical(std::filesystem::absolute(node->text()), error);
+            if (error)
+                node->fail("can't be used: " + error.message() + "; choose another path");
+            const auto type = std::filesystem::status(**file, error).type();
+            using enum std::filesystem::file_type;
+            if (type != regular && type != not_found && type != character)
+                node->fail("'" + node->text() + "' is no regular file, or can't be reached; choose another path");
+            if (type != character) // /dev/null takes both
                 files.write(*node);
         }
     return configuration;

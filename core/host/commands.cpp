@@ -157,7 +157,7 @@ double cpu_seconds_of_host() {
 // Whole under its name, or not there: written beside it and renamed.
 bool write_whole(const fs::path &file, const char *key, Console &console, const std::string &text) {
     std::error_code ignored;
-    if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) { // /dev/null, say
+    if (fs::is_character_file(file, ignored)) { // /dev/null, say
         std::ofstream stream(file);
         if (stream << text << std::flush)
             return true;

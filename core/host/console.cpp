@@ -5,6 +5,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 namespace arhost::host {
@@ -85,6 +86,9 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
         if (const auto timing = statistics.stages.find(stage); timing != statistics.stages.end())
             line += fmt::format("  {} {:.1f} ms", stage, timing->second.percentile_ms(0.5));
     if (terminal_) {
+        winsize size{};
+        if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)
+            line.resize(size.ws_col - 1u); // a longer one would be two, of which only the last can be drawn anew
         line_->info("\r\033[K{}", line);
         line_shown_ = true;
     } else {

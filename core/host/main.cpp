@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <fcntl.h>
+#include <filesystem>
 #include <unistd.h>
 
 namespace {
@@ -125,6 +126,10 @@ int main(int argc, char **argv) {
         return run(arguments, launcher);
     } catch (const arhost::yaml::Error &error) {
         std::fprintf(stderr, "error: %s\n", error.what());
+        return bad_configuration;
+    } catch (
+        const std::filesystem::filesystem_error &error) { // a name too long, a folder that may not be looked into
+        std::fprintf(stderr, "error: %s: %s\n", error.path1().c_str(), error.code().message().c_str());
         return bad_configuration;
     } catch (const std::exception &error) {
         std::fprintf(stderr, "error: %s\n", error.what());

@@ -413,16 +413,29 @@ Way way_of(const Node &motion, bool is_sphere) {
         const glm::dvec3 by = node ? position_of(*node) : glm::dvec3(0);
         values.insert(values.end(), {float(by.x), float(by.y), float(by.z)});
     });
-    channel("rotate", ARHOST_CHANNEL_ROTATION, [](const auto &node, std::vector<float> &values) {
-        glm::dvec3 axis(0, 0, 1);
-        double half = 0;
+    bool is_first = true;
+    glm::dvec3 axis(0, 0, 1);
+    double degrees_before = 0;
+    channel("rotate", ARHOST_CHANNEL_ROTATION, [&](const auto &node, std::vector<float> &values) {
+        const glm::dvec3 axis_before = axis;
+        double degrees = 0;
         if (node) {
             node->allow_keys({"axis", "degrees"});
             axis = direction_of(node->require("axis"));
-            half = std::fmod(node->require("degrees").real(), 720) * std::numbers::pi / 360;
+            degrees = node->require("degrees").real(-1e6, 1e6);
         }
-        axis *= std::sin(half);
-        values.insert(values.end(), {float(axis.x), float(axis.y), float(axis.z), float(std::cos(half))});
+        // From one axis to another the way is the shorter one in any case.
+        const bool about_one = degrees_before == 0 || degrees == 0 || glm::length(axis - axis_before) < 1e-9;
+        const double turn = std::abs(degrees - degrees_before);
+        if (!is_first && about_one && turn >= 180)
+            (node ? *node : keys_node)
+                .fail("turns by " + std::to_string(std::lround(turn)) +
+                      " degrees since the key before, and must turn by less than 180; add a key between the two");
+        is_first = false;
+        degrees_before = degrees;
+        const double half = std::fmod(degrees, 720) * std::numbers::pi / 360;
+        const glm::dvec3 part = axis * std::sin(half);
+        values.insert(values.end(), {float(part.x), float(part.y), float(part.z), float(std::cos(half))});
     });
     channel("scale", ARHOST_CHANNEL_SCALE, [&](const auto &node, std::vector<float> &values) {
         const glm::dvec3 by = node ? number_or_vector(*node) : glm::dvec3(1);

@@ -74,6 +74,7 @@ std::vector<std::uint32_t> neighbours(const MeshView &mesh) {
     }
     std::sort(keyed.begin(), keyed.end());
     std::vector<std::uint32_t> order;
+    order.reserve(keyed.size());
     for (const auto &[key, triangle] : keyed)
         order.push_back(triangle);
     return order;

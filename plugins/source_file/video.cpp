@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <thread>
 
 namespace arhost {
@@ -25,6 +27,19 @@ template <class T> T *allocated(T *pointer) {
     return pointer;
 }
 
+// An AVI says how long its data are; its header's count is of time slots, of which some may be empty (Microsoft, AVI
+// RIFF File Reference). Whether `file` is one and shorter than that; none where it is no AVI.
+std::optional<bool> is_short_avi(const std::filesystem::path &file) {
+    std::ifstream stream(file, std::ios::binary);
+    unsigned char head[12] = {};
+    stream.read(reinterpret_cast<char *>(head), sizeof head);
+    if (!stream || std::memcmp(head, "RIFF", 4) != 0 || std::memcmp(head + 8, "AVI ", 4) != 0)
+        return std::nullopt;
+    const std::uint64_t size = head[4] | head[5] << 8 | head[6] << 16 | std::uint64_t{head[7]} << 24;
+    std::error_code error;
+    return std::filesystem::file_size(file, error) < size + 8 && !error;
+}
+
 } // namespace
 
 Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
@@ -36,6 +51,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
         return Failure(ARHOST_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
     };
     log_.take_reason();
+    short_avi_ = is_short_avi(file);
 
     AVFormatContext *context = allocated(avformat_alloc_context());
     context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
@@ -152,10 +168,11 @@ void Decoder::take_time() {
 void Decoder::finish() {
     ended_ = true;
     const std::uint64_t declared = declared_count();
-    if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && packets_ >= declared)
+    const bool has_all = short_avi_ ? !*short_avi_ : packets_ >= declared;
+    if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
     cut_short_ = name_ + " is cut short: it ends after frame " + std::to_string(count_ - 1);
-    if (declared > count_)
+    if (declared > count_ && !short_avi_)
         cut_short_ += " of " + std::to_string(declared);
     cut_short_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
 }

@@ -55,6 +55,7 @@ private:
     std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
     bool lost_data_ = false; // since the last picture
     bool ended_ = false;
+    std::optional<bool> short_avi_;
     int read_error_ = 0;                    // what ended the reading, if not the file's end
     std::string decoder_fault_, end_fault_; // what libav said in passing, and when it met the end
     std::string damage_, cut_short_;

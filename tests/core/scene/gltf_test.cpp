@@ -391,4 +391,8 @@ TEST(YamlMotion, TellsWhatIsWrong) {
                 HasSubstr("keys[0].scale: each factor must be 1e-6 to 1e6"));
     EXPECT_THAT(error("[{at_s: 0, scale: [1, 1, 2]}, {at_s: 1}]"), HasSubstr("scales a sphere unevenly"));
     EXPECT_THAT(error("[{at_s: 0, spin: 3}, {at_s: 1}]"), HasSubstr("keys[0].spin: unknown key"));
+    EXPECT_THAT(
+        error("[{at_s: 0}, {at_s: 1, rotate: {axis: [0, 0, 1], degrees: 180}}]"),
+        HasSubstr("keys[1].rotate: turns by 180 degrees since the key before, and must turn by less than 180"));
+    EXPECT_THAT(error("[{at_s: 0, rotate: {axis: [1, 0, 0], degrees: -270}}, {at_s: 1}]"), HasSubstr("turns by 270"));
 }

@@ -662,6 +662,18 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
     }
 }
 
+TEST(Video, InAviMayHaveFewerFramesThanItsHeaderHasSlots) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
+    ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // its header says 80
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_OK) << source.log();
+    const auto frames = source.read_all();
+    EXPECT_EQ(frames.size(), 41u);
+    EXPECT_EQ(frames.back().status, ARHOST_END);
+    EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
+}
+
 TEST(Video, WithoutItsIndexSaysWhatIsMissing) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264); // its index lies at the end
