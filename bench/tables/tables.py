@@ -35,7 +35,8 @@ TABLES = {
         "CS": ("vkray-cs", FAR, 30.19, 59.79), "B": ("vkray-b", FAR, 30.15, 59.75),
         "HB": ("vkray-hb", FAR, 30.07, 29.99), "HBF": ("vkray-hbf", FAR, 30.32, 59.51),
         "MD": ("vkray-md", FAR, 15.16, 15.01), "CMD": ("vkray-md", CLOSE, 5.73, 5.98)}}
-# File → title; the scenes that the camera approaches; what the dissertation measured at either end stands in the table.
+# File → title; the scenes that the camera approaches: far, and close where the table has that, too. The circles in the
+# figures are the author's frame rates of the ray tracer alone.
 FIGURES = {
     "figure-23.svg": ("Figure 23: the camera approaches, OptiX scenes", "Table 3 (OptiX)", [("GL", "CGL"), ("GD", "CGD")]),
     "figure-26.svg": ("Figure 26: the camera approaches, VKRay scenes", "Table 4 (VKRay)", [("CS", None), ("MD", "CMD")])}
