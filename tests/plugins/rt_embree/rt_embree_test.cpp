@@ -169,6 +169,48 @@ TEST(Alpha, ACatcherFacingAwayIsNotThere) {
     EXPECT_GT(counts.at(255), 300) << "the ball is seen through the floor";
 }
 
+// A room of catchers that face inwards, with a mirror ball in it.
+TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    builder.settings.background = glm::vec3(0, 0, 1); // seen nowhere: the room is closed
+    scene::TriangleMesh room = cube(100);
+    for (auto &triangle : room.triangles)
+        std::swap(triangle[1], triangle[2]);
+    builder.add_object("room", builder.add_triangles(room), builder.add_material(flat(0.5f, 0.25f, 0)),
+                       ARHOST_CATCHER);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 30}}), builder.add_material(mirror(1)));
+    Tracer tracer(std::move(builder));
+    for (const double distance : {350.0, 90.0}) { // outside, inside
+        const Picture picture = tracer.render(camera({0, -distance, 0}, {0, 0, 0}, {0, 0, 1}));
+        EXPECT_EQ(picture.alpha(2, 2), 0) << distance;
+        EXPECT_EQ(picture.alphas().size(), 2u) << "nothing, and the ball";
+        EXPECT_EQ(picture.alpha(99, 74), 255);
+        for (const int x : {90, 99, 108}) {
+            EXPECT_TRUE(is_code_of(picture.at(static_cast<std::uint32_t>(x), 74)[0], 0.5)) << distance;
+            EXPECT_TRUE(is_code_of(picture.at(static_cast<std::uint32_t>(x), 74)[1], 0.25));
+            EXPECT_EQ(picture.at(static_cast<std::uint32_t>(x), 74)[2], 0);
+        }
+    }
+}
+
+TEST(Alpha, OfShadowsIsTheScenes) {
+    ArenaBuilder builder;
+    builder.settings.shadow_alpha_opaque = 0.8f;
+    builder.settings.shadow_alpha_translucent = 0.1f;
+    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(flat(1, 1, 1)),
+                       ARHOST_CATCHER);
+    arhost_material glass = scene::make_material(ARHOST_GLASS);
+    glass.index = 1.5f;
+    builder.add_object("glass", builder.add_spheres({{-20, 0, 25, 12}}), builder.add_material(glass));
+    builder.add_object("ball", builder.add_spheres({{20, 0, 25, 12}}), builder.add_material(flat(1, 0, 0)));
+    builder.add_light(light(0, -20, 300, 1));
+    const auto counts = Tracer(std::move(builder)).render(from_the_side()).alphas();
+    EXPECT_EQ(counts.size(), 4u);
+    EXPECT_GT(counts.at(26), 100);
+    EXPECT_GT(counts.at(204), 100);
+}
+
 TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
     // A table top between the ball and the floor: the shadow falls on the top, and through it on the floor,
     // where the top hides it.
