@@ -8,7 +8,7 @@
 namespace rt_embree {
 namespace {
 
-constexpr std::size_t group = 16, sample = 4096; // triangles
+constexpr std::size_t group = 16, sample = 1024; // triangles
 
 struct Bounds {
     float low[3], high[3];
@@ -55,7 +55,8 @@ std::uint32_t spread(std::uint32_t bits) {
 
 // Of every so many a triangle, along a Morton curve.
 std::vector<std::uint32_t> neighbours(const MeshView &mesh) {
-    const auto stride = std::max<std::uint32_t>(1, static_cast<std::uint32_t>(mesh.triangle_count / sample));
+    const auto stride =
+        std::max<std::uint32_t>(1, static_cast<std::uint32_t>((mesh.triangle_count + sample - 1) / sample));
     std::vector<Bounds> boxes;
     Bounds all;
     for (std::uint32_t i = 0; i < mesh.triangle_count; i += stride) {

@@ -18,7 +18,7 @@ struct MeshView {
 // What rays pay for boxes is the boxes' area (MacDonald and Booth, Heuristics for Ray Tracing Using Space
 // Subdivision, 1990). Embree's own boxes can't be seen, so this measures boxes of its own, round groups of
 // triangles that were neighbours when the tree was built, against groups of those that are neighbours now: what a
-// new tree would have. It looks at some thousand triangles, so that it costs little however large the mesh is.
+// new tree would have. It looks at a thousand triangles or so, so that it costs little however large the mesh is.
 class TreeQuality {
 public:
     // Takes the triangles' present neighbourhood for that of a tree that is built now.

@@ -185,7 +185,7 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
                               [](const arhost_host *, const char *) -> const void * { return nullptr; }};
     rt_embree::EmbreeScene scene(arena.scene(), 1, false, Host(&host));
     std::vector<std::uint64_t> rebuilds;
-    for (const float amount : {0.1f, 40.0f, 40.0f, 0.1f}) {
+    for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         const std::vector<glm::vec3> positions = sheet_sheared_by(amount);
         const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
