@@ -8,6 +8,7 @@ mode) and in the whole chain (--with-pipeline: one preloaded image again and aga
 Leaves build/tables/tables.json, figure-23.svg and figure-26.svg."""
 import csv
 import json
+import math
 import os
 import pathlib
 import statistics
@@ -135,7 +136,6 @@ def smoothed(rows):
 def draw(file, title, curves, marks):
     """curves: (label, colour, dashed, points); marks: (label, colour, x, frames a second). Frames a second are drawn
     on a logarithmic axis."""
-    import math
     left, top, width, height = 60, 50, 620, 330
     values = [y for _, _, _, points in curves for _, y in points] + [y for _, _, _, y in marks]
     low, high = math.floor(math.log2(min(values))), math.ceil(math.log2(max(values)))

@@ -100,14 +100,15 @@ public:
             path.fail("'" + path.text() + "' is a file that this run reads; choose another path");
     }
 
-private:
-    // The same for all paths to it, links included.
+    // The same for all paths to a file, links included.
     static std::filesystem::path real(const std::filesystem::path &file) {
         std::error_code error;
         const std::filesystem::path canonical =
             std::filesystem::weakly_canonical(std::filesystem::absolute(file), error);
         return error ? std::filesystem::absolute(file).lexically_normal() : canonical;
     }
+
+private:
     std::map<std::filesystem::path, bool> files_; // whether it is written
 };
 
@@ -202,11 +203,8 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            // Where a link leads to: what is written in its place must not replace the link.
+            *file = FilesInUse::real(node->text()); // of a link, which is not to be replaced, where it leads to
             std::error_code error;
-            *file = std::filesystem::weakly_canonical(std::filesystem::absolute(node->text()), error);
-            if (error)
-                node->fail("can't be used: " + error.message() + "; choose another path");
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;
             if (type != regular && type != not_found && type != character)

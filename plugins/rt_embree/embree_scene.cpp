@@ -37,7 +37,7 @@ unsigned mask_of(const Object &object) {
 
 // Normals get their length later, so that of the inverse, which is the cofactors by the determinant, only the
 // latter's sign counts: it keeps a mirrored object's outside outside.
-void place(Object &object, const float *m) {
+void set_transform(Object &object, const float *m) {
     std::copy_n(m, 9, object.transform);
     double cofactor[9];
     for (int column = 0; column < 3; ++column) {
@@ -60,7 +60,6 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.material = &elements<arhost_material>(arena, arena.materials)[from.material];
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
-    place(object, from.world_from_object);
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
     if (geometry.type == ARHOST_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
@@ -161,9 +160,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
         places_.push_back({local_box(arena, object), {}});
-        std::copy_n(object.world_from_object, 12, places_.back().world_from_object.begin());
         visible_boxes_.push_back(empty_box());
-        update_visible_box(number);
+        place_object(number, object.world_from_object);
         view_.has_catchers |= object.role == ARHOST_CATCHER;
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
@@ -218,11 +216,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
 void EmbreeScene::move(const arhost_motion &motion) {
     for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
         const arhost_moved_object &moved = motion.moved[i];
-        Object &object = objects_[moved.object];
-        object.has_transform = true;
-        place(object, moved.world_from_object);
-        std::copy_n(moved.world_from_object, 12, places_[moved.object].world_from_object.begin());
-        update_visible_box(moved.object);
+        objects_[moved.object].has_transform = true;
+        place_object(moved.object, moved.world_from_object);
         const RTCGeometry instance = rtcGetGeometry(root_.get(), moved.object);
         rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, moved.world_from_object);
         rtcCommitGeometry(instance);
@@ -262,6 +257,12 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     rtcCommitGeometry(instance); // its bounds have changed
     places_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
     update_visible_box(deformed.object);
+}
+
+void EmbreeScene::place_object(std::uint32_t object, const float *world_from_object) {
+    set_transform(objects_[object], world_from_object);
+    std::copy_n(world_from_object, 12, places_[object].world_from_object.begin());
+    update_visible_box(object);
 }
 
 void EmbreeScene::update_visible_box(std::uint32_t object) {

@@ -77,6 +77,7 @@ private:
         Box local;
         std::array<float, 12> world_from_object;
     };
+    void place_object(std::uint32_t object, const float *world_from_object);
     void update_visible_box(std::uint32_t object);
     std::vector<Object> objects_;
     std::vector<Place> places_;

@@ -138,8 +138,8 @@ TEST(Moving, AMeshMayMoveAndDeform) {
 }
 
 // Strips of a sheet that are pushed along themselves, each further than the one before.
-scene::TriangleMesh sheared(float amount) {
-    scene::TriangleMesh mesh = sheet(4);
+scene::TriangleMesh sheared(float amount, unsigned n = 40) {
+    scene::TriangleMesh mesh = sheet(4, n);
     for (glm::vec3 &p : mesh.positions)
         p.x += amount * std::round(p.y / 3);
     return mesh;
@@ -157,13 +157,6 @@ TEST(TreeQuality, DecaysWhereNeighboursPart) {
 
 // A deforming sheet of 80,000 triangles, of which the measure takes a sample.
 TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
-    const auto sheet_sheared_by = [](float amount) {
-        scene::TriangleMesh mesh = sheet(4, 200);
-        for (glm::vec3 &p : mesh.positions)
-            p.x += amount * std::round(p.y / 3);
-        mesh.positions.resize(mesh.positions.size() + 2); // spare bytes behind the last
-        return mesh.positions;
-    };
     scene::TriangleMesh mesh = sheet(4, 200);
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
     ArenaBuilder builder;
@@ -186,7 +179,8 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
     rt_embree::EmbreeScene scene(arena.scene(), 1, false, Host(&host));
     std::vector<std::uint64_t> rebuilds;
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
-        const std::vector<glm::vec3> positions = sheet_sheared_by(amount);
+        std::vector<glm::vec3> positions = sheared(amount, 200).positions;
+        positions.resize(vertices + 2); // spare bytes behind the last
         const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
         rebuilds.push_back(scene.rebuilds());
