@@ -113,7 +113,9 @@ public:
                 throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while painting the desk");
         };
         const int side = std::min(1024, static_cast<int>(256 / texel)); // the finest level covers the sheet
-        desk_.emplace(PyramidSize{side, static_cast<float>(texel), 1024}, threads_, paint_desk(sheet_, sensor_.seed),
+        // All cores, once: the rest of a run waits for a source that starts again.
+        const int cores = std::max(threads_, static_cast<int>(std::thread::hardware_concurrency()));
+        desk_.emplace(PyramidSize{side, static_cast<float>(texel), 1024}, cores, paint_desk(sheet_, sensor_.seed),
                       report);
         if (occlude_from_ >= 0)
             card_.emplace(PyramidSize{512, 0.5f, 128}, threads_, paint_card(sensor_.seed), [](double) {});
