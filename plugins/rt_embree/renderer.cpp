@@ -110,6 +110,9 @@ struct Pose {
     }
 };
 
+// Of a still picture: the noise that is left is below half a code. From then on it stays as it is.
+constexpr std::uint32_t enough_samples = 1u << 16;
+
 Camera camera_of(const Pose &pose) {
     Camera camera;
     const auto put = [](Vec3d from, float *to) {
@@ -175,7 +178,7 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), intrinsics_(checked(setup)), kernel_(choose_kernel(settings.instruction_set)),
       threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
-      samples_(sample_positions(settings.samples)),
+      samples_a_frame_(settings.samples), samples_(sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       one_path_(settings.one_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
@@ -200,11 +203,10 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
     std::array<float *, 4> history{};
     if (!history_.empty()) {
-        constexpr std::uint32_t enough = 1u << 20; // samples, which floats still sum up well
-        if (motion || !still_camera_ || !same_view(*still_camera_, camera) || history_samples_ > enough)
+        if (motion || !still_camera_ || !same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_ = camera;
-        samples_ = sample_positions(history_samples_, static_cast<std::int32_t>(samples_.size()));
+        samples_ = sample_positions(history_samples_, history_samples_ < enough_samples ? samples_a_frame_ : 0);
         for (std::size_t i = 0; i < 4; ++i)
             history[i] = history_.data() + i * (history_.size() / 4);
     }

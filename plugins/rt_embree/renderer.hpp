@@ -55,7 +55,8 @@ private:
     Kernel kernel_;
     ThreadPool threads_;
     RayTable ray_table_;
-    std::vector<Sample> samples_;
+    std::int32_t samples_a_frame_;
+    std::vector<Sample> samples_; // of this frame
     EmbreeScene scene_;
     std::vector<ScratchMemory> scratch_; // one a thread
     std::int32_t light_samples_;

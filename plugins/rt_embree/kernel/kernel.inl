@@ -107,11 +107,13 @@ ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, 
     }
 }
 
-// Adds the sums of the frames before to those of this one, and keeps them.
+// Adds the sums of the frames before to those of this one, and keeps them. A frame may add no sample.
 ARHOST_INLINE void remember(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
     for (int i = 0; i < 4; ++i) {
         float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
-        if (frame.first_sample > 0)
+        if (frame.sample_count == 0)
+            store(sum, load(kept));
+        else if (frame.first_sample > 0)
             store(sum, load(kept) + load(sum));
         store(kept, load(sum));
     }
@@ -155,7 +157,7 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
     Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
     bool coloured[tile_pixels / lanes];
-    const bool averages = frame.sample_count > 1 || frame.history[0];
+    const bool averages = frame.sample_count != 1 || frame.history[0];
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
         work.sample = frame.first_sample + static_cast<std::uint32_t>(i);

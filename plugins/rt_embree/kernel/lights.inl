@@ -68,7 +68,7 @@ struct Passage {
 // The tint of the glass between surface points and a light.
 ARHOST_INLINE Vec3 tint_on_the_way(const Scene &scene, Vec3 origin, const Incidence &in, Bool active,
                                    Bool &is_tinted) {
-    constexpr int most_surfaces = 64;
+    constexpr int most_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
     Vec3 tint = white(), start = origin, left = in.way;
     for (int i = 0; i < most_surfaces && any(active); ++i) {
         RTCRayHit16 rays;

@@ -148,6 +148,9 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
                 reflects);
 }
 
+// Rays that would change no 8-bit code by half a step end.
+constexpr float least_throughput = 2e-3f;
+
 // A ray off a microfacet.
 ARHOST_INLINE void scatter_off_roughness(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
     const Vec3 x = first_axis_across(s.normal), y = second_axis_across(s.normal);
@@ -161,7 +164,7 @@ ARHOST_INLINE void scatter_off_roughness(Work &work, const Paths &paths, const S
     const Vec3 share = schlick(s.specular, dot(to_eye, half_way)) * ggx_unmasked(cosine, s.alpha);
     const Vec3 throughput = paths.throughput * share;
     active = active & (cosine > Float(0.0f)) & (dot(direction, s.geometric_normal) > Float(0.0f)) &
-             (largest(throughput) > Float(2e-3f));
+             (largest(throughput) > Float(least_throughput));
     if (any(active))
         send_on(work, paths, s.position + s.geometric_normal * s.offset, direction, throughput, active);
 }

@@ -540,6 +540,31 @@ TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
     EXPECT_EQ(render(still), first) << "it begins anew";
 }
 
+TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
+    ArenaBuilder builder = sphere_over_catcher();
+    arhost_light bulb = arhost::scene::make_light(ARHOST_SPHERE_LIGHT);
+    set3(bulb.position, -60, -20, 200);
+    bulb.radius = 40;
+    builder.add_light(bulb);
+    Tracer tracer(std::move(builder), {{"accumulate", "true"}, {"samples", "64"}});
+    arhost_intrinsics tiny = pinhole();
+    tiny.fx = tiny.fy = tiny.fx / 20;
+    tiny.width = tiny.height = 8;
+    tiny.cx = tiny.cy = 3.5;
+    const arhost_camera still = from_the_side(tiny);
+    ASSERT_EQ(tracer.start(tiny), ARHOST_OK);
+    const auto after = [&](int frames) {
+        Picture picture(tiny);
+        for (int i = 0; i < frames; ++i)
+            EXPECT_EQ(tracer.try_render(still, picture), ARHOST_OK);
+        return picture.pixels();
+    };
+    const auto first = after(1), enough = after(65536 / 64 - 1);
+    EXPECT_NE(first, enough);
+    EXPECT_EQ(after(1), enough);
+    EXPECT_EQ(after(20), enough);
+}
+
 TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
     constexpr int count = 8;
     const arhost_intrinsics in = pinhole();
