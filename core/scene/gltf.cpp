@@ -819,18 +819,32 @@ private:
         material.metallic_roughness_texture = texture_of(pbr.metallicRoughnessTexture, false);
         material.normal_texture = texture_of(from.normalTexture, false);
         material.emission_texture = texture_of(from.emissiveTexture, true);
-        if (from.alphaMode == "MASK" || from.alphaMode == "BLEND") {
-            const double alpha = pbr.baseColorFactor.size() > 3 ? pbr.baseColorFactor[3] : 1;
-            const double cutoff = from.alphaMode == "MASK" ? from.alphaCutoff : 0.5;
-            if (from.alphaMode == "BLEND")
-                watch_.info(name_ + ": the material '" + printable(from.name) + "' is " +
-                            (material.colour_texture == ARHOST_NONE
-                                 ? "translucent, and drawn opaque; 'material' may give it glass"
-                                 : "blended, and drawn with holes where its alpha is below 0.5"));
-            if (material.colour_texture != ARHOST_NONE) // of the texture's alpha times the factor
-                material.alpha_cutoff = alpha > 0 ? number(cutoff / alpha, 1) : 1;
-        }
+        settle_alpha(from, material);
         return material;
+    }
+
+    void settle_alpha(const tinygltf::Material &from, arhost_material &material) const {
+        const bool is_blended = from.alphaMode == "BLEND";
+        if (from.alphaMode == "OPAQUE" || from.alphaMode.empty())
+            return;
+        if (!is_blended && from.alphaMode != "MASK")
+            accessors_.fail("the material '" + printable(from.name) + "' has the alphaMode '" +
+                            printable(from.alphaMode) + "', which must be OPAQUE, MASK or BLEND");
+        const std::vector<double> &factors = from.pbrMetallicRoughness.baseColorFactor;
+        const double alpha = factors.size() > 3 ? factors[3] : 1, cutoff = is_blended ? 0.5 : from.alphaCutoff;
+        if (!(cutoff >= 0))
+            accessors_.fail("the material '" + printable(from.name) + "' has an alphaCutoff below 0");
+        const bool is_textured = material.colour_texture != ARHOST_NONE;
+        const auto tell = [&](const char *what) {
+            watch_.info(name_ + ": the material '" + printable(from.name) + "' is " + what);
+        };
+        if (is_blended)
+            tell(is_textured ? "blended, and drawn with holes where its alpha is below 0.5"
+                             : "translucent, and drawn opaque; 'material' may give it glass");
+        else if (alpha < cutoff && !is_textured)
+            tell("a hole everywhere by its alphaCutoff, and drawn opaque");
+        if (is_textured) // the cutoff is of the texture's alpha times the factor
+            material.alpha_cutoff = alpha > 0 ? static_cast<float>(std::min(cutoff / alpha, 1.0)) : 1;
     }
 
     template <class Info> std::uint32_t texture_of(const Info &info, bool is_colour) {

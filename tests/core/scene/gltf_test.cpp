@@ -11,9 +11,11 @@
 using namespace arhost::scene;
 using namespace arhost::scene::test;
 using arhost::test::ScratchFolder;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::FloatNear;
 using testing::HasSubstr;
+using testing::Not;
 
 namespace {
 
@@ -237,6 +239,23 @@ TEST(Gltf, ReadsMaterialsAndTextures) {
     EXPECT_EQ(textures[m.normal_texture].wrap_u, ARHOST_WRAP_REPEAT);
     EXPECT_EQ(m.emission_texture, ARHOST_NONE);
     EXPECT_EQ(at<std::uint8_t>(arena, textures[m.colour_texture].texels)[2], 3);
+}
+
+TEST(Gltf, TellsWhatItMakesOfAlpha) {
+    const auto with = [](const std::string &material) {
+        Gltf gltf = triangle();
+        gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]})";
+        gltf.more = R"(, "materials": [{"name": "leaf", )" + material + "}]";
+        return gltf.text();
+    };
+    EXPECT_THAT(error_of(with(R"("alphaMode": "HASHED")")),
+                HasSubstr("the material 'leaf' has the alphaMode 'HASHED', which must be OPAQUE, MASK or BLEND"));
+    EXPECT_THAT(error_of(with(R"("alphaMode": "MASK", "alphaCutoff": -1)")), HasSubstr("an alphaCutoff below 0"));
+    EXPECT_THAT(load(with(R"("alphaMode": "BLEND")")).info, Contains(HasSubstr("'leaf' is translucent, and drawn")));
+    EXPECT_THAT(
+        load(with(R"("alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]})")).info,
+        Contains(HasSubstr("'leaf' is a hole everywhere by its alphaCutoff")));
+    EXPECT_THAT(load(with(R"("alphaMode": "MASK")")).info, Not(Contains(HasSubstr("'leaf'"))));
 }
 
 TEST(Gltf, RestsWithoutAnAnimation) {
