@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // How long the Embree ray tracer takes for an image, and how much of what Embree could do at best is
-// left: `rt-embree-bench [threads [instruction_set]]`.
+// left: `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass]]]`.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -184,23 +184,35 @@ int main(int argc, char **argv) {
     }
     TriangleMesh flat = mesh;
     flat.normals.clear();
-    const Arena unlit = scene_of(flat, diffuse, false), lit = scene_of(mesh, diffuse, true),
-                mirrored = scene_of(mesh, mirror, true);
+    const std::string only = argc > 3 ? argv[3] : "";
+    const auto wanted = [&](const char *name) { return only.empty() || only == name; };
 
-    Trial visibility(unlit, settings);
-    const Timing visible = visibility.time();
-    std::printf(
-        "%s of %zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; p50 of %d frames\n",
-        name, mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
-        visibility.renderer().kernel_name(), 100 * visibility.covered(), rounds);
-    report("primary visibility", visible);
-    const auto compare = [&](const char *what, const Timing &bare) {
-        report(what, bare);
-        std::printf("%-28s %7.1f %%    %7.1f %%\n", "primary's speed to that", 100 * bare.ms / visible.ms,
-                    100 * bare.cpu_ms / visible.cpu_ms);
+    if (wanted("primary")) {
+        const Arena unlit = scene_of(flat, diffuse, false);
+        Trial visibility(unlit, settings);
+        const Timing visible = visibility.time();
+        std::printf("%s of %zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; "
+                    "p50 of %d frames\n",
+                    name, mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
+                    visibility.renderer().kernel_name(), 100 * visibility.covered(), rounds);
+        report("primary visibility", visible);
+        const auto compare = [&](const char *what, const Timing &bare) {
+            report(what, bare);
+            std::printf("%-28s %7.1f %%    %7.1f %%\n", "primary's speed to that", 100 * bare.ms / visible.ms,
+                        100 * bare.cpu_ms / visible.cpu_ms);
+        };
+        if (only.empty()) {
+            compare("bare rtcIntersect16 loop", time_bare_intersect(unlit, settings, false));
+            compare("bare loop, native packets", time_bare_intersect(unlit, settings, true));
+        }
+    }
+    const auto time = [&](const char *key, const char *what, const arhost_material &material) {
+        if (!wanted(key))
+            return;
+        const Arena arena = scene_of(mesh, material, true);
+        report(what, Trial(arena, settings).time());
     };
-    compare("bare rtcIntersect16 loop", time_bare_intersect(unlit, settings, false));
-    compare("bare loop, native packets", time_bare_intersect(unlit, settings, true));
-    report("diffuse and shadows", Trial(lit, settings).time());
-    report("mirror, up to 10 bounces", Trial(mirrored, settings).time());
+    time("diffuse", "diffuse and shadows", diffuse);
+    time("mirror", "mirror, up to 10 bounces", mirror);
+    time("glass", "glass, the tree to depth 10", make_material(ARHOST_GLASS));
 }

@@ -9,6 +9,7 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <cstddef>
 #include <type_traits>
 
 // Always, since the kernels are compiled for several instruction sets and must not share a copy.
@@ -77,12 +78,17 @@ RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays
 #endif
 }
 
-// The same for 16 rays, in narrower packets. Both kinds of packet are rows of 4-byte numbers, one a ray.
+// The same for 16 rays, in narrower packets. Both kinds of packet are rows of 4-byte numbers, one a ray; only those
+// are copied that Embree reads (the ray, and the hit from geomID on) or writes (tfar, the hit). A row is moved as one
+// register: the processor forwards no two stores to one load.
 template <auto function, class Part, class Rays>
 RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &query, Rays &rays) {
     constexpr int parts = sizeof(Rays) / sizeof(Part), width = 16 / parts;
-    constexpr int rows = sizeof(Rays) / (16 * sizeof(int)), row_bytes = width * sizeof(int);
-    static_assert(sizeof(Rays) == parts * sizeof(Part) && sizeof(Part) == rows * row_bytes);
+    constexpr int row_count = sizeof(Rays) / (16 * sizeof(int)), ray_rows = sizeof(RTCRay16) / (16 * sizeof(int));
+    constexpr int tfar = offsetof(RTCRay16, tfar) / (16 * sizeof(int));
+    constexpr int geometry = (sizeof(RTCRay16) + offsetof(RTCHit16, geomID)) / (16 * sizeof(int));
+    typedef int Row __attribute__((vector_size(width * sizeof(int))));
+    static_assert(sizeof(Rays) == parts * sizeof(Part) && sizeof(Part) == row_count * sizeof(Row));
     for (int part = 0; part < parts; ++part, valid += width) {
         int any = 0;
         for (int i = 0; i < width; ++i)
@@ -90,13 +96,20 @@ RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &qu
         if (!any)
             continue;
         Part narrow;
-        char *const from = reinterpret_cast<char *>(&rays) + part * row_bytes,
-                    *to = reinterpret_cast<char *>(&narrow);
-        for (int row = 0; row < rows; ++row)
-            __builtin_memcpy(to + row * row_bytes, from + row * parts * row_bytes, row_bytes);
+        char *const wide_rows = reinterpret_cast<char *>(&rays) + part * sizeof(Row),
+                    *const rows = reinterpret_cast<char *>(&narrow);
+        const auto copy = [](char *to, const char *from) __attribute__((always_inline)) {
+            Row row;
+            __builtin_memcpy(&row, from, sizeof row);
+            __builtin_memcpy(to, &row, sizeof row);
+        };
+        for (int row = 0; row < row_count; ++row)
+            if (row < ray_rows || row >= geometry)
+                copy(rows + row * sizeof(Row), wide_rows + row * parts * sizeof(Row));
         trace<function>(valid, scene, query, narrow);
-        for (int row = 0; row < rows; ++row)
-            __builtin_memcpy(from + row * parts * row_bytes, to + row * row_bytes, row_bytes);
+        for (int row = tfar; row < row_count; ++row)
+            if (row == tfar || row >= ray_rows)
+                copy(wide_rows + row * parts * sizeof(Row), rows + row * sizeof(Row));
     }
 }
 

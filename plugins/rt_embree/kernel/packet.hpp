@@ -230,33 +230,48 @@ ARHOST_INLINE Float gather(const float *table, Int index) {
     return float_of(gather(reinterpret_cast<const int *>(table), index));
 }
 
-// Embree's arrays of 16.
+// Embree's arrays of 16. Register by register: whole packets GCC copies in halves of registers, which the
+// processor can't forward to the load that follows.
+template <class To> ARHOST_INLINE void load_registers(To &to, const void *from) {
+    if constexpr (requires { to.part; }) {
+        __builtin_memcpy(&to.part, from, sizeof to.part);
+    } else {
+        load_registers(to.low, from);
+        load_registers(to.high, static_cast<const char *>(from) + sizeof to.low);
+    }
+}
+template <class From> ARHOST_INLINE void store_registers(void *to, const From &from) {
+    if constexpr (requires { from.part; }) {
+        __builtin_memcpy(to, &from.part, sizeof from.part);
+    } else {
+        store_registers(to, from.low);
+        store_registers(static_cast<char *>(to) + sizeof from.low, from.high);
+    }
+}
 ARHOST_INLINE Float load(const float *from) {
     Float a;
-    __builtin_memcpy(&a, from, sizeof a);
+    load_registers(a.lane, from);
     return a;
-}
-ARHOST_INLINE Int load(const unsigned *from) {
-    Int a;
-    __builtin_memcpy(&a, from, sizeof a);
-    return a;
-}
-ARHOST_INLINE void store(float *to, Float a) {
-    __builtin_memcpy(to, &a, sizeof a);
 }
 ARHOST_INLINE Int load(const int *from) {
     Int a;
-    __builtin_memcpy(&a, from, sizeof a);
+    load_registers(a.lane, from);
     return a;
 }
+ARHOST_INLINE Int load(const unsigned *from) {
+    return load(reinterpret_cast<const int *>(from));
+}
+ARHOST_INLINE void store(float *to, Float a) {
+    store_registers(to, a.lane);
+}
 ARHOST_INLINE void store(int *to, Int a) {
-    __builtin_memcpy(to, &a, sizeof a);
+    store_registers(to, a.lane);
 }
 ARHOST_INLINE void store(unsigned *to, Int a) {
-    __builtin_memcpy(to, &a, sizeof a);
+    store_registers(to, a.lane);
 }
 ARHOST_INLINE void store(int *to, Bool a) {
-    __builtin_memcpy(to, &a, sizeof a);
+    store_registers(to, a.lane);
 }
 
 // log2 of a positive, normal number, to 2e-7: the mantissa brought to [√½, √2), then the odd series

@@ -89,7 +89,11 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     const Vec3 facet{load(hit.Ng_x), load(hit.Ng_y), load(hit.Ng_z)};
     const Vec3 step = direction * load(rays.ray.tfar);
 
-    Surface s{};
+    Surface s; // `= {}` would be a slow string instruction
+    s.ambient = s.diffuse = s.specular = s.emission = black();
+    s.exponent = s.alpha = Float(0.0f);
+    s.is_lit = s.is_rough = s.is_real = bool_of(false);
+    s.any_specular = s.any_rough = s.any_scattering = false;
     s.position = origin_of(rays.ray) + step;
     s.way = length(step);
     // A hit is as exact as the floats that it was computed from: 2^-24 of their size, a few times.
