@@ -96,8 +96,9 @@ RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &qu
         if (!any)
             continue;
         Part narrow;
-        char *const wide_rows = reinterpret_cast<char *>(&rays) + part * sizeof(Row),
-                    *const rows = reinterpret_cast<char *>(&narrow);
+        char *const wide_rows = reinterpret_cast<char *>(&rays) + part * sizeof(Row), *const rows =
+                                                                                          reinterpret_cast<char *>(
+                                                                                              &narrow);
         const auto copy = [](char *to, const char *from) __attribute__((always_inline)) {
             Row row;
             __builtin_memcpy(&row, from, sizeof row);
