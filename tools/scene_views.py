@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the scenes of config/scenes are seen from, in pictures and measurements."""
+"""Where the scenes of config/scenes are seen from, and when, in pictures and measurements."""
 
 # Scene → (eye, look_at) far and close, mm; z is up in demo and optix-*, y in vkray-*. The scenes of the
 # dissertation that are another's, seen close, are links in config/scenes, and are shown as its close view.
@@ -24,3 +24,6 @@ VIEWS = {
     "optix-skybox-lucy": (((50, -360, 170), (10, -30, 75)), ((20, -225, 100), (2, 0, 80))),
     "demo": (((0, -260, 170), (0, 0, 20)), ((0, -150, 100), (0, 0, 20))),
 }
+
+# The scene that moves has a picture of its own: from one place, at several times, in seconds.
+MOVING_VIEW, MOVING_TIMES = ((0, -250, 135), (6, 0, 40)), (0, 1, 2, 3, 4, 5)

@@ -6,7 +6,6 @@ to the CPU time of its plugins: tables.py [--quick] [overhead] [tables] [figures
 Each scene is traced twice on the same cameras, by the ray tracer alone (arhost replay, the dissertation's "pure"
 mode) and in the whole chain (--with-pipeline: one preloaded image again and again, tracker_aruco, sink_null).
 Leaves build/tables/tables.json, figure-23.svg and figure-26.svg."""
-import csv
 import json
 import math
 import os
@@ -16,14 +15,14 @@ import statistics
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
+HERE = pathlib.Path(__file__).resolve()
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "tools")]
+import replays  # noqa: E402
+from replays import BUILD, HEIGHT, ROOT, WIDTH, frames_a_second, write_trajectory  # noqa: E402
 from scene_views import VIEWS  # noqa: E402
 
-BUILD = ROOT / "build/release"
 OUT = ROOT / "build/tables"
 FRAME = OUT / "frame.png"
-WIDTH, HEIGHT = 800, 600
 
 # Dissertation's name → scene, view, frames a second with the middleware and of the ray tracer alone (GTX 1060;
 # its camera gave 30 a second).
@@ -48,40 +47,11 @@ def scene_file(scene):
     return ROOT / f"config/scenes/{scene}.yaml"
 
 
-def write_trajectory(file, eyes_and_targets, y_up):
-    """Eyes and points looked at, in mm, one a frame at 30 a second, through the dissertation's lens of 45 degrees."""
-    focal = HEIGHT / 2 / 0.41421356237309503
-    header = {"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 30,
-              "camera": {"width": WIDTH, "height": HEIGHT, "fx": focal, "fy": focal, "cx": (WIDTH - 1) / 2,
-                         "cy": (HEIGHT - 1) / 2}}
-    lines = [header]
-    for number, (eye, look_at) in enumerate(eyes_and_targets):
-        lines.append({"frame": number, "capture_ns": number * 1_000_000_000 // 30, "eye": list(eye),
-                      "look_at": list(look_at), "up": [0, 1, 0] if y_up else [0, 0, 1]})
-    file.write_text("".join(json.dumps(line) + "\n" for line in lines))
-
-
 def replay(scene, trajectory, frames, with_pipeline):
-    """A run's statistics and its timeline."""
-    stats, timeline = OUT / "stats.json", OUT / "timeline.csv"
-    command = [BUILD / "bin/arhost", "replay", "--trajectory", trajectory, "--scene", scene_file(scene),
-               "--frames", str(frames), "--stats", stats, "--timeline", timeline,
-               "--set", "raytracer.start_deadline_ms=120000", "--set", "raytracer.deadline_ms=60000"]
-    if with_pipeline:
-        command += ["--with-pipeline", "--set",
-                    f"source={{plugin: source_file, path: \"{FRAME}\", options: {{frames: {frames}}}}}"]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr}")
-    with open(timeline, encoding="utf-8") as file:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-    return json.loads(stats.read_text()), rows, done.stderr
-
-
-def frames_a_second(rows):
-    """Over the later part of a run: the first frames meet cold caches and an empty pipeline."""
-    rows = rows[len(rows) // 5:]
-    return (len(rows) - 1) / (rows[-1]["shown_s"] - rows[0]["shown_s"])
+    """A run's statistics, its timeline and what it said."""
+    pipeline = ["--with-pipeline", "--set",
+                f"source={{plugin: source_file, path: \"{FRAME}\", options: {{frames: {frames}}}}}"]
+    return replays.replay(scene_file(scene), trajectory, frames, *(pipeline if with_pipeline else []))
 
 
 def make_frame():

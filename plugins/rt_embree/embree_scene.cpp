@@ -150,6 +150,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     root_ = new_scene(anything_moves ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
     if (anything_moves)
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
+    catchers_ = new_scene(RTC_SCENE_FLAG_NONE);
+    bool catchers_stand_alone = true;
     view_.has_instances = anything_moves;
     for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
         textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
@@ -166,13 +168,19 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
 
+        const bool is_instance = object.deforms || object.moves || objects_.back().has_transform;
+        if (object.role == ARHOST_CATCHER)
+            catchers_stand_alone &= !is_instance;
         if (object.deforms) {
             attach(root_.get(), new_instance(deforming_scene(number), object.world_from_object), number);
-        } else if (object.moves || objects_.back().has_transform) {
+        } else if (is_instance) {
             view_.has_instances = true;
             attach(root_.get(), new_instance(instanced_scene(number), object.world_from_object), number);
         } else {
-            attach(static_ ? static_.get() : root_.get(), new_geometry(number), number);
+            const GeometryHandle geometry = new_geometry(number);
+            attach(static_ ? static_.get() : root_.get(), geometry, number);
+            if (object.role == ARHOST_CATCHER)
+                rtcAttachGeometryByID(catchers_.get(), geometry.get(), number);
         }
     }
     view_.static_instance = -2;
@@ -186,8 +194,11 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         rtcAttachGeometryByID(root_.get(), instance.get(), static_cast<unsigned>(from.size()));
     }
     commit(root_.get());
+    if (catchers_stand_alone)
+        commit(catchers_.get());
 
     view_.root = root_.get();
+    view_.catchers = catchers_stand_alone ? catchers_.get() : root_.get();
     view_.packet_width = native_packet_width(device_.get());
     view_.objects = objects_.data();
     const auto lights = elements<arhost_light>(arena, arena.lights);

@@ -3,6 +3,7 @@
 // A picture of a scene file from a given place, by the Embree ray tracer: without a video, a tracker or a marker.
 #include "renderer.hpp"
 #include "scene/loader.hpp"
+#include "scene/motion.hpp"
 
 #include <CLI/CLI.hpp>
 #include <glm/trigonometric.hpp>
@@ -71,7 +72,7 @@ cv::Mat over_checkerboard(const cv::Mat &rgba) {
     return picture;
 }
 
-cv::Mat render(const std::string &file, View view, const rt_embree::Settings &settings) {
+cv::Mat render(const std::string &file, View view, double time_s, const rt_embree::Settings &settings) {
     arhost::scene::LoadCallbacks callbacks;
     callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
@@ -85,8 +86,15 @@ cv::Mat render(const std::string &file, View view, const rt_embree::Settings &se
         {sizeof(arhost_raytracer_setup), view.size[0], view.size[1], 0, &arena.scene(), &camera.intrinsics}, settings,
         arhost::Host(&for_messages));
     cv::Mat rgba(static_cast<int>(view.size[1]), static_cast<int>(view.size[0]), CV_8UC4);
-    renderer.render(
-        camera, {sizeof(arhost_image), static_cast<std::uint32_t>(rgba.step), view.size[0], view.size[1], rgba.data});
+    const arhost_image image{sizeof(arhost_image), static_cast<std::uint32_t>(rgba.step), view.size[0], view.size[1],
+                             rgba.data};
+    if (arena.scene().duration_s > 0) {
+        arhost::scene::MotionEvaluator evaluator(arena.scene());
+        const arhost_motion motion = evaluator.at(time_s);
+        renderer.render(camera, image, &motion);
+    } else {
+        renderer.render(camera, image);
+    }
     return rgba;
 }
 
@@ -98,7 +106,7 @@ int main(int argc, char **argv) {
     View view;
     rt_embree::Settings settings;
     settings.samples = 16;
-    settings.light_samples = 1;
+    double time_s = 0;
     bool transparent = false;
     app.add_option("scene", scene, "The scene file")->required();
     app.add_option("--eye", view.eye, "Where the camera is")->delimiter(',')->capture_default_str();
@@ -113,13 +121,20 @@ int main(int argc, char **argv) {
         ->delimiter('x')
         ->check(CLI::Range(1, 16384))
         ->capture_default_str();
+    app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
     app.add_option("--samples", settings.samples, "A pixel")->check(CLI::Range(1, 256))->capture_default_str();
+    app.add_option("--light-samples", settings.light_samples,
+                   "Shadow rays from each of them to a light that has an extent, or to the environment")
+        ->check(CLI::Range(1, 256))
+        ->capture_default_str();
     app.add_option("--label", label, "A line of text to write into the picture");
     app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
     app.add_option("--output,-o", output, "The file to write")->required();
     CLI11_PARSE(app, argc, argv);
     try {
-        const cv::Mat rgba = render(scene, view, settings);
+        const cv::Mat rgba = render(scene, view, time_s, settings);
         cv::Mat picture;
         if (transparent)
             cv::cvtColor(rgba, picture, cv::COLOR_RGBA2BGRA);

@@ -21,7 +21,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0};
     RTCRayHit16 rays;
     set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
-    const Bool hit = trace(scene, make_query(Coherence::coherent), rays, active);
+    const Bool hit = trace(scene, scene.root, make_query(Coherence::coherent), rays, active);
     Bool occluded = bool_of(false);
     if (scene.has_occluders)
         for_each_object(scene, rays.hit, hit, [&](const Object &object, Bool here) {
@@ -38,7 +38,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     if (scene.has_catchers && any(rest)) {
         RTCRayHit16 onwards;
         set_ray(onwards.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
-        const Bool caught = trace(scene, make_query(Coherence::coherent, true), onwards, rest);
+        const Bool caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), onwards, rest);
         if (any(caught)) {
             const CaughtShadow shadow = caught_shadow(work.frame, onwards, caught, random_of(work, paths));
             alpha = select(caught, shadow.alpha, alpha);

@@ -73,7 +73,7 @@ ARHOST_INLINE Vec3 tint_on_the_way(const Scene &scene, Vec3 origin, const Incide
     for (int i = 0; i < most_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
         set_ray(rays.ray, start, left, Float(in.end), Int(glass_mask));
-        active = trace(scene, make_query(Coherence::incoherent), rays, active);
+        active = trace(scene, scene.root, make_query(Coherence::incoherent), rays, active);
         if (!any(active))
             break;
         is_tinted = is_tinted | active;

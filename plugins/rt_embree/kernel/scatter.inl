@@ -213,7 +213,7 @@ ARHOST_INLINE void follow_packet(Work &work, std::uint32_t depth) {
     RTCRayHit16 rays;
     set_ray(rays.ray, {row(0), row(1), row(2)}, {row(3), row(4), row(5)}, Float(far_away), Int(all_masks));
     waiting.count = first;
-    const Bool hit = trace(work.frame.scene, make_query(Coherence::incoherent), rays, active);
+    const Bool hit = trace(work.frame.scene, work.frame.scene.root, make_query(Coherence::incoherent), rays, active);
     const Bool missed = active & ~hit;
     if (any(missed))
         add_light(work, paths, environment_light(work.frame.scene, direction_of(rays.ray)), missed);

@@ -62,12 +62,12 @@ ARHOST_INLINE Vec3 direction_of(const RTCRay16 &ray) {
 }
 
 // The closest hits of the active lanes. Returns which of them hit.
-ARHOST_INLINE Bool trace(const Scene &scene, Query query, RTCRayHit16 &rays, Bool active) {
+ARHOST_INLINE Bool trace(const Scene &scene, RTCScene tree, Query query, RTCRayHit16 &rays, Bool active) {
     alignas(64) int valid[lanes];
     store(valid, active);
     store(rays.hit.geomID, Int(no_hit));
     store(rays.hit.instID[0], Int(no_hit));
-    intersect16(valid, scene.root, scene.packet_width, query, rays);
+    intersect16(valid, tree, scene.packet_width, query, rays);
     return active & (load(rays.hit.geomID) != Int(no_hit));
 }
 

@@ -4,11 +4,13 @@
 // tools/get-models where there are any.
 #include "plugin_under_test.hpp"
 #include "scene/loader.hpp"
+#include "scene/motion.hpp"
 
 #include <glm/common.hpp>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 
@@ -23,6 +25,7 @@ const fs::path folder = fs::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes";
 // the mesh has by table 1.
 const std::map<std::string, std::size_t> faces = {
     {"demo", 0},
+    {"moving", 0},
     {"optix-cs", 0},
     {"optix-b", 4968},
     {"optix-hb", 1'087'451},
@@ -87,7 +90,8 @@ TEST_P(ShippedScene, LoadsWithAStandInOfTheDissertationsFaces) {
     fs::create_directories(scratch.path() / "config/scenes");
     const fs::path file = scratch.path() / "config/scenes" / (GetParam() + ".yaml");
     fs::copy_file(folder / file.filename(), file);
-    fs::create_directory_symlink(folder / "textures", file.parent_path() / "textures");
+    for (const char *shipped : {"meshes", "textures"})
+        fs::create_directory_symlink(folder / shipped, file.parent_path() / shipped);
     std::size_t warnings = 0;
     const std::size_t most = check(file, &warnings);
     const std::size_t expected = faces.contains(GetParam()) ? faces.at(GetParam()) : 0;
@@ -107,6 +111,51 @@ INSTANTIATE_TEST_SUITE_P(Config, ShippedScene, testing::ValuesIn(scene_names()),
     std::ranges::replace(name, '-', '_');
     return name;
 });
+
+// Everything is where it began when it begins again; on the way it is not.
+TEST(MovingScene, BeginsAgainWithoutAJump) {
+    const Arena arena = load_scene(folder / "moving.yaml").build();
+    MotionEvaluator evaluator(arena.scene());
+    const auto places_at = [&](double time_s) { // of all objects and vertices
+        const arhost_motion motion = evaluator.at(time_s);
+        std::vector<float> places;
+        for (std::uint32_t i = 0; i < motion.moved_count; ++i)
+            places.insert(places.end(), motion.moved[i].world_from_object + 9,
+                          motion.moved[i].world_from_object + 12);
+        for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
+            places.insert(places.end(), motion.deformed[i].positions,
+                          motion.deformed[i].positions + 3 * std::size_t(motion.deformed[i].vertex_count));
+        return places;
+    };
+    const auto largest_way = [&](double from_s, double to_s) {
+        const std::vector<float> from = places_at(from_s), to = places_at(to_s);
+        float largest = 0;
+        for (std::size_t i = 0; i < from.size(); ++i)
+            largest = std::max(largest, std::abs(from[i] - to[i]));
+        return largest;
+    };
+    const double loop_s = arena.scene().duration_s, moment_s = 1e-3;
+    EXPECT_EQ(evaluator.at(0).moved_count, 3u);
+    EXPECT_EQ(evaluator.at(0).deformed_count, 1u);
+    EXPECT_GT(largest_way(0, loop_s / 2), 50);
+    EXPECT_LT(largest_way(loop_s - moment_s, 0), 0.2);
+    for (double t = 0; t < loop_s; t += loop_s / 24) // nor does anything jump in between
+        EXPECT_LT(largest_way(t, t + moment_s), 0.2) << t;
+}
+
+// The script that has made its mesh.
+TEST(MakeTentacles, MakesAMeshOfAboutSoManyTriangles) {
+    const arhost::test::ScratchFolder scratch;
+    fs::create_directory(scratch.path() / "meshes");
+    const std::string command = ARHOST_SOURCE_DIRECTORY "/tools/make-tentacles --faces 20000 --output " +
+                                (scratch.path() / "meshes/tentacles.glb").string() + " > /dev/null";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    fs::copy_file(folder / "moving.yaml", scratch.path() / "moving.yaml");
+    fs::create_directory_symlink(folder / "textures", scratch.path() / "textures");
+    std::size_t warnings = 0;
+    EXPECT_NEAR(static_cast<double>(check(scratch.path() / "moving.yaml", &warnings)), 20000, 1000);
+    EXPECT_EQ(warnings, 0u);
+}
 
 // From a folder, so without a network.
 TEST(GetModels, PutsTheMeshesInPlace) {

@@ -6,6 +6,7 @@
 #include "tracer.hpp"
 #include "tree_quality.hpp"
 
+#include <glm/trigonometric.hpp>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -42,9 +43,8 @@ scene::TriangleMesh sheet(float height, unsigned n = 40) {
     return mesh;
 }
 
-Picture at_time(ArenaBuilder builder, double time_s) {
+Picture at_time(ArenaBuilder builder, double time_s, const arhost_camera &view = from_the_side()) {
     Tracer tracer(std::move(builder));
-    const arhost_camera view = from_the_side();
     EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(view.intrinsics);
@@ -63,6 +63,27 @@ void expect_alike(const Picture &a, const Picture &b) {
         for (std::size_t c = 0; c < 4; ++c)
             different += std::abs(these[i][c] - those[i][c]) > 1;
     EXPECT_LE(different, 20) << "of 120000 numbers: edges, by the last bit of a float";
+}
+
+// A square with normals of its own that faces the only light, which shines straight down, and the camera.
+constexpr float albedo = 0.8f;
+arhost_material white() {
+    return diffuse(albedo, albedo, albedo);
+}
+ArenaBuilder under_the_sun() {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.settings.duration_s = 2;
+    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    set3(sun.direction, 0, 0, -1);
+    set3(sun.intensity, 1, 1, 1);
+    builder.add_light(sun);
+    return builder;
+}
+scene::TriangleMesh square_with_normals() {
+    scene::TriangleMesh mesh = square(40);
+    mesh.normals.assign(4, {0, 0, 1});
+    return mesh;
 }
 
 rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
@@ -102,6 +123,49 @@ TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
     ArenaBuilder still = with_floor_and_light();
     still.add_object("sheet", still.add_triangles(sheet(8)), still.add_material(diffuse(0.2f, 0.4f, 0.8f)));
     expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
+}
+
+// Lambert: cos 60° of what it was. Were the normals left behind, it would be as bright as before.
+TEST(Moving, ASkinTurnsItsNormals) {
+    const auto turning = [] {
+        ArenaBuilder builder = under_the_sun();
+        const std::uint32_t joint = builder.add_node({.animated = true, .morph_weights = {}});
+        const float sine = std::sin(glm::radians(30.0f)), cosine = std::cos(glm::radians(30.0f)); // of half the angle
+        builder.add_channel({.node = joint,
+                             .target = ARHOST_CHANNEL_ROTATION,
+                             .times = {0, 1},
+                             .values = {0, 0, 0, 1, sine, 0, 0, cosine}});
+        scene::TriangleMesh mesh = square_with_normals();
+        mesh.joints.assign(4, glm::u16vec4(0));
+        mesh.weights.assign(4, glm::vec4(1, 0, 0, 0));
+        const std::uint32_t skin = builder.add_skin({{joint}, {glm::mat4x3(1)}});
+        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_VIRTUAL,
+                           glm::mat4x3(1), {.deforms = true, .skin = skin});
+        return builder;
+    };
+    const Picture before = at_time(turning(), 0, from_above()), after = at_time(turning(), 1, from_above());
+    EXPECT_TRUE(is_code_of(before.at(100, 75)[1], albedo));
+    EXPECT_TRUE(is_code_of(after.at(100, 75)[1], albedo * 0.5));
+    EXPECT_EQ(before.alpha(100, 75 - 30), 255);
+    EXPECT_EQ(after.alpha(100, 75 - 30), 0) << "it reaches 40 mm · cos 60° that way now";
+}
+
+// The square stays where it is. In the middle of the morph its normals lean by 60°: 0.5 · 2 tan 60° to the side.
+TEST(Moving, AMorphTargetLeansItsNormals) {
+    const auto leaning = [] {
+        ArenaBuilder builder = under_the_sun();
+        const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
+        builder.add_channel(
+            {.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 2}, .values = {0, 1}});
+        scene::TriangleMesh mesh = square_with_normals();
+        mesh.morph_positions.assign(4, glm::vec3(0));
+        mesh.morph_normals.assign(4, {0, 2 * std::tan(glm::radians(60.0f)), 0});
+        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_VIRTUAL,
+                           glm::mat4x3(1), {.deforms = true, .node = node});
+        return builder;
+    };
+    EXPECT_TRUE(is_code_of(at_time(leaning(), 0, from_above()).at(100, 75)[1], albedo));
+    EXPECT_TRUE(is_code_of(at_time(leaning(), 1, from_above()).at(100, 75)[1], albedo * 0.5));
 }
 
 TEST(TreeQuality, StaysWhileAMeshIsMovedScaledAndBent) {
