@@ -59,10 +59,6 @@ bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
                       b.coefficients);
 }
 
-double length(Vec3d a) {
-    return std::sqrt(dot(a, a));
-}
-
 // The camera's axes in the world.
 struct Pose {
     Vec3d eye, right, down, forward;

@@ -23,8 +23,7 @@ ARHOST_INLINE Incidence incidence_along(const Surface &s, Vec3 way, float end, F
     in.end = end;
     in.from_environment = false;
     in.direction = normalize(way);
-    in.cosine =
-        select(dot(s.geometric_normal, in.direction) > Float(0.0f), lambert(s.normal, in.direction), Float(0.0f));
+    in.cosine = lambert_on_facet(s.normal, s.geometric_normal, in.direction);
     in.irradiance = irradiance;
     return in;
 }
@@ -38,23 +37,17 @@ ARHOST_INLINE Incidence incidence(const arhost_light &light, const Surface &s, P
     if (light.type == ARHOST_DIRECTIONAL_LIGHT)
         return incidence_along(s, -splat(light.direction), far_away, Float(1.0f));
     Vec3 way = splat(light.position) - s.position;
-    if (light.type == ARHOST_RECTANGLE_LIGHT) {
-        way = way + splat(light.axis_u) * (where.u * Float(2.0f) - Float(1.0f)) +
-              splat(light.axis_v) * (where.v * Float(2.0f) - Float(1.0f));
-    } else if (light.type == ARHOST_SPHERE_LIGHT) {
-        // Evenly over the disc that faces the surface point.
-        const Vec3 n = normalize(way);
-        const Float radius = Float(light.radius) * sqrt(where.u);
-        way = way + first_axis_across(n) * (radius * cosine_of_turn(where.v)) +
-              second_axis_across(n) * (radius * sine_of_turn(where.v));
-    }
+    if (light.type == ARHOST_RECTANGLE_LIGHT)
+        way = way_to_rectangle(way, splat(light.axis_u), splat(light.axis_v), where.u, where.v);
+    else if (light.type == ARHOST_SPHERE_LIGHT)
+        way = way_to_disc(way, Float(light.radius), where.u, where.v);
     const Bool falls_off = bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE);
     Incidence in = incidence_along(s, way, 1, point_light_falloff(falls_off, dot(way, way)));
-    const Float outwards = -dot(in.direction, splat(light.direction)); // the cosine at the light
     if (light.type == ARHOST_SPOT_LIGHT)
-        in.irradiance = in.irradiance * spot_share(outwards, Float(light.cosine_inner), Float(light.cosine_outer));
+        in.irradiance = in.irradiance * spot_share(dot(splat(light.direction), -in.direction),
+                                                   Float(light.cosine_inner), Float(light.cosine_outer));
     if (light.type == ARHOST_RECTANGLE_LIGHT)
-        in.irradiance = in.irradiance * max(outwards, Float(0.0f));
+        in.irradiance = in.irradiance * lambert(splat(light.direction), -in.direction);
     return in;
 }
 
@@ -127,8 +120,8 @@ ARHOST_INLINE Vec3 environment_light(const Scene &scene, Vec3 direction) {
     if (!environment.image)
         return splat(scene.background);
     const Vec3 d = transform(environment.environment_from_world, direction);
-    const Float u = Float(0.5f) + turn_of(d.x, -d.z), v = angle_from_up(d.y);
-    return sample_texture(scene, *environment.image, u, v).colour * Float(environment.intensity);
+    return sample_texture(scene, *environment.image, equirectangular_u(d), equirectangular_v(d)).colour *
+           Float(environment.intensity);
 }
 
 struct EnvironmentSample {
@@ -150,21 +143,18 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     const Int first = row * Int(image.width);
     const Int column = search(environment.columns, first, image.width, where.u);
     const Pair column_step = step(environment.columns, first, column);
-    const Float x =
-        to_float(column) + min((where.u - column_step.u) / max(column_step.v, Float(1e-12f)), Float(1.0f));
-    const Float y = to_float(row) + min((where.v - row_step.u) / max(row_step.v, Float(1e-12f)), Float(1.0f));
+    const Float x = to_float(column) + place_in_step(where.u, column_step.u, column_step.v);
+    const Float y = to_float(row) + place_in_step(where.v, row_step.u, row_step.v);
     const Float u = x * Float(1.0f / static_cast<float>(image.width)),
                 v = y * Float(1.0f / static_cast<float>(image.height));
-    const Float sine = max(sine_of_turn(v * Float(0.5f)), Float(1e-4f)), around = u - Float(0.5f);
-    const Vec3 d{sine * sine_of_turn(around), cosine_of_turn(v * Float(0.5f)), -(sine * cosine_of_turn(around))};
+    const Vec3 d = equirectangular_direction(u, v);
     // The rotation's transpose is its inverse.
     const float *m = environment.environment_from_world;
     const Vec3 way{dot(splat(m), d), dot(splat(m + 3), d), dot(splat(m + 6), d)};
     const Float texels = Float(static_cast<float>(image.width) * static_cast<float>(image.height));
-    const Float density = row_step.v * column_step.v * texels / (Float(19.7392088f) * sine); // 2π² sin θ
-    // Lambert's 1/π, which a lamp's intensity has in it.
+    const Float density = equirectangular_density(row_step.v * column_step.v * texels, v);
     EnvironmentSample sample;
-    sample.in = incidence_along(s, way, far_away, Float(1.0f) / max(density * Float(3.14159265f), Float(1e-12f)));
+    sample.in = incidence_along(s, way, far_away, irradiance_of_density(density));
     sample.in.from_environment = true;
     // The texel's own, as the density is: between texels the mixed light would be too much for the darker one's.
     sample.light = texel_at(scene, image, column, row).colour * Float(environment.intensity);
@@ -212,9 +202,7 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
         if (s.any_rough) {
             const Vec3 half_way = normalize(in.direction + to_eye);
             const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_way));
-            const Float eye_cosine = max(dot(s.normal, to_eye), Float(1e-4f));
-            const Float lobe = Float(3.14159265f) * in.cosine * ggx_distribution(dot(s.normal, half_way), s.alpha) *
-                               ggx_visibility(in.cosine, eye_cosine, s.alpha);
+            const Float lobe = ggx_lobe(in.cosine, dot(s.normal, to_eye), dot(s.normal, half_way), s.alpha);
             // The environment's glint comes with the ray that goes on from here.
             const Vec3 glint = in.from_environment ? black() : fresnel * lobe;
             reflected = select(s.is_rough, s.diffuse * (white() - fresnel) * in.cosine + glint, reflected);
@@ -258,13 +246,14 @@ ARHOST_INLINE CaughtShadow caught_shadow(const Frame &frame, const RTCRayHit16 &
                                      Float(scene.shadow_alpha_opaque), Float(scene.shadow_alpha_translucent));
     CaughtShadow shadow{select(active, alpha, Float(0.0f)), black()};
     if (scene.coloured_shadows) {
-        // Each channel's own alpha; the colour makes up for what the common one takes too much, over a video
-        // of middle grey.
+        // Each channel's own alpha; the colour makes up for what the common one takes too much.
         const Vec3 own{share_of_light(weighted_colour.x, irradiance), share_of_light(weighted_colour.y, irradiance),
                        share_of_light(weighted_colour.z, irradiance)};
         shadow.alpha = select(active, largest(own), Float(0.0f));
-        const Vec3 encoded = (white() * shadow.alpha - own) * (Float(0.5f) / max(shadow.alpha, Float(1e-6f)));
-        shadow.colour = {srgb_decode(encoded.x), srgb_decode(encoded.y), srgb_decode(encoded.z)};
+        const auto colour = [&](Float channel) __attribute__((always_inline)) {
+            return srgb_decode(shadow_colour_encoded(channel, shadow.alpha));
+        };
+        shadow.colour = {colour(own.x), colour(own.y), colour(own.z)};
     }
     return shadow;
 }

@@ -184,6 +184,12 @@ ARHOST_INLINE FloatPart sqrt_of(FloatPart a) {
 ARHOST_INLINE Float sqrt(Float a) {
     ARHOST_UNARY(Float, sqrt_of(a_));
 }
+ARHOST_INLINE Float length(Vec3 a) {
+    return sqrt(dot(a, a));
+}
+ARHOST_INLINE Vec3 normalize(Vec3 a) {
+    return a * (Float(1.0f) / length(a));
+}
 
 // A bit a lane.
 ARHOST_INLINE unsigned mask_of(Wide<IntPart, width> b) {
@@ -331,17 +337,16 @@ ARHOST_INLINE Float turn_of(Float x, Float y) {
     const Float half = select(y < Float(0.0f), Float(0.5f) - folded, folded);
     return select(x < Float(0.0f), -half, half);
 }
-// The angle of a direction of height y, in half turns: 0 up, 1 down.
-ARHOST_INLINE Float angle_from_up(Float y) {
-    return Float(2.0f) * turn_of(sqrt(max(Float(1.0f) - y * y, Float(0.0f))), y);
-}
 
 #define ARHOST_LEAF ARHOST_INLINE
 #include <arhost/shading/leaf/alpha.h>
 #include <arhost/shading/leaf/bsdf.h>
 #include <arhost/shading/leaf/colour.h>
+#include <arhost/shading/leaf/environment.h>
+#include <arhost/shading/leaf/lens.h>
 #include <arhost/shading/leaf/light.h>
 #include <arhost/shading/leaf/sampling.h>
+#include <arhost/shading/leaf/surface.h>
 #undef ARHOST_LEAF
 #undef ARHOST_UNARY
 #undef ARHOST_BINARY

@@ -74,11 +74,8 @@ ARHOST_INLINE void send_on(Work &work, const Paths &from, Vec3 origin, Vec3 dire
 // Below this a ray's light can't be seen.
 constexpr float faint = 1e-4f;
 
-// An interpolated normal may send the ray into the facet: then the facet's own reflects.
 ARHOST_INLINE Vec3 reflected(const Surface &s, Vec3 direction) {
-    const Vec3 by_normal = mirror_direction(direction, s.normal);
-    return select(dot(by_normal, s.geometric_normal) > Float(0.0f), by_normal,
-                  mirror_direction(direction, s.geometric_normal));
+    return mirror_direction_off_facet(direction, s.normal, s.geometric_normal);
 }
 
 ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 share,
@@ -92,9 +89,7 @@ ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec
 // Both branches, or the one that chance chooses. What is not followed looks like the cutoff colour.
 ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                     const arhost_material &glass, Bool active) {
-    // Bouguer's law, for what came through the inside.
-    const Vec3 k = splat(glass.extinction) * (s.way * Float(-1.44269504f));
-    const Vec3 left = select(s.from_behind, Vec3{exp2(k.x), exp2(k.y), exp2(k.z)}, white());
+    const Vec3 left = select(s.from_behind, bouguer(splat(glass.extinction), s.way), white());
     const Vec3 throughput = paths.throughput * left;
 
     const Float ratio = select(s.from_behind, Float(glass.index), Float(1 / glass.index));
@@ -113,10 +108,8 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
         refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
     }
     const Bool total = squared < Float(0.0f);
-    const Float reflectance =
-        select(total, Float(1.0f),
-               glass_reflectance(select(s.from_behind, refracted_cosine, cosine), Float(glass.fresnel_exponent),
-                                 Float(glass.fresnel_minimum), Float(glass.fresnel_maximum)));
+    const Float reflectance = glass_reflected_share(s.from_behind, cosine, squared, Float(glass.fresnel_exponent),
+                                                    Float(glass.fresnel_minimum), Float(glass.fresnel_maximum));
 
     const Vec3 inside = s.position - s.geometric_normal * s.offset;
     Vec3 refracted_share = throughput * splat(glass.refraction) * (Float(1.0f) - reflectance);
@@ -153,11 +146,8 @@ constexpr float least_throughput = 2e-3f;
 
 // A ray off a microfacet.
 ARHOST_INLINE void scatter_off_roughness(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
-    const Vec3 x = first_axis_across(s.normal), y = second_axis_across(s.normal);
-    const Vec3 local{dot(to_eye, x), dot(to_eye, y), max(dot(to_eye, s.normal), Float(1e-4f))};
     const Pair where = pair(random_of(work, paths), rough_purpose, 0, 1);
-    const Vec3 facet = ggx_visible_normal(local, s.alpha, where.u, where.v);
-    const Vec3 half_way = x * facet.x + y * facet.y + s.normal * facet.z;
+    const Vec3 half_way = ggx_half_way(s.normal, to_eye, s.alpha, where.u, where.v);
     const Vec3 direction = mirror_direction(-to_eye, half_way);
     const Float cosine = dot(direction, s.normal);
     // The masking of the way in is in the choice of the facet.

@@ -46,9 +46,7 @@ ARHOST_INLINE Texel textured(const Scene &scene, const Object &object, std::uint
     return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
 }
 
-// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own
-// (E. Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2012, section 7.8), brought into the
-// plane across the normal; the texture's green points against v, as in glTF 2.0, section 3.9.3.
+// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own.
 ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal, const RTCHit16 &hit,
                         Bool here) {
     const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
@@ -65,22 +63,14 @@ ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 facet, Ve
     }
     const Vec3 edge_1 = position[1] - position[0], edge_2 = position[2] - position[0];
     const Float u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
-    const Float turn = select(u1 * v2 < u2 * v1, Float(-1.0f), Float(1.0f));
-    Vec3 along_u = (edge_1 * v2 - edge_2 * v1) * turn, along_v = (edge_2 * u1 - edge_1 * u2) * turn;
+    Vec3 along_u = tangent_along_u(edge_1, edge_2, u1, u2, v1, v2);
+    Vec3 along_v = tangent_along_v(edge_1, edge_2, u1, u2, v1, v2);
     if (object.has_transform) {
         along_u = transform(object.transform, along_u);
         along_v = transform(object.transform, along_v);
     }
-    const Vec3 n = normalize(normal), across = along_u - n * dot(n, along_u);
-    const Vec3 right = normalize(across), side = cross(n, right);
-    const Vec3 up = select(dot(side, along_v) > Float(0.0f), -side, side);
     const Vec3 texel = textured(scene, object, object.material->normal_texture, hit, here).colour;
-    const Vec3 asked = right * (texel.x * Float(2.0f) - Float(1.0f)) + up * (texel.y * Float(2.0f) - Float(1.0f)) +
-                       n * (texel.z * Float(2.0f) - Float(1.0f));
-    // One that points into the facet would be taken for the back's.
-    const Vec3 outwards = select(dot(facet, n) < Float(0.0f), -facet, facet);
-    const Bool is_possible = (dot(across, across) > Float(0.0f)) & (dot(asked, outwards) > Float(0.0f));
-    return select(is_possible, asked, normal);
+    return bent_normal(normal, facet, along_u, along_v, texel);
 }
 
 ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
@@ -96,8 +86,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     s.any_specular = s.any_rough = s.any_scattering = false;
     s.position = origin_of(rays.ray) + step;
     s.way = length(step);
-    // A hit is as exact as the floats that it was computed from: 2^-24 of their size, a few times.
-    s.offset = (largest(s.position) + largest(step)) * Float(0x1p-19f);
+    s.offset = offset_from_surface(s.position, step);
     s.geometric_normal = facet;
     s.normal = facet;
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
@@ -141,15 +130,12 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
                 metallic = metallic * factors.z;
                 roughness = roughness * factors.y;
             }
-            // glTF 2.0, appendix B.3: dielectrics reflect 4 %, metals their colour.
-            s.specular =
-                select(here, white() * (Float(0.04f) * (Float(1.0f) - metallic)) + diffuse * metallic, s.specular);
-            s.alpha = select(here, max(roughness * roughness, Float(0.001f)), s.alpha);
+            s.specular = select(here, metallic_reflectance(diffuse, metallic), s.specular);
+            s.alpha = select(here, ggx_alpha(roughness), s.alpha);
             s.is_rough = s.is_rough | here;
             s.any_rough = true;
-            const Vec3 base = diffuse * (Float(1.0f) - metallic);
-            ambient = ambient * (Float(1.0f) - metallic);
-            diffuse = base;
+            ambient = metallic_diffuse(ambient, metallic);
+            diffuse = metallic_diffuse(diffuse, metallic);
         }
         s.ambient = select(here, ambient, s.ambient);
         s.diffuse = select(here, diffuse, s.diffuse);
@@ -163,9 +149,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
 
     s.geometric_normal = normalize(s.geometric_normal);
     s.from_behind = dot(s.geometric_normal, direction) > Float(0.0f);
-    s.geometric_normal = select(s.from_behind, -s.geometric_normal, s.geometric_normal);
-    // Vertex normals that cancel out leave the facet's.
-    s.normal = select(dot(s.normal, s.normal) > Float(1e-12f), normalize(s.normal), s.geometric_normal);
-    s.normal = select(dot(s.normal, s.geometric_normal) < Float(0.0f), -s.normal, s.normal);
+    s.geometric_normal = facing(s.geometric_normal, -direction);
+    s.normal = shading_normal(s.normal, s.geometric_normal);
     return s;
 }

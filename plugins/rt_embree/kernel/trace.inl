@@ -27,19 +27,6 @@ ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
     return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;
 }
 
-ARHOST_INLINE Float length(Vec3 a) {
-    return sqrt(dot(a, a));
-}
-ARHOST_INLINE Vec3 normalize(Vec3 a) {
-    return a * (Float(1.0f) / length(a));
-}
-ARHOST_INLINE Float largest(Vec3 a) {
-    return max(max(abs(a.x), abs(a.y)), abs(a.z));
-}
-ARHOST_INLINE Float luminance(Vec3 a) { // of Rec. 709's primaries
-    return a.x * Float(0.2126f) + a.y * Float(0.7152f) + a.z * Float(0.0722f);
-}
-
 template <class Ray> ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 direction, Float end, Int mask) {
     store(ray.org_x, origin.x);
     store(ray.org_y, origin.y);

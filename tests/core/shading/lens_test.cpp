@@ -63,6 +63,20 @@ TEST_P(EveryLens, ProjectionUndoesTheRay) {
     }
 }
 
+TEST_P(EveryLens, TheLeafFunctionsAreOpenCvsFormulas) {
+    const arhost_intrinsics in = intrinsics_of(GetParam());
+    for (double y = -0.6; y <= 0.6; y += 0.15)
+        for (double x = -0.6; x <= 0.6; x += 0.15) {
+            const Vec3 d{x, y, 1};
+            const Vec3 p = in.distortion == ARHOST_DISTORTION_FISHEYE ? kannala_brandt(kannala_brandt_of(in), d * 7)
+                                                                      : brown_conrady(brown_conrady_of(in), d);
+            const cv::Point2d pixel = opencv_pixel(in, d);
+            EXPECT_NEAR(in.fx * p.x + in.cx, pixel.x, 1e-9);
+            EXPECT_NEAR(in.fy * p.y + in.cy, pixel.y, 1e-9);
+            EXPECT_EQ(p.z, 1);
+        }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Models, EveryLens,
     testing::Values(Model{"pinhole", ARHOST_DISTORTION_NONE, {}},
@@ -74,6 +88,26 @@ INSTANTIATE_TEST_SUITE_P(
                           {-0.2, 0.05, 0.001, 0.002, 0, 0.02, 0.01, 0, 0.004, -0.002, 0.003, 0.001}},
                     Model{"fisheye", ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001}}),
     [](const auto &info) { return info.param.name; });
+
+TEST(Lens, ABrownLensMovesPointsAwayFromTheCentreByItsRadialPart) {
+    const BrownConrady k{0.1, 0.02, 0, 0, 0.003, 0.4, 0.05, 0.006, 0, 0, 0, 0};
+    EXPECT_NEAR(brown_conrady_radial(k, 2), (1 + 0.2 + 0.08 + 0.024) / (1 + 0.8 + 0.2 + 0.048), 1e-15);
+    EXPECT_NEAR(brown_conrady(k, {-1, 1, 1}).y, brown_conrady_radial(k, 2), 1e-15);
+}
+
+TEST(Lens, AFisheyesSlopeIsThatOfItsCurve) {
+    const KannalaBrandt k{0.05, -0.01, 0.004, -0.001};
+    for (double angle = 0; angle < 1.8; angle += 0.1)
+        EXPECT_NEAR(kannala_brandt_slope(k, angle),
+                    (kannala_brandt_radius(k, angle + 1e-5) - kannala_brandt_radius(k, angle - 1e-5)) / 2e-5, 1e-8);
+}
+
+TEST(Lens, WhatIsPastTheCountOfCoefficientsDoesNotCount) {
+    arhost_intrinsics in = intrinsics_of({"", ARHOST_DISTORTION_BROWN, {0.1, 0.2, 0.3, 0.4, 0.5}});
+    in.coefficient_count = 4;
+    EXPECT_EQ(brown_conrady_of(in).p2, 0.4);
+    EXPECT_EQ(brown_conrady_of(in).k3, 0);
+}
 
 TEST(Lens, FisheyeSeesBehindItself) {
     arhost_intrinsics in = intrinsics_of({"", ARHOST_DISTORTION_FISHEYE, {0, 0, 0, 0}});

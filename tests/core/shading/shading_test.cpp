@@ -3,17 +3,20 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace arhost::shading {
 namespace {
 
+constexpr double pi = std::numbers::pi;
 constexpr Vec3 up{0, 0, 1};
 
 Vec3 at_degrees(double degrees) {
-    const double a = degrees * 3.14159265358979323846 / 180;
+    const double a = degrees * pi / 180;
     return {std::sin(a), 0, std::cos(a)};
 }
 
@@ -25,8 +28,7 @@ TEST(Bsdf, LambertIsTheCosineAndNothingFromBehind) {
 TEST(Bsdf, PhongIsOneInTheMirrorDirectionAndFallsOffWithTheExponent) {
     EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-30), 256), 1, 1e-12);
     EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(15), 2), 0.5, 1e-12); // 45° off
-    EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-20), 64), std::pow(std::cos(3.14159265358979323846 / 18), 64),
-                1e-12);
+    EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-20), 64), std::pow(std::cos(pi / 18), 64), 1e-12);
 }
 
 TEST(Bsdf, PhongGivesNothingFromBehindTheSurface) {
@@ -57,6 +59,165 @@ TEST(Alpha, SeveralLightsAreWeighedByTheirIrradiance) {
     EXPECT_EQ(share_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
     EXPECT_EQ(share_of_light(0, 0), 0) << "no light, no shadow";
     EXPECT_DOUBLE_EQ(shadow_alpha(0.5, 0.25, 0.6, 0.3), 0.375);
+}
+
+TEST(Alpha, TheShadowsColourMakesUpForTheCommonAlphaOverMiddleGrey) {
+    for (const double own : {0.0, 0.2, 0.6}) {
+        const double alpha = 0.6, colour = shadow_colour_encoded(own, alpha);
+        EXPECT_NEAR(alpha * colour + (1 - alpha) * 0.5, (1 - own) * 0.5, 1e-15);
+    }
+    EXPECT_EQ(shadow_colour_encoded(0, 0), 0) << "no shadow";
+}
+
+TEST(Light, ASpotIsFullInsideItsInnerConeAndDarkOutsideItsOuter) {
+    EXPECT_EQ(spot_share(1, 0.9, 0.7), 1);
+    EXPECT_EQ(spot_share(0.9, 0.9, 0.7), 1);
+    EXPECT_NEAR(spot_share(0.8, 0.9, 0.7), 0.5, 1e-12);
+    EXPECT_NEAR(spot_share(0.75, 0.9, 0.7), 5.0 / 32, 1e-12); // 3 t² − 2 t³ at a quarter
+    EXPECT_EQ(spot_share(0.7, 0.9, 0.7), 0);
+    EXPECT_EQ(spot_share(-1, 0.9, 0.7), 0);
+    EXPECT_EQ(spot_share(0.81, 0.8, 0.8), 1) << "cones of one width: a sharp edge";
+    EXPECT_EQ(spot_share(0.79, 0.8, 0.8), 0);
+}
+
+TEST(Light, AWhiteSurfaceUnderAWhiteSkyOfEvenlyChosenDirectionsIsWhite) {
+    // The mean of a cosine that is cut at 0 is 1/4 over the sphere.
+    EXPECT_NEAR(irradiance_of_density(1 / (4 * pi)) / 4, 1, 1e-12);
+    EXPECT_TRUE(std::isfinite(irradiance_of_density(0)));
+}
+
+TEST(Environment, UpIsTheFirstRowAndMinusZTheMiddle) {
+    EXPECT_NEAR(equirectangular_v({0, 1, 0}), 0, 1e-12);
+    EXPECT_NEAR(equirectangular_v({0, -1, 0}), 1, 1e-12);
+    EXPECT_NEAR(equirectangular_v({1, 0, 0}), 0.5, 1e-12);
+    EXPECT_NEAR(equirectangular_u({0, 0, -1}), 0.5, 1e-12);
+    EXPECT_NEAR(equirectangular_u({1, 0, 0}), 0.75, 1e-12);
+    EXPECT_NEAR(equirectangular_u({-1, 0, 0}), 0.25, 1e-12);
+    EXPECT_NEAR(angle_from_up(0.5), 1.0 / 3, 1e-12);
+    EXPECT_NEAR(angle_from_up(-0.5), 2.0 / 3, 1e-12);
+}
+
+TEST(Environment, EachPlacesDirectionLeadsBackToIt) {
+    for (double v = 0.01; v < 1; v += 0.07)
+        for (double u = 0.01; u < 1; u += 0.07) {
+            const Vec3 d = equirectangular_direction(u, v);
+            EXPECT_NEAR(dot(d, d), 1, 1e-12);
+            EXPECT_NEAR(equirectangular_u(d), u, 1e-12);
+            EXPECT_NEAR(equirectangular_v(d), v, 1e-7); // by an arc cosine
+        }
+}
+
+TEST(Environment, TheDensityIsOneBySolidAngle) {
+    constexpr double h = 1e-5;
+    for (double v = 0.01; v < 1; v += 0.07) {
+        const Vec3 across = equirectangular_direction(0.3 + h, v) - equirectangular_direction(0.3 - h, v);
+        const Vec3 down = equirectangular_direction(0.3, v + h) - equirectangular_direction(0.3, v - h);
+        EXPECT_NEAR(equirectangular_density(7, v) * length(cross(across, down)) / (4 * h * h), 7, 1e-6);
+    }
+    EXPECT_TRUE(std::isfinite(equirectangular_density(1, 0)));
+}
+
+TEST(Sampling, AxesAreAcrossTheNormalAndEachOther) {
+    const auto check = [](Vec3 n) {
+        const Vec3 x = first_axis_across(n), y = second_axis_across(n), z = cross(x, y);
+        EXPECT_NEAR(dot(x, x), 1, 1e-12);
+        EXPECT_NEAR(dot(y, y), 1, 1e-12);
+        EXPECT_NEAR(dot(x, y), 0, 1e-12);
+        EXPECT_NEAR(z.x, n.x, 1e-12);
+        EXPECT_NEAR(z.y, n.y, 1e-12);
+        EXPECT_NEAR(z.z, n.z, 1e-12);
+    };
+    for (const double z : {-1.0, -1 + 1e-12, -0.999999, -0.5, -1e-9, -0.0, 0.0, 1e-9, 0.3, 0.999999, 1.0})
+        for (double turn = 0; turn < 1; turn += 0.13) {
+            const double r = std::sqrt(1 - z * z);
+            check({r * cosine_of_turn(turn), r * sine_of_turn(turn), z});
+        }
+}
+
+TEST(Sampling, RectanglesAreCoveredFromCornerToCorner) {
+    const Vec3 centre{1, 2, 3}, u{4, 0, 0}, v{0, 0, 5};
+    const auto is = [&](double at_u, double at_v, Vec3 wanted) {
+        const Vec3 error = way_to_rectangle(centre, u, v, at_u, at_v) - wanted;
+        EXPECT_EQ(dot(error, error), 0);
+    };
+    is(0, 0, {-3, 2, -2});
+    is(1, 0, {5, 2, -2});
+    is(0.5, 0.5, centre);
+    is(0.5, 1, {1, 2, 8});
+}
+
+TEST(Sampling, ASpheresDiscFacesUsAndIsCoveredEvenly) {
+    const Vec3 centre{30, -40, 20};
+    Vec3 mean{0, 0, 0};
+    double mean_square = 0;
+    constexpr int n = 100;
+    for (int i = 0; i < n * n; ++i) {
+        const Vec3 r = way_to_disc(centre, 6, (i / n + 0.5) / n, (i % n + 0.5) / n) - centre;
+        EXPECT_NEAR(dot(r, centre), 0, 1e-9);
+        EXPECT_LE(dot(r, r), 36);
+        mean = mean + r * (1.0 / n / n);
+        mean_square += dot(r, r) / n / n;
+    }
+    EXPECT_NEAR(length(mean), 0, 1e-12);
+    EXPECT_NEAR(mean_square, 18, 1e-9); // half the radius' square, as of any even disc
+}
+
+TEST(Sampling, APlaceInAStepIsItsShare) {
+    EXPECT_NEAR(place_in_step(0.35, 0.3, 0.2), 0.25, 1e-12);
+    EXPECT_EQ(place_in_step(0.3, 0.3, 0.2), 0);
+    EXPECT_EQ(place_in_step(0.9, 0.3, 0.2), 1);
+    EXPECT_EQ(place_in_step(0.3, 0.3, 0), 0);
+}
+
+TEST(Surface, RaysStartSomeFloatsAboveIt) {
+    EXPECT_EQ(largest({1, -7, 3}), 7);
+    EXPECT_EQ(offset_from_surface({100, -412, 0}, {0, 5, -100}), 512.0 / (1 << 19));
+}
+
+TEST(Surface, NormalsAreTurnedToTheSideAskedFor) {
+    EXPECT_EQ(facing(up, {1, 0, 0.1}).z, 1);
+    EXPECT_EQ(facing(up, {1, 0, -0.1}).z, -1);
+    EXPECT_NEAR(shading_normal({0, 3, 4}, up).z, 0.8, 1e-12);
+    EXPECT_NEAR(shading_normal({0, 3, -4}, up).z, 0.8, 1e-12) << "on the facet's side";
+    EXPECT_NEAR(shading_normal({0, 3, -4}, up).y, -0.6, 1e-12);
+    EXPECT_EQ(shading_normal({0, 1e-7, 0}, up).z, 1) << "vertex normals that cancel out";
+}
+
+TEST(Surface, TangentsPointToWhereTheTexturesCoordinatesGrow) {
+    const Vec3 per_u{3, 1, 0}, per_v{-1, 2, 1};
+    const auto edge = [&](double u, double v) { return per_u * u + per_v * v; };
+    const auto is_along = [](Vec3 a, Vec3 b) {
+        const Vec3 error = normalize(a) - normalize(b);
+        EXPECT_NEAR(length(error), 0, 1e-12);
+    };
+    // Corners in either order, and a texture that lies mirrored.
+    for (const auto &[u1, v1, u2, v2] :
+         {std::array{1.0, 0.0, 0.2, 1.0}, {0.2, 1.0, 1.0, 0.0}, {-1.0, 0.3, 0.5, 2.0}}) {
+        is_along(tangent_along_u(edge(u1, v1), edge(u2, v2), u1, u2, v1, v2), per_u);
+        is_along(tangent_along_v(edge(u1, v1), edge(u2, v2), u1, u2, v1, v2), per_v);
+    }
+}
+
+TEST(Surface, ANormalTexturesRedBendsAlongUAndItsGreenAgainstV) {
+    const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not across the normal
+    const auto is = [&](Vec3 texel, Vec3 wanted) {
+        const Vec3 bent = bent_normal(up, up, u, v, texel);
+        EXPECT_NEAR(length(normalize(bent) - wanted), 0, 1e-12);
+    };
+    is({0.5, 0.5, 1}, up);
+    is({0.8, 0.5, 0.9}, {0.6, 0, 0.8});
+    is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
+    is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
+    const auto stays = [&](Vec3 bent) { EXPECT_EQ(length(bent - up), 0); };
+    stays(bent_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // it would point inwards
+    stays(bent_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // no direction along u
+    is({0.8, 0.5, 0.9}, bent_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the facet's side does not matter
+}
+
+TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {
+    EXPECT_NEAR(luminance({1, 1, 1}), 1, 1e-15);
+    EXPECT_EQ(luminance({0, 1, 0}), 0.7152);
+    EXPECT_EQ(luminance({1, 0, 0}), 0.2126);
 }
 
 TEST(Srgb, EncodesTheStandardsLandmarks) {

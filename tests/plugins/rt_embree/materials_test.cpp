@@ -9,7 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 namespace arhost::test {
 namespace {
@@ -47,6 +50,15 @@ void add_ball(ArenaBuilder &builder, const arhost_material &material) {
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(material));
 }
 
+// Of the angle under which a pixel's ray from above meets that ball: t² + 2 b t + c = 0.
+std::optional<double> cosine_on_ball(int x, int y) {
+    const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, y) - eye);
+    const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 60 * 60);
+    if (root < 0)
+        return {};
+    return -glm::dot(d, (eye + d * (-b - std::sqrt(root))) / 60.0);
+}
+
 } // namespace
 
 TEST(Metal, ReflectsBySchlicksTerm) {
@@ -55,18 +67,12 @@ TEST(Metal, ReflectsBySchlicksTerm) {
     ArenaBuilder builder = in_a_room_of_light(0.6f);
     add_ball(builder, metal);
     const Picture picture = Tracer(std::move(builder)).render(from_above());
-    for (int x = 100; x < 155; x += 2) {
-        // The ball at the pixel's ray: a² + 2 b t + c = 0 from 200 mm above.
-        const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, 74) - eye);
-        const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 60 * 60);
-        if (root < 0)
-            continue;
-        const double cosine = -glm::dot(d, (eye + d * (-b - std::sqrt(root))) / 60.0);
-        for (int i = 0; i < 3; ++i) {
-            const double r0 = metal.reflectivity[i], r = r0 + (1 - r0) * std::pow(1 - cosine, 5);
-            ASSERT_TRUE(is_code_of(picture.at(x, 74)[i], 0.6 * r, 1e-3)) << x;
-        }
-    }
+    for (int x = 100; x < 155; x += 2)
+        if (const auto cosine = cosine_on_ball(x, 74))
+            for (int i = 0; i < 3; ++i) {
+                const double r0 = metal.reflectivity[i], r = r0 + (1 - r0) * std::pow(1 - *cosine, 5);
+                ASSERT_TRUE(is_code_of(picture.at(x, 74)[i], 0.6 * r, 1e-3)) << x;
+            }
 }
 
 TEST(Glass, LosesNoLight) {
@@ -157,6 +163,49 @@ TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
     // Straight on, 4 % are reflected on entering, and 4 % of the rest on leaving: only these stand in for rays.
     const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
     EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
+}
+
+TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
+    for (const double exponent : {0.7, 1.5, 3.0}) {
+        arhost_material glass = clear_glass();
+        set3(glass.refraction, 0, 0, 0);
+        glass.fresnel_exponent = static_cast<float>(exponent);
+        glass.fresnel_minimum = 0.1f;
+        glass.fresnel_maximum = 0.6f;
+        ArenaBuilder builder = in_a_room_of_light(0.8f);
+        add_ball(builder, glass);
+        const Picture picture = Tracer(std::move(builder)).render(from_above());
+        int between = 0;
+        for (int x = 102; x < 160; ++x)
+            if (const auto cosine = cosine_on_ball(x, 74)) {
+                const double r = 0.1 + 0.9 * std::pow(1 - *cosine, exponent);
+                between += r < 0.6;
+                ASSERT_TRUE(is_code_of(picture.at(x, 74)[0], 0.8 * std::min(r, 0.6), 1e-3)) << exponent << " " << x;
+            }
+        EXPECT_GT(between, 20);
+    }
+}
+
+TEST(Glass, CountsReflectedAndRefractedRaysDepthsApart) {
+    // Straight through the ball: 4 % are reflected on entering, and again at each try to leave.
+    constexpr double r = 0.04, t = 0.96, all = 60;
+    for (const auto &[reflection_depth, refraction_depth, arriving] : {std::array{all, 0.0, r},
+                                                                       {all, 1, r}, // none leaves
+                                                                       {all, 2, r + t * t},
+                                                                       {all, 3, r + t * t + t * r * t},
+                                                                       {0, all, t * t},
+                                                                       {1, all, r + t * t},
+                                                                       {2, all, r + t * t + t * r * t},
+                                                                       {0, 1, 0}}) {
+        arhost_material glass = clear_glass();
+        glass.reflection_depth = static_cast<std::uint32_t>(reflection_depth);
+        glass.refraction_depth = static_cast<std::uint32_t>(refraction_depth);
+        ArenaBuilder builder = in_a_room_of_light(0.8f);
+        add_ball(builder, glass);
+        const Picture picture = Tracer(std::move(builder)).render(from_above());
+        EXPECT_TRUE(is_code_of(picture.at(100, 74)[0], 0.8 * arriving, 1e-3))
+            << reflection_depth << " " << refraction_depth;
+    }
 }
 
 TEST(Glass, TheChosenPathsMeanIsTheTree) {

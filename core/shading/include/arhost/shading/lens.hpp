@@ -8,11 +8,12 @@
 
 #include <arhost/camera.h>
 
-#include "vec3.hpp"
+#include "scalar.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
+#include <cstddef>
 #include <numbers>
 #include <optional>
 
@@ -22,22 +23,35 @@ struct Point2 {
     double x, y;
 };
 
+// A lens' coefficients as leaf/lens.h takes them. What is past their count does not count.
+inline std::array<double, ARHOST_MAX_DISTORTION> coefficients_of(const arhost_intrinsics &intrinsics) {
+    std::array<double, ARHOST_MAX_DISTORTION> k{};
+    std::copy_n(intrinsics.coefficients, std::min<std::size_t>(intrinsics.coefficient_count, k.size()), k.begin());
+    return k;
+}
+inline BrownConrady brown_conrady_of(const arhost_intrinsics &intrinsics) {
+    const auto [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4] = coefficients_of(intrinsics);
+    return {k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4};
+}
+inline KannalaBrandt kannala_brandt_of(const arhost_intrinsics &intrinsics) {
+    const auto k = coefficients_of(intrinsics);
+    return {k[0], k[1], k[2], k[3]};
+}
+
 class Lens {
 public:
-    explicit Lens(const arhost_intrinsics &intrinsics) : intrinsics_(intrinsics) {
-        std::copy_n(intrinsics.coefficients, std::min<std::uint32_t>(intrinsics.coefficient_count, 12), k_);
-        limit_ = fold();
-    }
+    explicit Lens(const arhost_intrinsics &intrinsics)
+        : intrinsics_(intrinsics), brown_(brown_conrady_of(intrinsics)), fisheye_(kannala_brandt_of(intrinsics)),
+          limit_(fold()) {}
 
     // (x'', y'') of a direction. None behind the camera, or beyond the fold of the polynomial, where
     // directions come back inwards.
     std::optional<Point2> distort(Vec3T<double> d) const {
         if (intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE) {
-            const double r = std::hypot(d.x, d.y), theta = std::atan2(r, d.z);
-            if (theta > limit_)
+            if (std::atan2(std::hypot(d.x, d.y), d.z) > limit_)
                 return {};
-            const double scale = r > 0 ? fisheye(theta) / r : 0;
-            return Point2{d.x * scale, d.y * scale};
+            const Vec3 p = kannala_brandt(fisheye_, d);
+            return Point2{p.x, p.y};
         }
         if (d.z <= 0)
             return {};
@@ -72,21 +86,9 @@ private:
     static constexpr double tolerance = 1e-11; // of x'', y''
     static constexpr int max_steps = 100;
 
-    // Brown–Conrady as in OpenCV's calib3d ("Detailed Description" of camera calibration); s3, s4 of the
-    // thin prism included.
-    double radial(double r2) const {
-        return (1 + r2 * (k_[0] + r2 * (k_[1] + r2 * k_[4]))) / (1 + r2 * (k_[5] + r2 * (k_[6] + r2 * k_[7])));
-    }
     Point2 brown(Point2 p) const {
-        const double r2 = p.x * p.x + p.y * p.y, scale = radial(r2);
-        return {p.x * scale + 2 * k_[2] * p.x * p.y + k_[3] * (r2 + 2 * p.x * p.x) + r2 * (k_[8] + r2 * k_[9]),
-                p.y * scale + k_[2] * (r2 + 2 * p.y * p.y) + 2 * k_[3] * p.x * p.y + r2 * (k_[10] + r2 * k_[11])};
-    }
-
-    // Kannala–Brandt as in OpenCV's fisheye: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸).
-    double fisheye(double theta) const {
-        const double t2 = theta * theta;
-        return theta * (1 + t2 * (k_[0] + t2 * (k_[1] + t2 * (k_[2] + t2 * k_[3]))));
+        const Vec3 q = brown_conrady(brown_, {p.x, p.y, 1});
+        return {q.x, q.y};
     }
 
     // The radius on the image plane (Brown) or the angle (fisheye) up to which the radial curve rises:
@@ -98,7 +100,8 @@ private:
         const double end = is_fisheye ? std::numbers::pi : 20, step = 0.001;
         double before = 0;
         for (double r = step; r < end; r += step) {
-            const double after = is_fisheye ? fisheye(r) : r * radial(r * r);
+            const double after =
+                is_fisheye ? kannala_brandt_radius(fisheye_, r) : r * brown_conrady_radial(brown_, r * r);
             if (!(after > before))
                 return r - step;
             before = after;
@@ -150,15 +153,15 @@ private:
     std::optional<Vec3T<double>> undistort_fisheye(Point2 wanted) const {
         const double r = std::hypot(wanted.x, wanted.y);
         double low = 0, high = limit_;
-        if (!(r <= fisheye(high)))
+        if (!(r <= kannala_brandt_radius(fisheye_, high)))
             return {};
         double theta = std::min(r, high);
         for (int step = 0; step < max_steps; ++step) {
-            const double error = fisheye(theta) - r, t2 = theta * theta;
+            const double error = kannala_brandt_radius(fisheye_, theta) - r;
             if (std::abs(error) < tolerance)
                 break;
             (error < 0 ? low : high) = theta;
-            theta -= error / (1 + t2 * (3 * k_[0] + t2 * (5 * k_[1] + t2 * (7 * k_[2] + t2 * 9 * k_[3]))));
+            theta -= error / kannala_brandt_slope(fisheye_, theta);
             if (!(theta > low && theta < high))
                 theta = (low + high) / 2;
         }
@@ -167,7 +170,8 @@ private:
     }
 
     arhost_intrinsics intrinsics_;
-    double k_[ARHOST_MAX_DISTORTION] = {};
+    BrownConrady brown_;
+    KannalaBrandt fisheye_;
     double limit_;
 };
 

@@ -6,9 +6,12 @@
 // guard. Whoever includes it does so inside a namespace of his own that defines
 //   ARHOST_LEAF            what stands before a function: "inline", or nothing in GLSL
 //   Float, Bool, Vec3      a number, the result of comparing two, three numbers; one lane or many
-//   vec3(x, y, z), select(b, yes, no), min, max, floor, pow, sqrt, dot
-//   cosine_of_turn(t), sine_of_turn(t)   of an angle of t full turns, 0 to 1
-// so that the same formulas serve scalars (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders.
+//   vec3(x, y, z), select(b, yes, no) of Float and of Vec3
+//   abs, min, max, floor, pow, exp2, sqrt of Float; dot, cross, length, normalize of Vec3
+//   cosine_of_turn(t), sine_of_turn(t)   of an angle of t full turns
+//   turn_of(x, y)                        the angle of (x, y) from the y axis to the x axis in turns, −½ to ½
+// so that the same formulas serve scalars (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders
+// (glsl.h). Leaf files that use others' functions come after them.
 #pragma once
 
 #include "vec3.hpp"
@@ -25,6 +28,8 @@ using Vec3 = Vec3T<Float>;
 constexpr Float select(Bool condition, Float yes, Float no) {
     return condition ? yes : no;
 }
+using std::abs;
+using std::exp2;
 using std::floor;
 using std::max;
 using std::min;
@@ -33,19 +38,34 @@ using std::sqrt;
 constexpr Vec3 vec3(Float x, Float y, Float z) {
     return {x, y, z};
 }
+constexpr Vec3 select(Bool condition, Vec3 yes, Vec3 no) {
+    return condition ? yes : no;
+}
+inline Float length(Vec3 a) {
+    return sqrt(dot(a, a));
+}
+inline Vec3 normalize(Vec3 a) {
+    return a * (1 / length(a));
+}
 inline Float cosine_of_turn(Float t) {
     return std::cos(2 * std::numbers::pi * t);
 }
 inline Float sine_of_turn(Float t) {
     return std::sin(2 * std::numbers::pi * t);
 }
+inline Float turn_of(Float x, Float y) {
+    return std::atan2(x, y) / (2 * std::numbers::pi);
+}
 
 #define ARHOST_LEAF inline
 #include "leaf/alpha.h"
 #include "leaf/bsdf.h"
 #include "leaf/colour.h"
+#include "leaf/environment.h"
+#include "leaf/lens.h"
 #include "leaf/light.h"
 #include "leaf/sampling.h"
+#include "leaf/surface.h"
 #undef ARHOST_LEAF
 
 } // namespace arhost::shading

@@ -20,6 +20,12 @@ ARHOST_LEAF Float shadow_alpha(Float opaque_share, Float translucent_share, Floa
     return opaque_share * alpha_opaque + translucent_share * alpha_translucent;
 }
 
+// The encoded colour that makes up for what a catcher's common alpha takes too much of a channel whose own would be
+// `own`, over a video of middle grey.
+ARHOST_LEAF Float shadow_colour_encoded(Float own, Float alpha) {
+    return (alpha - own) * (Float(0.5) / max(alpha, Float(1e-6)));
+}
+
 // 0 to 1 as an 8-bit code, still as a Float: round to nearest.
 ARHOST_LEAF Float code_8bit(Float value) {
     return floor(Float(255.0) * min(max(value, Float(0.0)), Float(1.0)) + Float(0.5));

@@ -7,6 +7,11 @@ ARHOST_LEAF Float lambert(Vec3 normal, Vec3 to_light) {
     return max(dot(normal, to_light), Float(0.0));
 }
 
+// The same where the normal is interpolated: nothing from behind the facet.
+ARHOST_LEAF Float lambert_on_facet(Vec3 normal, Vec3 facet, Vec3 to_light) {
+    return select(dot(facet, to_light) > Float(0.0), lambert(normal, to_light), Float(0.0));
+}
+
 // Phong: (r·v)^n, r being the light's direction reflected about the normal; 0 behind the surface
 // (Phong, Illumination for Computer Generated Pictures, CACM 18(6), 1975).
 ARHOST_LEAF Float phong(Vec3 normal, Vec3 to_light, Vec3 to_eye, Float exponent) {
@@ -20,6 +25,12 @@ ARHOST_LEAF Float phong(Vec3 normal, Vec3 to_light, Vec3 to_eye, Float exponent)
 // The law of reflection: i − 2 (n·i) n, `incident` pointing at the surface.
 ARHOST_LEAF Vec3 mirror_direction(Vec3 incident, Vec3 normal) {
     return incident - normal * (Float(2.0) * dot(normal, incident));
+}
+
+// The same where the normal is interpolated, which may send the ray into the facet: then the facet's own reflects.
+ARHOST_LEAF Vec3 mirror_direction_off_facet(Vec3 incident, Vec3 normal, Vec3 facet) {
+    Vec3 by_normal = mirror_direction(incident, normal);
+    return select(dot(by_normal, facet) > Float(0.0), by_normal, mirror_direction(incident, facet));
 }
 
 // Schlick: the reflectance of a metal, from that at a right angle to 1 at the rim
@@ -49,7 +60,38 @@ ARHOST_LEAF Vec3 refracted_direction(Vec3 incident, Vec3 normal, Float ratio, Fl
     return incident * ratio + normal * (ratio * cosine - refracted_cosine);
 }
 
-// GGX, as glTF 2.0's appendix B has it, alpha being the roughness squared: the distribution of the
+// The share of light that a surface of glass reflects: all of it at total reflection, else by the cosine on the
+// outside. `refracted_squared` is the refracted ray's squared cosine.
+ARHOST_LEAF Float glass_reflected_share(Bool from_inside, Float cosine, Float refracted_squared, Float exponent,
+                                        Float minimum, Float maximum) {
+    Float refracted = sqrt(max(refracted_squared, Float(0.0)));
+    return select(refracted_squared < Float(0.0), Float(1.0),
+                  glass_reflectance(select(from_inside, refracted, cosine), exponent, minimum, maximum));
+}
+
+// Bouguer's law: what is left of light after a way of `way` mm inside, exp(−extinction · way)
+// (Bouguer, Essai d'optique sur la gradation de la lumière, 1729; Lambert 1760, Beer 1852).
+ARHOST_LEAF Vec3 bouguer(Vec3 extinction, Float way) {
+    Vec3 power = extinction * (way * Float(-1.44269504088896)); // of 2
+    return vec3(exp2(power.x), exp2(power.y), exp2(power.z));
+}
+
+// Metallic-roughness, as glTF 2.0's appendix B.3 has it: dielectrics reflect 4 % at a right angle, metals their
+// colour, which is the base colour …
+ARHOST_LEAF Vec3 metallic_reflectance(Vec3 base_colour, Float metallic) {
+    Float dielectric = Float(0.04) * (Float(1.0) - metallic);
+    return vec3(dielectric, dielectric, dielectric) + base_colour * metallic;
+}
+// … and only dielectrics scatter what enters them …
+ARHOST_LEAF Vec3 metallic_diffuse(Vec3 base_colour, Float metallic) {
+    return base_colour * (Float(1.0) - metallic);
+}
+// … GGX's alpha being the roughness squared. The floor keeps the distribution finite.
+ARHOST_LEAF Float ggx_alpha(Float roughness) {
+    return max(roughness * roughness, Float(0.001));
+}
+
+// GGX, as glTF 2.0's appendix B has it: the distribution of the
 // microfacets' normals (Walter et al., Microfacet Models for Refraction, EGSR 2007, eq. 33) …
 ARHOST_LEAF Float ggx_distribution(Float cosine_half, Float alpha) {
     Float a2 = alpha * alpha;
@@ -70,4 +112,11 @@ ARHOST_LEAF Float ggx_visibility(Float cosine_light, Float cosine_eye, Float alp
 ARHOST_LEAF Float ggx_unmasked(Float cosine, Float alpha) {
     Float a2 = alpha * alpha;
     return Float(2.0) * cosine / max(cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine), Float(1e-7));
+}
+
+// What microfacets send to the eye of a lamp's light, by Schlick's term at the microfacet. Lamps' intensities have
+// Lambert's π in them.
+ARHOST_LEAF Float ggx_lobe(Float cosine_light, Float cosine_eye, Float cosine_half, Float alpha) {
+    return Float(3.14159265358979) * cosine_light * ggx_distribution(cosine_half, alpha) *
+           ggx_visibility(cosine_light, max(cosine_eye, Float(1e-4)), alpha);
 }

@@ -13,3 +13,8 @@ ARHOST_LEAF Float srgb_decode(Float encoded) {
     Float curve = pow((max(x, Float(0.04045)) + Float(0.055)) / Float(1.055), Float(2.4));
     return select(x > Float(0.04045), curve, x / Float(12.92));
 }
+
+// Of Rec. 709's primaries (ITU-R BT.709-6, item 3.2).
+ARHOST_LEAF Float luminance(Vec3 colour) {
+    return colour.x * Float(0.2126) + colour.y * Float(0.7152) + colour.z * Float(0.0722);
+}

@@ -21,3 +21,9 @@ ARHOST_LEAF Vec3 glass_shadow(Vec3 attenuation, Float cosine) {
     Vec3 held = schlick(vec3(Float(1.0), Float(1.0), Float(1.0)) - attenuation, cosine);
     return vec3(Float(1.0), Float(1.0), Float(1.0)) - held;
 }
+
+// The irradiance, per unit of what comes from there, that a direction stands for which was chosen with this density
+// per steradian. Lambert's 1/π is in it, as in a lamp's intensity.
+ARHOST_LEAF Float irradiance_of_density(Float density) {
+    return Float(1.0) / max(density * Float(3.14159265358979), Float(1e-12));
+}

@@ -24,3 +24,30 @@ ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) 
     Vec3 n = vec3(half_way.x * alpha, half_way.y * alpha, max(half_way.z, Float(1e-6)));
     return n * (Float(1.0) / sqrt(dot(n, n)));
 }
+
+// The same for any normal of length 1, in the world's axes: what `to_eye` is reflected by.
+ARHOST_LEAF Vec3 ggx_half_way(Vec3 normal, Vec3 to_eye, Float alpha, Float u, Float v) {
+    Vec3 x = first_axis_across(normal);
+    Vec3 y = second_axis_across(normal);
+    Vec3 local = vec3(dot(to_eye, x), dot(to_eye, y), max(dot(to_eye, normal), Float(1e-4)));
+    Vec3 facet = ggx_visible_normal(local, alpha, u, v);
+    return x * facet.x + y * facet.y + normal * facet.z;
+}
+
+// The way to a point of a rectangle; `axis_u` and `axis_v` are half a side each.
+ARHOST_LEAF Vec3 way_to_rectangle(Vec3 way_to_centre, Vec3 axis_u, Vec3 axis_v, Float u, Float v) {
+    return way_to_centre + axis_u * (u * Float(2.0) - Float(1.0)) + axis_v * (v * Float(2.0) - Float(1.0));
+}
+
+// The way to a point of a sphere's disc that faces us.
+ARHOST_LEAF Vec3 way_to_disc(Vec3 way_to_centre, Float radius, Float u, Float v) {
+    Vec3 n = normalize(way_to_centre);
+    Float r = radius * sqrt(u);
+    return way_to_centre + first_axis_across(n) * (r * cosine_of_turn(v)) +
+           second_axis_across(n) * (r * sine_of_turn(v));
+}
+
+// Where `value` lies between a cumulative sum and the one after it, which is `step` more: 0 to 1.
+ARHOST_LEAF Float place_in_step(Float value, Float sum_before, Float step) {
+    return min((value - sum_before) / max(step, Float(1e-12)), Float(1.0));
+}

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Fresnel terms, glass and microfacets: against their sources' values, and against integrals.
+#include <arhost/shading/scalar.hpp>
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+namespace arhost::shading {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr Vec3 up{0, 0, 1};
+
+Vec3 direction(double theta, double phi) {
+    return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+// ∫ f over the directions with z > 0, by the midpoint rule, finest round the pole.
+template <class F> double integral_over_hemisphere(F f, int rows = 600, int columns = 300) {
+    double sum = 0;
+    for (int row = 0; row < rows; ++row) {
+        const double x = (row + 0.5) / rows, theta = pi / 2 * x * x, step = pi * x / rows;
+        for (int column = 0; column < columns; ++column) {
+            const double phi = 2 * pi * (column + 0.5) / columns;
+            sum += f(direction(theta, phi)) * std::sin(theta) * step * 2 * pi / columns;
+        }
+    }
+    return sum;
+}
+
+// The mean of f(u, v) over the unit square.
+template <class F> double mean_over_square(F f, int n = 500) {
+    double sum = 0;
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j)
+            sum += f((i + 0.5) / n, (j + 0.5) / n);
+    return sum / n / n;
+}
+
+void expect_near(Vec3 a, Vec3 b, double tolerance) {
+    EXPECT_NEAR(a.x, b.x, tolerance);
+    EXPECT_NEAR(a.y, b.y, tolerance);
+    EXPECT_NEAR(a.z, b.z, tolerance);
+}
+
+} // namespace
+
+TEST(Schlick, RisesFromTheReflectanceAtARightAngleToOneAtTheRim) {
+    const Vec3 metal{0.04, 0.5, 1};
+    expect_near(schlick(metal, 1), metal, 0);
+    expect_near(schlick(metal, 0), {1, 1, 1}, 0);
+    expect_near(schlick(metal, 0.5), {0.04 + 0.96 / 32, 0.5 + 0.5 / 32, 1}, 1e-15); // eq. 15
+    expect_near(schlick(metal, 1.5), metal, 0);
+    expect_near(schlick(metal, -0.5), {1, 1, 1}, 0);
+}
+
+TEST(Glass, ReflectsByItsExponentBetweenItsLimits) {
+    EXPECT_NEAR(glass_reflectance(0.5, 5, 0.04, 1), 0.04 + 0.96 / 32, 1e-15);
+    EXPECT_NEAR(glass_reflectance(0.5, 3, 0.1, 1), 0.1 + 0.9 / 8, 1e-15);
+    EXPECT_NEAR(glass_reflectance(0.75, 0.5, 0, 1), 0.5, 1e-15);
+    EXPECT_EQ(glass_reflectance(0.5, 3, 0.1, 0.2), 0.2) << "the maximum";
+    EXPECT_NEAR(glass_reflectance(1, 3, 0.1, 0.2), 0.1, 1e-15) << "the minimum";
+    EXPECT_EQ(glass_reflectance(0, 3, 0.1, 1), 1);
+    EXPECT_EQ(glass_reflectance(0.3, 3, 0, 0), 0);
+}
+
+TEST(Glass, RefractsBySnellsLaw) {
+    for (const double ratio : {1 / 1.5, 1.0, 1.2})
+        for (const double angle : {0.0, 0.3, 0.7, 0.98}) {
+            const Vec3 incident{std::sin(angle), 0, -std::cos(angle)};
+            const double cosine = std::cos(angle), squared = refracted_cosine_squared(cosine, ratio);
+            const Vec3 refracted = refracted_direction(incident, up, ratio, cosine, std::sqrt(squared));
+            expect_near(refracted, {ratio * std::sin(angle), 0, -std::sqrt(squared)}, 1e-15);
+            EXPECT_NEAR(dot(refracted, refracted), 1, 1e-14);
+        }
+}
+
+TEST(Glass, ReflectsTotallyBeyondTheCriticalAngle) {
+    const double critical = std::asin(1 / 1.5);
+    EXPECT_GT(refracted_cosine_squared(std::cos(critical - 1e-6), 1.5), 0);
+    EXPECT_LT(refracted_cosine_squared(std::cos(critical + 1e-6), 1.5), 0);
+    const auto share = [](double angle) {
+        return glass_reflected_share(true, std::cos(angle), refracted_cosine_squared(std::cos(angle), 1.5), 5, 0.04,
+                                     0.7);
+    };
+    EXPECT_LE(share(critical - 1e-6), 0.7);
+    EXPECT_EQ(share(critical + 1e-6), 1) << "whatever the maximum";
+}
+
+TEST(Glass, ReflectsAsMuchOnTheWayOutAsOnTheWayIn) {
+    for (const double angle : {0.0, 0.4, 1.0, 1.5}) {
+        const double outside = std::cos(angle), squared = refracted_cosine_squared(outside, 1 / 1.5);
+        const double inside = std::sqrt(squared);
+        EXPECT_NEAR(glass_reflected_share(false, outside, squared, 4, 0.05, 1),
+                    glass_reflected_share(true, inside, refracted_cosine_squared(inside, 1.5), 4, 0.05, 1), 1e-12);
+    }
+}
+
+TEST(Glass, AbsorbsByBouguersLaw) {
+    expect_near(bouguer({0.01, 0.2, 0}, 50), {std::exp(-0.5), std::exp(-10), 1}, 1e-14);
+    expect_near(bouguer({1, 2, 3}, 0), {1, 1, 1}, 0);
+}
+
+TEST(Glass, ItsShadowIsTheAttenuationAtARightAngleAndBlackAtTheRim) {
+    const Vec3 attenuation{0.4, 0.8, 1};
+    expect_near(glass_shadow(attenuation, 1), attenuation, 1e-15);
+    expect_near(glass_shadow(attenuation, 0), {0, 0, 0}, 1e-15);
+    expect_near(glass_shadow(attenuation, 0.5), {0.4 * 31 / 32, 0.8 * 31 / 32, 31.0 / 32}, 1e-15);
+}
+
+TEST(InterpolatedNormals, LetNoLightThroughFromBehindTheFacet) {
+    const Vec3 to_light{0.6, 0, 0.8};
+    EXPECT_EQ(lambert_on_facet(up, up, to_light), 0.8);
+    EXPECT_EQ(lambert_on_facet(up, Vec3{-0.8, 0, 0.6000001}, to_light), 0.8);
+    EXPECT_EQ(lambert_on_facet(up, Vec3{-1, 0, 0}, to_light), 0);
+    EXPECT_EQ(lambert_on_facet(-up, up, to_light), 0);
+}
+
+TEST(InterpolatedNormals, SendNoMirroredRayIntoTheFacet) {
+    const Vec3 incident{0.6, 0, -0.8}, tilted{0.6, 0, 0.8};
+    expect_near(mirror_direction_off_facet(incident, up, up), {0.6, 0, 0.8}, 1e-15);
+    expect_near(mirror_direction_off_facet(incident, tilted, {1, 0, 0}), mirror_direction(incident, tilted), 0);
+    expect_near(mirror_direction_off_facet(incident, -tilted, {-1, 0, 0}), {-0.6, 0, -0.8}, 1e-15);
+}
+
+TEST(MetallicRoughness, MetalsReflectTheirColourAndDielectricsFourPercent) {
+    const Vec3 base{0.5, 0.25, 1};
+    expect_near(metallic_reflectance(base, 0), {0.04, 0.04, 0.04}, 0);
+    expect_near(metallic_reflectance(base, 1), base, 0);
+    expect_near(metallic_reflectance(base, 0.25), {0.03 + 0.125, 0.03 + 0.0625, 0.28}, 1e-15);
+    expect_near(metallic_diffuse(base, 0), base, 0);
+    expect_near(metallic_diffuse(base, 1), {0, 0, 0}, 0);
+    EXPECT_EQ(ggx_alpha(0.5), 0.25);
+    EXPECT_EQ(ggx_alpha(0), 0.001);
+}
+
+TEST(Ggx, TheMicrofacetsAreasAddUpToTheSurfaces) {
+    for (const double alpha : {0.05, 0.3, 1.0})
+        EXPECT_NEAR(integral_over_hemisphere([&](Vec3 n) { return ggx_distribution(n.z, alpha) * n.z; }), 1, 1e-3)
+            << alpha;
+}
+
+TEST(Ggx, TheVisibleAreasAddUpToThatOfTheSurfaceAsItIsSeen) {
+    for (const double alpha : {0.1, 0.3, 1.0})
+        for (const double theta : {0.0, 0.8, 1.4}) {
+            const Vec3 eye = direction(theta, 0.5);
+            const double seen = integral_over_hemisphere(
+                [&](Vec3 n) { return ggx_distribution(n.z, alpha) * std::max(dot(eye, n), 0.0); });
+            EXPECT_NEAR(ggx_unmasked(eye.z, alpha) * seen, eye.z, 2e-3) << alpha << " " << theta;
+        }
+}
+
+// 8 × 8 cells of the hemisphere, of even steps of θ and φ.
+TEST(Ggx, VisibleNormalsAreChosenByTheirDensity) {
+    constexpr int cells = 8, finer = 60;
+    for (const double alpha : {0.2, 0.5, 1.0})
+        for (const double theta : {0.0, 0.6, 1.3}) {
+            const Vec3 eye = direction(theta, 2.0);
+            std::array<double, cells * cells> chosen{};
+            mean_over_square([&](double u, double v) {
+                const Vec3 n = ggx_visible_normal(eye, alpha, u, v);
+                EXPECT_NEAR(dot(n, n), 1, 1e-12);
+                const double t = std::acos(n.z) / (pi / 2), p = std::atan2(n.y, n.x) / (2 * pi) + 0.5;
+                const int row = std::min(static_cast<int>(t * cells), cells - 1);
+                chosen.at(static_cast<std::size_t>(row * cells + std::min(static_cast<int>(p * cells), cells - 1))) +=
+                    1.0 / (500 * 500);
+                return 0.0;
+            });
+            for (int row = 0; row < cells; ++row)
+                for (int column = 0; column < cells; ++column) {
+                    double expected = 0;
+                    for (int i = 0; i < finer * finer; ++i) {
+                        const double t = (row + (i / finer + 0.5) / finer) / cells * pi / 2;
+                        const double p = ((column + (i % finer + 0.5) / finer) / cells - 0.5) * 2 * pi;
+                        const Vec3 n = direction(t, p);
+                        expected += ggx_unmasked(eye.z, alpha) * std::max(dot(eye, n), 0.0) / eye.z *
+                                    ggx_distribution(n.z, alpha) * std::sin(t) * pi * pi / std::pow(cells * finer, 2);
+                    }
+                    ASSERT_NEAR(chosen.at(static_cast<std::size_t>(row * cells + column)), expected, 2e-3)
+                        << alpha << " " << theta << " " << row << " " << column;
+                }
+        }
+}
+
+// A white surface in a white furnace: microfacets that reflect all but mask each other give back less, never more.
+TEST(Ggx, NoLightIsMadeByLampsOrByChosenRays) {
+    for (const double alpha : {0.1, 0.3, 0.7, 1.0})
+        for (const double theta : {0.0, 0.7, 1.2, 1.4}) {
+            const std::string where = std::to_string(alpha) + " " + std::to_string(theta);
+            const Vec3 eye = direction(theta, 0);
+            const auto half_way = [&](Vec3 light) { return normalize(eye + light).z; };
+            const double by_lamps = integral_over_hemisphere(
+                [&](Vec3 light) { return ggx_lobe(light.z, eye.z, half_way(light), alpha) / pi; });
+            const double by_rays = mean_over_square([&](double u, double v) {
+                const Vec3 light = mirror_direction(-eye, ggx_half_way(up, eye, alpha, u, v));
+                return light.z > 0 ? ggx_unmasked(light.z, alpha) : 0;
+            });
+            // What rays stand for: masking and shadowing each on its own, which is a little darker.
+            const double expected = integral_over_hemisphere([&](Vec3 light) {
+                return ggx_distribution(half_way(light), alpha) * ggx_unmasked(light.z, alpha) *
+                       ggx_unmasked(eye.z, alpha) / (4 * eye.z);
+            });
+            EXPECT_LE(by_lamps, 1.001) << where;
+            EXPECT_GE(by_lamps, by_rays - 1e-3) << where;
+            EXPECT_NEAR(by_rays, expected, 2e-3) << where;
+            EXPECT_GT(by_rays, 0.3) << where;
+        }
+}
+
+TEST(Ggx, HalfWayVectorsTurnWithTheSurface) {
+    const Vec3 normal = normalize({0.3, -0.5, -0.7}), x = first_axis_across(normal), y = second_axis_across(normal);
+    const Vec3 eye = direction(0.6, 1);
+    const Vec3 turned_eye = x * eye.x + y * eye.y + normal * eye.z;
+    const Vec3 n = ggx_visible_normal(eye, 0.4, 0.3, 0.8);
+    expect_near(ggx_half_way(normal, turned_eye, 0.4, 0.3, 0.8), x * n.x + y * n.y + normal * n.z, 1e-14);
+}
+
+} // namespace arhost::shading

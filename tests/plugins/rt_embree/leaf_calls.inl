@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every leaf function of arhost/shading/, to be called with numbers from an array. Included in a namespace that has
+// included the leaf files, so that Float is one number or a packet of them.
+
+// All that leaf functions take and return are Floats side by side, but for Bool.
+template <class T> constexpr int numbers_of = sizeof(T) / sizeof(Float);
+template <> constexpr int numbers_of<Bool> = 1;
+
+template <class T> T value_of(const Float *numbers) {
+    T value;
+    __builtin_memcpy(&value, numbers, sizeof value);
+    return value;
+}
+template <> Bool value_of<Bool>(const Float *numbers) {
+    return *numbers > Float(0.5);
+}
+
+template <class...> struct Types {};
+
+template <class F, class... Done> void call(F f, const Float *, Float *results, Types<>, Done... done) {
+    const auto value = f(done...);
+    __builtin_memcpy(results, &value, sizeof value);
+}
+template <class F, class Next, class... Left, class... Done>
+void call(F f, const Float *arguments, Float *results, Types<Next, Left...>, Done... done) {
+    call(f, arguments + numbers_of<Next>, results, Types<Left...>{}, done..., value_of<Next>(arguments));
+}
+
+template <class Result, class... Parameters>
+void call(Result (*f)(Parameters...), const Float *arguments, Float *results) {
+    call(f, arguments, results, Types<Parameters...>{});
+}
+
+// A bit for each of the arguments' numbers, set where a Vec3 begins.
+template <class Result, class... Parameters> constexpr unsigned vectors_of(Result (*)(Parameters...)) {
+    unsigned vectors = 0;
+    int at = 0;
+    ((vectors |= (numbers_of<Parameters> == 3 ? 1u : 0u) << at, at += numbers_of<Parameters>), ...);
+    return vectors;
+}
+
+struct LeafFunction {
+    const char *name;
+    void (*call)(const Float *arguments, Float *results);
+    unsigned vectors;
+};
+
+#define LEAF(name)                                                                                                   \
+    LeafFunction {                                                                                                   \
+#name, [](const Float *from, Float *to) { call(&name, from, to); }, vectors_of(&name)                        \
+    }
+const LeafFunction leaf_functions[] = {
+    LEAF(share_of_light),
+    LEAF(shadow_alpha),
+    LEAF(shadow_colour_encoded),
+    LEAF(code_8bit),
+    LEAF(lambert),
+    LEAF(lambert_on_facet),
+    LEAF(phong),
+    LEAF(mirror_direction),
+    LEAF(mirror_direction_off_facet),
+    LEAF(schlick),
+    LEAF(glass_reflectance),
+    LEAF(refracted_cosine_squared),
+    LEAF(refracted_direction),
+    LEAF(glass_reflected_share),
+    LEAF(bouguer),
+    LEAF(metallic_reflectance),
+    LEAF(metallic_diffuse),
+    LEAF(ggx_alpha),
+    LEAF(ggx_distribution),
+    LEAF(ggx_visibility),
+    LEAF(ggx_unmasked),
+    LEAF(ggx_lobe),
+    LEAF(srgb_encode),
+    LEAF(srgb_decode),
+    LEAF(luminance),
+    LEAF(angle_from_up),
+    LEAF(equirectangular_u),
+    LEAF(equirectangular_v),
+    LEAF(equirectangular_sine),
+    LEAF(equirectangular_direction),
+    LEAF(equirectangular_density),
+    LEAF(brown_conrady_radial),
+    LEAF(brown_conrady),
+    LEAF(kannala_brandt_radius),
+    LEAF(kannala_brandt_slope),
+    LEAF(kannala_brandt),
+    LEAF(point_light_falloff),
+    LEAF(spot_share),
+    LEAF(glass_shadow),
+    LEAF(irradiance_of_density),
+    LEAF(first_axis_across),
+    LEAF(second_axis_across),
+    LEAF(ggx_visible_normal),
+    LEAF(ggx_half_way),
+    LEAF(way_to_rectangle),
+    LEAF(way_to_disc),
+    LEAF(place_in_step),
+    LEAF(largest),
+    LEAF(offset_from_surface),
+    LEAF(facing),
+    LEAF(shading_normal),
+    LEAF(tangent_along_u),
+    LEAF(tangent_along_v),
+    LEAF(bent_normal),
+};
+#undef LEAF

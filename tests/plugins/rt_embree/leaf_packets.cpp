@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiled once for each instruction set, ARHOST_ISA, with the kernel's options. It includes nothing of the standard
+// library, whose functions would be linked into code for other processors.
+#include "leaf_packets.hpp"
+
+#include "kernel/packet.hpp"
+
+namespace rt_embree::ARHOST_ISA {
+namespace {
+#include "leaf_calls.inl"
+}
+
+void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]) {
+    Float from[most_arguments], to[most_results]{};
+    for (int i = 0; i < most_arguments; ++i)
+        from[i] = load(arguments[i].lane);
+    leaf_functions[number].call(from, to);
+    for (int i = 0; i < most_results; ++i)
+        store(results[i].lane, to[i]);
+}
+
+} // namespace rt_embree::ARHOST_ISA

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The leaf functions as the kernel has them, sixteen numbers at once, once for each instruction set.
+#pragma once
+
+namespace rt_embree {
+
+constexpr int packet_lanes = 16, most_arguments = 16, most_results = 3;
+struct alignas(64) Packet {
+    float lane[packet_lanes];
+};
+
+// Calls the function of this place in leaf_calls.inl.
+using CallLeaf = void (*)(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+
+namespace base {
+void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+}
+namespace avx2 {
+void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+}
+namespace avx512 {
+void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+}
+
+} // namespace rt_embree
