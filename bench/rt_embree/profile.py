@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Where the time of rt_embree's frames goes: profile.py [--quick] [PROGRAM]
+"""Where the time of rt_embree's frames goes: profile.py [PROGRAM]
 
 Runs rt-embree-bench, or PROGRAM (one of an older version, say), under Linux' perf, one case after the other, and adds
-up the samples by part of the renderer. Shares hardly depend on what else the machine does."""
+up the samples by part of the renderer (half a minute). Shares hardly depend on what else the machine does."""
 import collections
 import pathlib
 import re
@@ -14,16 +14,15 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CASES = ["primary", "diffuse", "mirror", "glass"]
-# The first that matches counts. Inlined functions count for the one that they stand in.
-PARTS = [("inside Embree", r"libembree|^rtc"), ("what was hit, textures", r"surface_at|texture|textured"),
-         ("lamps and shadow rays", r"direct_light|passage|caught_shadow|sample_environment|environment_light|tint_on"),
-         ("rays that go on", r"shade|scatter|follow|send_on|reflect|add_light"),
-         ("primary rays, pixels", r"render_tile|primary|encode|accumulate"), ("threads, clearing, start", r"")]
+# The first that matches counts. Most of the kernel is inlined into these functions of its own.
+PARTS = [("inside Embree", r"libembree"), ("what was hit, textures", r"surface_at"),
+         ("lamps and shadow rays", r"direct_light|caught_shadow"), ("materials", r"shade"),
+         ("rays, queues, pixels", r"render_tile"), ("threads, clearing, start", r"")]
 
 
-def profile(program, case, seconds_matter):
+def profile(program, case):
     with tempfile.NamedTemporaryFile() as data:
-        subprocess.run(["perf", "record", "-o", data.name, "-F", "999" if seconds_matter else "199", "--", program, "0",
+        subprocess.run(["perf", "record", "-o", data.name, "-F", "999", "--", program, "0",
                         "auto", case], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         report = subprocess.run(["perf", "report", "-i", data.name, "--stdio", "-F", "overhead,dso,symbol", "--no-children",
                                  "-t", "|"], check=True, capture_output=True, text=True).stdout
@@ -31,7 +30,6 @@ def profile(program, case, seconds_matter):
     for line in report.splitlines():
         found = re.match(r"\s*([\d.]+)%?\s*\|(.*)\|(.*)", line)
         if found:
-            # Scene and mesh are made before the first frame; Embree builds its tree in threads of its own.
             where = found[2] + " " + found[3]
             shares[next(name for name, pattern in PARTS if re.search(pattern, where))] += float(found[1])
     return shares
@@ -41,7 +39,7 @@ def main():
     program = next((word for word in sys.argv[1:] if word != "--quick"), ROOT / "build/release/bin/rt-embree-bench")
     if not shutil.which("perf"):
         raise SystemExit("perf isn't installed: apt-get install linux-perf")
-    rows = {case: profile(program, case, "--quick" not in sys.argv) for case in CASES}
+    rows = {case: profile(program, case) for case in CASES}
     print("rt_embree, the bunny of 69,451 triangles, 800x600, 1 sample: shares of a run's CPU time, %")
     print(f"  {'':26}" + "".join(f"{case:>10}" for case in CASES))
     for name, _ in PARTS:

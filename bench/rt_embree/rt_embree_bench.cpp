@@ -185,6 +185,11 @@ int main(int argc, char **argv) {
     TriangleMesh flat = mesh;
     flat.normals.clear();
     const std::string only = argc > 3 ? argv[3] : "";
+    if (!only.empty() && only != "primary" && only != "diffuse" && only != "mirror" && only != "glass") {
+        std::fprintf(stderr, "rt-embree-bench: there is no case '%s'; there are primary, diffuse, mirror, glass\n",
+                     only.c_str());
+        return 2;
+    }
     const auto wanted = [&](const char *name) { return only.empty() || only == name; };
 
     if (wanted("primary")) {

@@ -213,15 +213,15 @@ def main():
     parts = [word for word in sys.argv[1:] if word != "--quick"] or ["overhead", "tables", "figures"]
     OUT.mkdir(parents=True, exist_ok=True)
     make_frame()
-    before = OUT / "tables.json"  # parts that are not measured now keep their figures
-    results, missed = json.loads(before.read_text()) if before.exists() else {}, []
+    file = OUT / ("quick.json" if quick else "tables.json")  # parts that are not measured now keep their figures
+    results, missed = json.loads(file.read_text()) if file.exists() else {}, []
     if "overhead" in parts:
         results["overhead"], missed = print_overhead(30 if quick else 100, 1 if quick else 15)
     if "tables" in parts:
         results["tables"] = print_tables(0.5 if quick else 8)
     if "figures" in parts:
         results["figures"] = draw_figures(20 if quick else 120)
-    before.write_text(json.dumps(results, indent=1) + "\n")
+    file.write_text(json.dumps(results, indent=1) + "\n")
     if missed and not quick:
         raise SystemExit("missed: " + "; ".join(missed))
 

@@ -841,10 +841,10 @@ private:
         if (is_blended)
             tell(is_textured ? "blended, and drawn with holes where its alpha is below 0.5"
                              : "translucent, and drawn opaque; 'material' may give it glass");
-        else if (alpha < cutoff && !is_textured)
-            tell("a hole everywhere by its alphaCutoff, and drawn opaque");
-        if (is_textured) // the cutoff is of the texture's alpha times the factor
-            material.alpha_cutoff = alpha > 0 ? static_cast<float>(std::min(cutoff / alpha, 1.0)) : 1;
+        else if (alpha < cutoff)
+            tell("a hole everywhere by its alphaCutoff, and drawn where its texture is opaque");
+        if (is_textured && cutoff > 0) // of the texture's alpha times the factor
+            material.alpha_cutoff = alpha > cutoff ? static_cast<float>(cutoff / alpha) : 1;
     }
 
     template <class Info> std::uint32_t texture_of(const Info &info, bool is_colour) {

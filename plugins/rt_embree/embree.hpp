@@ -96,21 +96,20 @@ RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &qu
         if (!any)
             continue;
         Part narrow;
-        char *const wide_rows = reinterpret_cast<char *>(&rays) + part * sizeof(Row), *const rows =
-                                                                                          reinterpret_cast<char *>(
-                                                                                              &narrow);
-        const auto copy = [](char *to, const char *from) __attribute__((always_inline)) {
+        char *const from = reinterpret_cast<char *>(&rays) + part * sizeof(Row);
+        char *const to = reinterpret_cast<char *>(&narrow);
+        const auto copy = [](char *into, const char *row_of) __attribute__((always_inline)) {
             Row row;
-            __builtin_memcpy(&row, from, sizeof row);
-            __builtin_memcpy(to, &row, sizeof row);
+            __builtin_memcpy(&row, row_of, sizeof row);
+            __builtin_memcpy(into, &row, sizeof row);
         };
         for (int row = 0; row < row_count; ++row)
             if (row < ray_rows || row >= geometry)
-                copy(rows + row * sizeof(Row), wide_rows + row * parts * sizeof(Row));
+                copy(to + row * sizeof(Row), from + row * parts * sizeof(Row));
         trace<function>(valid, scene, query, narrow);
         for (int row = tfar; row < row_count; ++row)
             if (row == tfar || row >= ray_rows)
-                copy(wide_rows + row * parts * sizeof(Row), rows + row * sizeof(Row));
+                copy(from + row * parts * sizeof(Row), to + row * sizeof(Row));
     }
 }
 

@@ -118,6 +118,33 @@ Box transformed(const Box &local, const float *m) {
     return world;
 }
 
+bool is_instance(const arhost_object &object) {
+    return object.deforms || object.moves || !is_identity(object.world_from_object);
+}
+
+// Rays for catchers needn't walk all the other triangles; but a scanned room is not to be built twice.
+bool catchers_deserve_a_tree(const arhost_scene &arena) {
+    const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
+    std::uint64_t of_catchers = 0, all = 0;
+    bool any_catcher = false;
+    for (const arhost_object &object : elements<arhost_object>(arena, arena.objects)) {
+        const std::uint64_t count = std::max(geometries[object.geometry].indices.count, std::uint32_t{1});
+        all += count;
+        if (object.role != ARHOST_CATCHER)
+            continue;
+        if (is_instance(object))
+            return false;
+        any_catcher = true;
+        of_catchers += count;
+    }
+    return any_catcher && 8 * of_catchers <= all;
+}
+
+// As an 8-bit code has it: the mean over several samples then rounds to that code.
+float alpha_of_code(float alpha) {
+    return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
+}
+
 bool report_build(void *host, double fraction) {
     const auto &h = *static_cast<const arhost::Host *>(host);
     h.progress(fraction, "building the acceleration structure");
@@ -150,8 +177,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     root_ = new_scene(anything_moves ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
     if (anything_moves)
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
-    catchers_ = new_scene(RTC_SCENE_FLAG_NONE);
-    bool catchers_stand_alone = true;
+    if (catchers_deserve_a_tree(arena))
+        catchers_ = new_scene(RTC_SCENE_FLAG_NONE);
     view_.has_instances = anything_moves;
     for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
         textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
@@ -168,18 +195,15 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         view_.has_occluders |= object.role == ARHOST_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
 
-        const bool is_instance = object.deforms || object.moves || objects_.back().has_transform;
-        if (object.role == ARHOST_CATCHER)
-            catchers_stand_alone &= !is_instance;
         if (object.deforms) {
             attach(root_.get(), new_instance(deforming_scene(number), object.world_from_object), number);
-        } else if (is_instance) {
+        } else if (is_instance(object)) {
             view_.has_instances = true;
             attach(root_.get(), new_instance(instanced_scene(number), object.world_from_object), number);
         } else {
             const GeometryHandle geometry = new_geometry(number);
             attach(static_ ? static_.get() : root_.get(), geometry, number);
-            if (object.role == ARHOST_CATCHER)
+            if (catchers_ && object.role == ARHOST_CATCHER)
                 rtcAttachGeometryByID(catchers_.get(), geometry.get(), number);
         }
     }
@@ -194,11 +218,11 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         rtcAttachGeometryByID(root_.get(), instance.get(), static_cast<unsigned>(from.size()));
     }
     commit(root_.get());
-    if (catchers_stand_alone)
+    if (catchers_)
         commit(catchers_.get());
 
     view_.root = root_.get();
-    view_.catchers = catchers_stand_alone ? catchers_.get() : root_.get();
+    view_.catchers = catchers_ ? catchers_.get() : root_.get();
     view_.packet_width = native_packet_width(device_.get());
     view_.objects = objects_.data();
     const auto lights = elements<arhost_light>(arena, arena.lights);
@@ -207,8 +231,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.max_depth = arena.max_depth;
     copy3(arena.ambient, view_.ambient);
     copy3(arena.background, view_.background);
-    view_.shadow_alpha_opaque = arena.shadow_alpha_opaque;
-    view_.shadow_alpha_translucent = arena.shadow_alpha_translucent;
+    view_.shadow_alpha_opaque = alpha_of_code(arena.shadow_alpha_opaque);
+    view_.shadow_alpha_translucent = alpha_of_code(arena.shadow_alpha_translucent);
     view_.coloured_shadows = arena.coloured_shadows != 0;
     for (int code = 0; code < 256; ++code)
         linear_of_srgb8_.push_back(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));

@@ -73,7 +73,7 @@ private:
     std::vector<Instanced> instanced_;
     std::map<std::uint32_t, Deforming> deforming_; // by object
     SceneHandle static_, root_;                    // the former only where something moves
-    SceneHandle catchers_; // alone, unless one is an instance: their rays needn't walk everything else's triangles
+    SceneHandle catchers_;                         // nothing but them, where that is worth it
     struct Place {
         Box local;
         std::array<float, 12> world_from_object;

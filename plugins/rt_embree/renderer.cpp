@@ -106,7 +106,7 @@ struct Pose {
     }
 };
 
-// Of a still picture: the noise that is left is below half a code. From then on it stays as it is.
+// Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {

@@ -120,8 +120,7 @@ TEST(MovingScene, BeginsAgainWithoutAJump) {
         const arhost_motion motion = evaluator.at(time_s);
         std::vector<float> places;
         for (std::uint32_t i = 0; i < motion.moved_count; ++i)
-            places.insert(places.end(), motion.moved[i].world_from_object + 9,
-                          motion.moved[i].world_from_object + 12);
+            places.insert(places.end(), motion.moved[i].world_from_object, motion.moved[i].world_from_object + 12);
         for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
             places.insert(places.end(), motion.deformed[i].positions,
                           motion.deformed[i].positions + 3 * std::size_t(motion.deformed[i].vertex_count));

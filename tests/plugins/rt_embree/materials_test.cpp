@@ -247,6 +247,27 @@ TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
     EXPECT_GT(counts.at(153), 100);
 }
 
+TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
+    const auto under_glass = [] {
+        ArenaBuilder builder;
+        builder.add_object("floor", builder.add_triangles(square(400)),
+                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_CATCHER);
+        builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
+                           builder.add_material(clear_glass()));
+        builder.add_light(light(0, -20, 500, 1));
+        return builder;
+    };
+    for (const char *samples : {"1", "2", "8", "11", "12", "13", "64"}) {
+        Tracer tracer(under_glass(), {{"samples", samples}, {"accumulate", "true"}});
+        ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+        for (int frame = 0; frame < 5; ++frame) {
+            Picture picture(pinhole());
+            ASSERT_EQ(tracer.try_render(from_above(), picture), ARHOST_OK);
+            EXPECT_EQ(picture.alphas(), (std::map<int, int>{{77, 200 * 150}})) << samples << ", frame " << frame;
+        }
+    }
+}
+
 TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),

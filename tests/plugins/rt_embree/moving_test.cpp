@@ -16,6 +16,7 @@ namespace arhost::test {
 namespace {
 
 using scene::ArenaBuilder;
+using scene::Motion;
 
 ArenaBuilder with_floor_and_light() {
     ArenaBuilder builder;
@@ -93,6 +94,32 @@ rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
 }
 
 } // namespace
+
+// Catchers that stand still have a tree of their own, others lie in the common one: the picture is the same.
+TEST(Moving, CatchersCatchWhereverTheyLie) {
+    const auto scene = [](const glm::mat4x3 &place, bool moves, float raised) {
+        ArenaBuilder builder = with_floor_and_light();
+        builder.settings.duration_s = 1;
+        const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {}});
+        builder.add_channel({.node = node, .times = {0, 1}, .values = {0, 0, 0, 0, 0, 20}});
+        scene::TriangleMesh shelf = square(15);
+        for (glm::vec3 &p : shelf.positions)
+            p += glm::vec3(30, 10, raised);
+        builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_CATCHER,
+                           place, moves ? Motion{.moves = true, .node = node} : Motion{});
+        // So many triangles that the catchers' tree is worth it.
+        builder.add_object("sheet", builder.add_triangles(sheet(10)), builder.add_material(shiny(0.5f, 0.4f, 30)));
+        return builder;
+    };
+    glm::mat4x3 up(1);
+    up[3].z = 10;
+    const Picture plain = at_time(scene(glm::mat4x3(1), false, 15), 0.5);
+    EXPECT_GT(plain.alphas().at(153), 100);
+    expect_alike(at_time(scene(up, false, 5), 0.5), plain);
+    expect_alike(at_time(scene(glm::mat4x3(1), true, 5), 0.5), plain);
+    const Picture elsewhere = at_time(scene(glm::mat4x3(1), true, 5), 0.1);
+    EXPECT_NE(elsewhere.pixels(), plain.pixels());
+}
 
 TEST(Moving, AnObjectIsWhereItsNodeIs) {
     ArenaBuilder moving = with_floor_and_light();
