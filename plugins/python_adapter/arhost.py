@@ -324,6 +324,6 @@ class _Adapter:
         def write():
             more = self.plugin.write(Fields(bgr=_pixels(bgr, height, width, 3, stride), height=height, width=width,
                                             record=np.ndarray(1, RECORD, record).view(np.recarray)[0]))
-            return END if more is False else OK
+            return OK if more is None or more else END
 
         return self._with_memory([bgr, record], write)

@@ -23,8 +23,7 @@ protected:
 
 // The counting plugins, but for the one under test; six frames.
 std::string chain(const std::string &replaced, const std::string &by) {
-    std::string text = counting("lockstep", "frames: 6", "", "");
-    std::istringstream lines(text);
+    std::istringstream lines(counting("lockstep", "frames: 6", "", ""));
     std::string result;
     for (std::string line; std::getline(lines, line);)
         result += line.starts_with(replaced) ? by + "\n" : line + "\n";
@@ -34,9 +33,8 @@ const std::string tracker = chain(
     "tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, markers: [{id: 3, side_mm: 80}]}");
 const std::string raytracer =
     chain("raytracer:", "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}");
-const std::string source = chain("source:", "source: {plugin: source_python, options: {script: script.py}}");
-const std::string sink =
-    chain("outputs:", "outputs: [{plugin: sink_python, path: out.txt, options: {script: script.py}}]");
+const char *const sink = "version: 1\nsource: {plugin: source_counter, options: {frames: 1000}}\n"
+                         "outputs: [{plugin: sink_python, options: {script: script.py}}]\nstats: stats.json\n";
 
 int run_script(ArhostRun &run, const std::string &script) {
     run.write("scene.yaml", small_scene);
@@ -118,7 +116,7 @@ class Tracer:
 TEST_F(PythonAdapter, SourceAndSinkPassFramesOn) {
     ArhostRun run(
         "version: 1\nsource: {plugin: source_python, options: {script: script.py, class: Source, "
-        "arguments: '{\"frames\": 4}'}}\n"
+        "arguments: '{\"frames\": 3}'}}\n"
         "outputs: [{plugin: sink_python, path: out.txt, options: {script: script.py}}]\nstats: stats.json\n");
     EXPECT_EQ(run_script(run, R"(
 import arhost
@@ -126,7 +124,7 @@ class Source:
     def __init__(self, host, frames): self.frames = frames
     def start(self, setup): return {"width": 66, "height": 34, "pixel_format": arhost.NV12, "fps": 25}
     def read(self, buffer):
-        if buffer.sequence == self.frames: return None
+        if buffer.sequence >= self.frames: return None
         y, uv = buffer.planes
         y[...], uv[...] = 16 + 20 * buffer.sequence, 128
         return 40_000_000 * buffer.sequence
@@ -136,14 +134,26 @@ class Sink:
     def write(self, output):
         r = output.record
         print(r.sequence, r.capture_ns // 1000000, r.overlay, output.bgr.shape, output.bgr[0, 0], file=self.file)
-        return r.sequence < 2
     def stop(self): self.file.close()
 )"),
               0)
         << run.output();
     EXPECT_EQ(run.read("out.txt"), "0 0 3 (34, 66, 3) [0 0 0]\n"
                                    "1 40 3 (34, 66, 3) [23 23 23]\n"
-                                   "2 80 3 (34, 66, 3) [47 47 47]\n"); // and then it ended the run
+                                   "2 80 3 (34, 66, 3) [47 47 47]\n");
+}
+
+TEST_F(PythonAdapter, ASinkEndsTheRunByReturningFalse) {
+    ArhostRun run(sink);
+    EXPECT_EQ(run_script(run, R"(
+class Sink:
+    def __init__(self, host): pass
+    def start(self, setup): pass
+    def write(self, output): return output.record.sequence < 2
+)"),
+              0)
+        << run.output();
+    EXPECT_LT(run.stats()["frames"]["in"], 1000);
 }
 
 TEST_F(PythonAdapter, ThreadsOfAScriptRunBetweenItsCalls) {
