@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -99,7 +102,7 @@ void copy_folder(const fs::path &from, const fs::path &to, const Words &words) {
 
 int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
     check_name(plugin.name, prefix);
-    const fs::path folder = plugin.into / plugin.name, unfinished = plugin.into / (plugin.name + ".part");
+    const fs::path folder = plugin.into / plugin.name;
     if (fs::symlink_status(folder).type() != fs::file_type::not_found)
         throw std::runtime_error(folder.string() +
                                  " is there already, and is left as it is; choose another name or --into");
@@ -108,15 +111,20 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
         throw std::runtime_error("the SDK's templates are missing: " + templates.string() + "; install arhost again");
 
     const Words words = words_for(plugin, prefix);
-    fs::remove_all(unfinished); // of a run that was killed
+    fs::create_directories(plugin.into);
+    std::string pattern = folder.string() + ".XXXXXX";
+    if (!::mkdtemp(pattern.data()))
+        throw std::runtime_error("can't make a folder in " + plugin.into.string() + ": " + std::strerror(errno));
+    const fs::path workshop = pattern;
     try {
         for (const fs::path &part :
              {fs::path(plugin.kind), fs::path(plugin.language), fs::path(plugin.language) / plugin.kind})
-            copy_folder(templates / part, unfinished, words);
-        fs::rename(unfinished, folder);
+            copy_folder(templates / part, workshop / plugin.name, words);
+        fs::rename(workshop / plugin.name, folder);
+        fs::remove_all(workshop);
     } catch (...) {
         std::error_code ignored;
-        fs::remove_all(unfinished, ignored);
+        fs::remove_all(workshop, ignored);
         throw;
     }
     std::printf("%s: a %s in %s that works. README.md in there tells how to build it, run it and go on.\n",

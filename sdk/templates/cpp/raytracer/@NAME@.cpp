@@ -124,7 +124,7 @@ constexpr arhost_descriptor descriptor = {
     0,
     std::size(options),
     options,
-    nullptr, // device nodes that it needs ("/dev/video*")
+    nullptr, // what of the machine it needs: arhost/plugin.h
 };
 
 } // namespace

@@ -78,7 +78,7 @@ constexpr arhost_descriptor descriptor = {
     ARHOST_CAN_SEEK,
     std::size(options),
     options,
-    nullptr, // device nodes that it needs ("/dev/video*")
+    nullptr, // what of the machine it needs: arhost/plugin.h
 };
 
 } // namespace
