@@ -22,7 +22,8 @@ if(ARHOST_SANITIZE)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
 endif()
 
-set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost)
+# As in an installed arhost, so that programs find each other in the same way.
+set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost/plugins)
 add_custom_target(plugins COMMENT "All plugins")
 
 # arhost_add_library(name SOURCES … [LIBRARIES …]): a room of core/, included as <room/header.h>.
@@ -33,21 +34,9 @@ function(arhost_add_library name)
   target_link_libraries(${name} PUBLIC ${ARG_LIBRARIES})
 endfunction()
 
-# arhost_add_plugin(name SOURCES … [LIBRARIES …]): plugins/<name> → lib/arhost/<name>.so. It sees the
-# C ABI and the shading headers of core/, and nothing else of it.
-function(arhost_add_plugin name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
-  add_library(${name} MODULE ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE arhost::abi ${ARG_LIBRARIES})
-  target_include_directories(${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
-  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${ARHOST_PLUGIN_DIRECTORY})
-  # arhost_entry is the one symbol that leaves the library.
-  target_link_options(${name} PRIVATE -Wl,--version-script=${CMAKE_SOURCE_DIR}/cmake/plugin.map)
-  if(CMAKE_CURRENT_SOURCE_DIR MATCHES "^${CMAKE_SOURCE_DIR}/plugins/")
-    add_dependencies(plugins ${name})
-  endif()
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${CMAKE_SOURCE_DIR}/cmake/plugin.map)
-endfunction()
+# arhost_add_plugin(name SOURCES … [LIBRARIES …]): the SDK's own way to build a plugin. It sees the C ABI and the
+# shading headers of core/, and nothing else of it.
+include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…]): a GoogleTest
 # program, each of its tests a test of ctest, run in a scratch folder of its own.

@@ -4,6 +4,7 @@
 #include "config/schema.hpp"
 #include "host/probe.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -19,10 +20,10 @@ fs::path own_folder() {
     return fs::read_symlink("/proc/self/exe").parent_path();
 }
 fs::path built_in_plugins() {
-    return (own_folder() / "../lib/arhost").lexically_normal();
+    return own_prefix() / "lib/arhost/plugins";
 }
 
-supervise::Context make_context(ring::Reactor &reactor, supervise::Launcher &launcher, Console &console) {
+supervise::Context make_context(ring::Reactor &reactor, supervise::Starter &launcher, Console &console) {
     return {reactor, launcher, own_folder() / "arhost-worker",
             [&console](arhost_severity severity, const std::string &component, const std::string &text) {
                 console.log(severity, component, text);
@@ -54,6 +55,20 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     return coordinates;
 }
 
+void lift_deadlines(config::Configuration &configuration) {
+    const auto lift = [](config::ComponentConfiguration &component) {
+        supervise::Limits &limits = component.limits;
+        limits.start = limits.frame = limits.stop = std::chrono::hours(1000);
+    };
+    if (configuration.source)
+        lift(*configuration.source);
+    if (configuration.tracker)
+        lift(*configuration.tracker);
+    if (configuration.raytracer)
+        lift(*configuration.raytracer);
+    std::for_each(configuration.outputs.begin(), configuration.outputs.end(), lift);
+}
+
 config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
@@ -66,6 +81,8 @@ config::Configuration parse_configuration(yaml::Node &root, const Arguments &arg
     config::Configuration configuration = config::parse(root, built_in_plugins());
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
+    if (arguments.without_deadlines)
+        lift_deadlines(configuration);
     return configuration;
 }
 
@@ -176,7 +193,7 @@ bool write_whole(const fs::path &file, const char *key, Console &console, const 
     return false;
 }
 
-int run(const config::Configuration &configuration, bool verbose, supervise::Launcher &launcher) {
+int run(const config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
@@ -237,15 +254,19 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Lau
 
 } // namespace
 
-int run(const Arguments &arguments, supervise::Launcher &launcher) {
+fs::path own_prefix() {
+    return own_folder().parent_path();
+}
+
+int run(const Arguments &arguments, supervise::Starter &launcher) {
     return run(read_configuration(arguments), arguments.verbose, launcher);
 }
 
-int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Launcher &launcher) {
+int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher) {
     return run(replay_configuration(arguments, replay), arguments.verbose, launcher);
 }
 
-int check(const Arguments &arguments, supervise::Launcher &launcher) {
+int check(const Arguments &arguments, supervise::Starter &launcher) {
     Console console(arguments.verbose);
     const config::Configuration configuration = read_configuration(arguments);
     warn_of_trajectory(configuration, console);
@@ -283,7 +304,7 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
     return success;
 }
 
-int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher) {
+int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher) {
     Console console(verbose);
     ring::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);

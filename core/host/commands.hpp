@@ -6,6 +6,7 @@
 #include "camera/coordinates.hpp"
 #include "host/console.hpp"
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ struct Arguments {
     std::optional<double> g1, g2;
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
+    bool without_deadlines = false; // for debuggers
 };
 
 // `arhost replay`.
@@ -32,11 +34,14 @@ struct ReplayArguments {
     bool with_pipeline = false;
 };
 
-// All take a launcher that was forked before any thread.
-int run(const Arguments &arguments, supervise::Launcher &launcher);
-int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Launcher &launcher);
-int check(const Arguments &arguments, supervise::Launcher &launcher);
-int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher);
+// A launcher is to be forked before any thread.
+int run(const Arguments &arguments, supervise::Starter &launcher);
+int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
+int check(const Arguments &arguments, supervise::Starter &launcher);
+int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher);
 int print_schema(bool markdown);
+
+// Where this arhost is installed: <prefix>/bin/arhost.
+std::filesystem::path own_prefix();
 
 } // namespace arhost::host

@@ -2,6 +2,7 @@
 //
 // arhost: the command line.
 #include "host/commands.hpp"
+#include "host/new_plugin.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -104,6 +105,18 @@ int main(int argc, char **argv) {
     CLI::App *schema_command = app.add_subcommand("schema", "Print the JSON Schema of configurations, for editors");
     schema_command->add_flag("--markdown", markdown, "As the table of docs/config.md");
 
+    NewPlugin plugin;
+    CLI::App *new_plugin_command =
+        app.add_subcommand("new-plugin", "Make a working plugin to begin with (docs/backend-guide.md)");
+    new_plugin_command->add_option("KIND", plugin.kind, "What it is to be")
+        ->required()
+        ->check(CLI::IsMember(plugin_kinds));
+    new_plugin_command->add_option("NAME", plugin.name, "Its name, and its folder's")->required();
+    new_plugin_command->add_option("--language", plugin.language, "What to write it in")
+        ->required()
+        ->check(CLI::IsMember(plugin_languages));
+    new_plugin_command->add_option("--into", plugin.into, "The folder to make it in (here)")->type_name("DIR");
+
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
@@ -112,6 +125,8 @@ int main(int argc, char **argv) {
     try {
         if (*schema_command)
             return print_schema(markdown);
+        if (*new_plugin_command)
+            return new_plugin(plugin, own_prefix());
         arhost::supervise::Launcher launcher; // before any thread
         if (*replay_command)
             return replay(arguments, replay_arguments, launcher);

@@ -24,7 +24,7 @@ ReadImage *reader() {
     static ReadImage *const found = [] {
         // By its path: under sanitizers dlopen is theirs, and knows no RUNPATH of ours.
         const std::filesystem::path file =
-            std::filesystem::read_symlink("/proc/self/exe").parent_path() / "../lib/arhost-images.so";
+            std::filesystem::read_symlink("/proc/self/exe").parent_path() / "../lib/arhost/arhost-images.so";
         void *module = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
         void *symbol = module ? ::dlsym(module, read_image_symbol) : nullptr;
         if (!symbol)

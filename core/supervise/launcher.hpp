@@ -33,19 +33,28 @@ struct Exit {
 
 double cpu_seconds(const rusage &usage); // user and system
 
-class Launcher {
+// What starts workers: the launcher, or whatever stands in for it (core/inprocess).
+class Starter {
+public:
+    virtual ~Starter() = default;
+
+    // Throws std::runtime_error where no process can be had.
+    virtual Spawned spawn(const std::filesystem::path &program) = 0;
+
+    // How a process that is dead already (its pidfd is readable) ended. Waits until that is known.
+    virtual Exit wait_exit(pid_t pid) = 0;
+};
+
+class Launcher final : public Starter {
 public:
     // Forks. To be called while the process has one thread.
     Launcher();
-    ~Launcher();
+    ~Launcher() override;
     Launcher(const Launcher &) = delete;
     Launcher &operator=(const Launcher &) = delete;
 
-    // Throws std::runtime_error where no process can be had.
-    Spawned spawn(const std::filesystem::path &program);
-
-    // How a process that is dead already (its pidfd is readable) ended. Waits for the launcher to say so.
-    Exit wait_exit(pid_t pid);
+    Spawned spawn(const std::filesystem::path &program) override;
+    Exit wait_exit(pid_t pid) override;
 
 private:
     ring::UniqueFd socket_;

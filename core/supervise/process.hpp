@@ -23,7 +23,7 @@ using LogFunction =
 // What every component of a host shares.
 struct Context {
     ring::Reactor &reactor;
-    Launcher &launcher;
+    Starter &launcher;
     std::filesystem::path worker_program;
     LogFunction log;
 };

@@ -59,8 +59,9 @@ const arhost_plugin &open_plugin(const std::filesystem::path &file) {
         refuse("its negotiate gave no (whole) arhost_plugin");
     if (!plugin->descriptor || plugin->descriptor->struct_size < sizeof(arhost_descriptor) || !plugin->descriptor->id)
         refuse("has no (whole) descriptor");
-    if (file.stem() != plugin->descriptor->id)
-        refuse("its id is '" + std::string(plugin->descriptor->id) + "'; the file must bear that name");
+    const std::string id = plugin->descriptor->id;
+    if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
+        refuse("its id is '" + id + "'; the file must bear that name");
     if (!plugin->create || !plugin->destroy || !plugin->get_extension)
         refuse("lacks create, destroy or get_extension");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)

@@ -1,24 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// arhost-worker: opens one plugin and serves it, or loads one scene. Started by the host's launcher with
-// its control channel as descriptor 3 and its doorbell as descriptor 4; of no use by hand.
+#include "worker/session.hpp"
+
 #include "worker/library.hpp"
-#include "worker/link.hpp"
 #include "worker/loader.hpp"
 #include "worker/services.hpp"
 
-#include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <fcntl.h>
 #include <sys/prctl.h>
 
 namespace arhost::worker {
 namespace {
 
 using namespace ring;
-
-constexpr int control_fd = 3, doorbell_fd = 4;
 
 // The host's callbacks for a plugin, and the last error that it logged, for `failed`.
 class HostSide {
@@ -194,25 +188,20 @@ int serve(Link &link) {
 }
 
 } // namespace
-} // namespace arhost::worker
 
-int main() {
-    using namespace arhost;
-    if (::fcntl(worker::control_fd, F_GETFD) < 0 || ::fcntl(worker::doorbell_fd, F_GETFD) < 0) {
-        std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
-        return 2;
-    }
-    worker::Link link{ring::Channel(ring::UniqueFd(worker::control_fd)), ring::UniqueFd(worker::doorbell_fd)};
+int work(Link &link) {
     try {
-        return worker::serve(link);
-    } catch (const worker::HostGone &) {
+        return serve(link);
+    } catch (const HostGone &) {
         return EXIT_FAILURE; // nobody is left to tell
     } catch (const std::exception &error) {
         try {
             const arhost_status status = link.serving ? ARHOST_ERROR_INTERNAL : ARHOST_ERROR_CONFIGURATION;
             link.send({{"type", "failed"}, {"status", status}, {"text", error.what()}});
-        } catch (const worker::HostGone &) {
+        } catch (const HostGone &) {
         }
         return EXIT_FAILURE;
     }
 }
+
+} // namespace arhost::worker

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/new_plugin.hpp"
+
+#include "host/commands.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+
+namespace arhost::host {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::map<std::string, std::string>; // "@NAME@" → what stands for it
+
+// What a kind is called elsewhere.
+struct Kind {
+    const char *section; // of a configuration
+    const char *python;  // the plugin that runs a class of this kind
+    const char *count;   // of the statistics: frames that have come through it
+};
+const std::map<std::string, Kind> kinds = {{"raytracer", {"raytracer", "rt_python", "augmented"}},
+                                           {"tracker", {"tracker", "tracker_python", "tracked"}},
+                                           {"source", {"source", "source_python", "in"}},
+                                           {"sink", {"outputs[0]", "sink_python", "composited"}}};
+
+void check_name(const std::string &name, const fs::path &prefix) {
+    const auto refuse = [&](const std::string &why) { throw std::runtime_error("the name '" + name + "' " + why); };
+    const auto fits = [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; };
+    if (name.empty() || name.size() > 64 || !std::islower(static_cast<unsigned char>(name[0])) ||
+        !std::all_of(name.begin(), name.end(), fits))
+        refuse("must be 1 to 64 small letters, digits and underscores, the first a letter, as in 'my_tracer'");
+    // Targets of CMake's, crates of Rust's, modules of Python's.
+    for (const char *taken : {"all", "alloc", "arhost", "build", "clean", "core", "crate", "deps", "help", "install",
+                              "json", "numpy", "out", "package", "self", "std", "super", "sys", "test"})
+        if (name == taken)
+            refuse("has a meaning of its own in a build tool or a language; choose another, as 'my_" + name + "'");
+    if (fs::exists(prefix / "lib/arhost/plugins" / (name + ".so")))
+        refuse("is that of a plugin that comes with arhost; choose another, as 'my_" + name + "'");
+}
+
+std::string camel_case(const std::string &name) {
+    std::string result;
+    bool begins = true;
+    for (const char c : name) {
+        if (c != '_')
+            result += begins ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
+        begins = c == '_';
+    }
+    return result;
+}
+
+Words words_for(const NewPlugin &plugin, const fs::path &prefix) {
+    const Kind &kind = kinds.at(plugin.kind);
+    std::string component = "plugin: ./build/" + plugin.name + ".so";
+    if (plugin.language == "rust")
+        component = "plugin: ./target/debug/lib" + plugin.name + ".so";
+    else if (plugin.language == "python")
+        component = std::string("plugin: ") + kind.python + ", options: {script: " + plugin.name + ".py}";
+    return {{"@NAME@", plugin.name},      {"@CLASS@", camel_case(plugin.name)},
+            {"@KIND@", plugin.kind},      {"@SECTION@", kind.section},
+            {"@COUNT@", kind.count},      {"@PLUGIN@", component},
+            {"@PREFIX@", prefix.string()}};
+}
+
+std::string filled_in(std::string text, const Words &words) {
+    for (const auto &[word, value] : words)
+        for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; at += value.size())
+            text.replace(at, word.size(), value);
+    return text;
+}
+
+void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
+    std::ostringstream text;
+    text << std::ifstream(from, std::ios::binary).rdbuf();
+    fs::create_directories(to.parent_path());
+    std::ofstream file(to, std::ios::binary);
+    file << filled_in(text.str(), words) << std::flush;
+    if (!file)
+        throw std::runtime_error("can't write " + to.string());
+}
+
+// The files below `from`, but not those in its folders named after kinds.
+void copy_folder(const fs::path &from, const fs::path &to, const Words &words) {
+    for (auto it = fs::recursive_directory_iterator(from); it != fs::recursive_directory_iterator(); ++it) {
+        const bool is_kind = it.depth() == 0 && kinds.contains(it->path().filename().string());
+        if (it->is_directory() && is_kind)
+            it.disable_recursion_pending();
+        else if (!it->is_directory())
+            copy_file(it->path(), to / filled_in(it->path().lexically_relative(from).string(), words), words);
+    }
+}
+
+} // namespace
+
+int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
+    check_name(plugin.name, prefix);
+    const fs::path folder = plugin.into / plugin.name;
+    if (fs::symlink_status(folder).type() != fs::file_type::not_found)
+        throw std::runtime_error(folder.string() +
+                                 " is there already, and is left as it is; choose another name or --into");
+    const fs::path templates = prefix / "share/arhost/templates";
+    if (!fs::is_directory(templates))
+        throw std::runtime_error("the SDK's templates are missing: " + templates.string() + "; install arhost again");
+
+    const Words words = words_for(plugin, prefix);
+    fs::create_directories(plugin.into);
+    std::string pattern = folder.string() + ".XXXXXX";
+    if (!::mkdtemp(pattern.data()))
+        throw std::runtime_error("can't make a folder in " + plugin.into.string() + ": " + std::strerror(errno));
+    const fs::path workshop = pattern;
+    try {
+        for (const fs::path &part :
+             {fs::path(plugin.kind), fs::path(plugin.language), fs::path(plugin.language) / plugin.kind})
+            copy_folder(templates / part, workshop / plugin.name, words);
+        fs::rename(workshop / plugin.name, folder);
+        fs::remove_all(workshop);
+    } catch (...) {
+        std::error_code ignored;
+        fs::remove_all(workshop, ignored);
+        throw;
+    }
+    std::printf("%s: a %s in %s that works. README.md in there tells how to build it, run it and go on.\n",
+                folder.c_str(), plugin.kind.c_str(), plugin.language.c_str());
+    return success;
+}
+
+} // namespace arhost::host

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Starts workers as threads of this process. To the host they look like processes, but for one thing: nothing ends
+// them but themselves.
+#pragma once
+
+#include "supervise/launcher.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace arhost::inprocess {
+
+class ThreadStarter final : public supervise::Starter {
+public:
+    ThreadStarter() = default;
+    ~ThreadStarter() override; // waits for all
+    ThreadStarter(const ThreadStarter &) = delete;
+    ThreadStarter &operator=(const ThreadStarter &) = delete;
+
+    supervise::Spawned spawn(const std::filesystem::path &program) override; // the program is not looked at
+    supervise::Exit wait_exit(pid_t pid) override;
+
+private:
+    std::mutex mutex_;
+    std::condition_variable ended_;
+    std::deque<supervise::Exit> exits_;
+    std::vector<std::thread> threads_;
+};
+
+} // namespace arhost::inprocess

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-worker: started by the host's launcher with its control channel as descriptor 3 and its doorbell as
+// descriptor 4; of no use by hand.
+#include "worker/session.hpp"
+
+#include <cstdio>
+#include <fcntl.h>
+
+int main() {
+    using namespace arhost;
+    constexpr int control_fd = 3, doorbell_fd = 4;
+    if (::fcntl(control_fd, F_GETFD) < 0 || ::fcntl(doorbell_fd, F_GETFD) < 0) {
+        std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
+        return 2;
+    }
+    worker::Link link{ring::Channel(ring::UniqueFd(control_fd)), ring::UniqueFd(doorbell_fd)};
+    return worker::work(link);
+}

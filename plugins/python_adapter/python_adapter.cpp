@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Runs a class of a Python script in CPython. What the class sees is made by arhost.py; this file starts the
+// interpreter, hands memory over as memoryviews, and takes statuses back. The interpreter's lock is held during
+// calls only, so that threads of the script run between them.
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "arhost_py.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <dlfcn.h>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#if defined(KIND_SOURCE)
+#define KIND ARHOST_KIND_SOURCE
+#define METHOD "read"
+#elif defined(KIND_TRACKER)
+#define KIND ARHOST_KIND_TRACKER
+#define METHOD "track"
+#elif defined(KIND_RAYTRACER)
+#define KIND ARHOST_KIND_RAYTRACER
+#define METHOD "render"
+#else
+#define KIND ARHOST_KIND_SINK
+#define METHOD "write"
+#endif
+
+namespace {
+
+using namespace arhost;
+
+// A reference that is given back; null where Python has raised.
+class Object {
+public:
+    Object(PyObject *owned = nullptr) : object_(owned) {} // NOLINT(google-explicit-constructor)
+    Object(Object &&other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
+    Object &operator=(Object &&other) noexcept {
+        std::swap(object_, other.object_);
+        return *this;
+    }
+    Object(const Object &) = delete;
+    Object &operator=(const Object &) = delete;
+    ~Object() { Py_XDECREF(object_); }
+    PyObject *get() const { return object_; }
+    PyObject *release() { return std::exchange(object_, nullptr); }
+    explicit operator bool() const { return object_ != nullptr; }
+
+private:
+    PyObject *object_;
+};
+
+class Locked {
+public:
+    Locked() : state_(PyGILState_Ensure()) {}
+    ~Locked() { PyGILState_Release(state_); }
+    Locked(const Locked &) = delete;
+    Locked &operator=(const Locked &) = delete;
+
+private:
+    PyGILState_STATE state_;
+};
+
+std::string text_of(PyObject *object) {
+    const Object text(PyObject_Str(object));
+    const char *bytes = text ? PyUnicode_AsUTF8(text.get()) : nullptr;
+    PyErr_Clear();
+    return bytes ? bytes : "";
+}
+
+// What Python has raised outside of arhost.py's own care.
+std::string take_error() {
+    PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+    PyErr_Fetch(&type, &value, &trace);
+    const Object owned_type(type), owned_value(value), owned_trace(trace);
+    return value ? text_of(value) : type ? text_of(type) : "an error of unknown kind";
+}
+
+Object checked(PyObject *object) {
+    if (!object)
+        throw Failure(ARHOST_ERROR_INTERNAL, "Python: " + take_error());
+    return object;
+}
+
+Object view(const void *bytes, std::size_t size, int flag = PyBUF_READ) {
+    static const char nothing = 0;
+    const auto *start = static_cast<const char *>(bytes ? bytes : &nothing);
+    return checked(PyMemoryView_FromMemory(const_cast<char *>(start), static_cast<Py_ssize_t>(size), flag));
+}
+template <class T> Object view_of(const T *object) {
+    return object ? view(object, sizeof *object) : Object(Py_NewRef(Py_None));
+}
+
+Object tuple_of(std::vector<Object> &&objects) {
+    Object tuple = checked(PyTuple_New(static_cast<Py_ssize_t>(objects.size())));
+    for (std::size_t i = 0; i < objects.size(); ++i)
+        PyTuple_SET_ITEM(tuple.get(), static_cast<Py_ssize_t>(i), objects[i].release());
+    return tuple;
+}
+
+std::size_t plane_size(const arhost_frame_format &format, std::uint32_t plane) {
+    const bool halved = plane > 0; // of NV12 and I420, the formats that have more planes than one
+    return std::size_t(format.stride[plane]) * (halved ? format.height / 2 : format.height);
+}
+template <class Plane> Object views_of_planes(const arhost_frame_format &format, const Plane *planes, int flag) {
+    std::vector<Object> views;
+    for (std::uint32_t i = 0; i < format.plane_count; ++i)
+        views.push_back(view(planes[i], plane_size(format, i), flag));
+    return tuple_of(std::move(views));
+}
+
+// ---- the host's callbacks; `self` is a capsule of the Host ----
+
+const Host &host_of(PyObject *self) {
+    return *static_cast<const Host *>(PyCapsule_GetPointer(self, nullptr));
+}
+PyObject *py_log(PyObject *self, PyObject *arguments) {
+    int severity = 0;
+    const char *text = nullptr;
+    if (!PyArg_ParseTuple(arguments, "is", &severity, &text))
+        return nullptr;
+    host_of(self).log(severity, text);
+    Py_RETURN_NONE;
+}
+PyObject *py_progress(PyObject *self, PyObject *arguments) {
+    double fraction = 0;
+    const char *what = "";
+    if (!PyArg_ParseTuple(arguments, "d|s", &fraction, &what))
+        return nullptr;
+    host_of(self).progress(fraction, what);
+    Py_RETURN_NONE;
+}
+PyObject *py_cancelled(PyObject *self, PyObject *) {
+    return PyBool_FromLong(host_of(self).cancelled());
+}
+PyMethodDef callbacks[] = {{"log", py_log, METH_VARARGS, "log(severity, text)"},
+                           {"progress", py_progress, METH_VARARGS, "progress(fraction, what)"},
+                           {"cancelled", py_cancelled, METH_NOARGS, "True: the running call is to return soon"}};
+
+// ---- the interpreter ----
+
+void initialise(const std::string &interpreter) {
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    if (Py_IsInitialized())
+        return;
+    // Modules in C look for Python's symbols among the global ones, and this plugin was opened with RTLD_LOCAL.
+    Dl_info info{};
+    if (::dladdr(reinterpret_cast<void *>(&Py_IsInitialized), &info))
+        ::dlopen(info.dli_fname, RTLD_NOW | RTLD_GLOBAL | RTLD_NOLOAD);
+    PyConfig config;
+    PyConfig_InitPythonConfig(&config);
+    config.install_signal_handlers = 0;
+    config.parse_argv = 0;
+    config.buffered_stdio = 0; // print() comes in its place in the log
+    config.write_bytecode = 0; // nothing is written beside the script
+    PyConfig_SetBytesString(&config, &config.program_name, interpreter.c_str());
+    const PyStatus status = Py_InitializeFromConfig(&config);
+    PyConfig_Clear(&config);
+    if (PyStatus_Exception(status))
+        throw Failure(ARHOST_ERROR_CONFIGURATION, std::string("Python can't be started: ") +
+                                                      (status.err_msg ? status.err_msg : "no reason given"));
+    PyEval_SaveThread();
+}
+
+// `import arhost`, for this plugin and for its script.
+Object import_arhost(const std::string &interpreter) {
+    if (PyObject *already = PyImport_AddModule("arhost"); already && PyObject_HasAttrString(already, "_Adapter"))
+        return Py_NewRef(already);
+    const Object code = checked(Py_CompileString(arhost_py, "arhost.py", Py_file_input));
+    Object module = PyImport_ExecCodeModule("arhost", code.get());
+    if (!module)
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
+                                                      "; install python3-numpy, or name the python of a virtual "
+                                                      "environment that has numpy in the option 'interpreter'");
+    // The structs of the headers, which arhost.py writes down once more.
+    const std::pair<const char *, std::size_t> sizes[] = {{"INTRINSICS", sizeof(arhost_intrinsics)},
+                                                          {"CAMERA", sizeof(arhost_camera)},
+                                                          {"FORMAT", sizeof(arhost_frame_format)},
+                                                          {"MARKER_CONFIG", sizeof(arhost_marker_config)},
+                                                          {"MARKER", sizeof(arhost_marker)},
+                                                          {"RECORD", sizeof(arhost_record)},
+                                                          {"MOVED", sizeof(arhost_moved_object)},
+                                                          {"BUFFER", sizeof(arhost_buffer)},
+                                                          {"GEOMETRY", sizeof(arhost_geometry)},
+                                                          {"TEXTURE", sizeof(arhost_texture)},
+                                                          {"MATERIAL", sizeof(arhost_material)},
+                                                          {"OBJECT", sizeof(arhost_object)},
+                                                          {"LIGHT", sizeof(arhost_light)},
+                                                          {"ENVIRONMENT", sizeof(arhost_environment)},
+                                                          {"SCENE", sizeof(arhost_scene)}};
+    for (const auto &[name, size] : sizes) {
+        const Object dtype = checked(PyObject_GetAttrString(module.get(), name));
+        const Object there = checked(PyObject_GetAttrString(dtype.get(), "itemsize"));
+        if (PyLong_AsSize_t(there.get()) != size)
+            throw Failure(ARHOST_ERROR_INTERNAL, std::string("arhost.py: ") + name + " is not as in the C headers");
+    }
+    return module;
+}
+
+// ---- the plugin ----
+
+class PythonAdapter {
+public:
+    PythonAdapter(const Host &host, const Options &options) : host_(host) {
+#if defined(KIND_SINK)
+        path_ = options.text("path");
+#endif
+        const std::string interpreter = options.text("interpreter");
+        initialise(interpreter);
+        const Locked locked;
+        const Object module = import_arhost(interpreter);
+        const Object capsule = checked(PyCapsule_New(&host_, nullptr, nullptr));
+        Object functions[3];
+        for (int i = 0; i < 3; ++i)
+            functions[i] = checked(PyCFunction_New(&callbacks[i], capsule.get()));
+        adapter_ = checked(PyObject_CallMethod(module.get(), "_Adapter", "sOOO", METHOD, functions[0].get(),
+                                               functions[1].get(), functions[2].get()));
+        try {
+            call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
+                 options.text("arguments").c_str());
+        } catch (...) {
+            adapter_ = Object(); // while the lock is held
+            throw;
+        }
+    }
+    ~PythonAdapter() {
+        const Locked locked;
+        adapter_ = Object();
+    }
+    PythonAdapter(const PythonAdapter &) = delete;
+    PythonAdapter &operator=(const PythonAdapter &) = delete;
+
+    void stop() {
+        const Locked locked;
+        call("stop", "");
+    }
+
+    // sources
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        const Locked locked;
+        const Answer answer = call("start_source", "KdNN", static_cast<unsigned long long>(setup.first_sequence),
+                                   setup.fps, PyBool_FromLong(setup.paced), view_of(setup.intrinsics).release());
+        arhost_frame_format &format = properties.format;
+        unsigned long long frames = 0;
+        require(PyArg_ParseTuple(answer.value.get(), "iIIdiiK", &format.pixel_format, &format.width, &format.height,
+                                 &format.fps, &format.yuv_matrix, &format.yuv_range, &frames));
+        properties.frame_count = frames;
+        if (!arhost_frame_layout(&format))
+            throw Failure(ARHOST_ERROR_CONFIGURATION, "start returned a frame format or size that is not valid");
+    }
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        const Locked locked;
+        const Answer answer =
+            call("read", "NKN", view_of(buffer.format).release(), static_cast<unsigned long long>(buffer.sequence),
+                 views_of_planes(*buffer.format, buffer.plane, PyBUF_WRITE).release());
+        if (answer.status == ARHOST_OK) {
+            long long capture_ns = 0;
+            require(PyArg_ParseTuple(answer.value.get(), "iL", &info.clock, &capture_ns));
+            info.capture_ns = capture_ns;
+        }
+        return answer.status;
+    }
+
+    // trackers
+    void start(const arhost_tracker_setup &setup) {
+        const Locked locked;
+        call("start_tracker", "NNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
+             view(setup.markers, setup.marker_count * sizeof *setup.markers).release());
+    }
+    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+        const Locked locked;
+        const arhost_frame_format &format = *frame.format;
+        const Answer answer = call("track", "KLiNNN", static_cast<unsigned long long>(frame.sequence),
+                                   static_cast<long long>(frame.capture_ns), frame.clock,
+                                   views_of_planes(format, frame.plane, PyBUF_READ).release(),
+                                   view(frame.grey, std::size_t(format.grey_stride) * format.height).release(),
+                                   view(result.markers, sizeof result.markers, PyBUF_WRITE).release());
+        const long count = PyLong_AsLong(answer.value.get());
+        if (count < 0 || count > ARHOST_MAX_MARKERS)
+            throw Failure(ARHOST_ERROR_INTERNAL, "track must return how many markers it has filled in, 0 to 64");
+        result.marker_count = static_cast<std::uint32_t>(count);
+    }
+
+    // ray tracers
+    void start(const arhost_raytracer_setup &setup) {
+        const Locked locked;
+        call("start_raytracer", "IINN", setup.width, setup.height,
+             view(setup.scene, setup.scene->byte_size).release(), view_of(setup.intrinsics).release());
+    }
+    void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
+        const Locked locked;
+        std::vector<Object> deformed;
+        const arhost_motion *motion = request.motion;
+        for (std::uint32_t i = 0; motion && i < motion->deformed_count; ++i) {
+            const arhost_deformed_geometry &geometry = motion->deformed[i];
+            const std::size_t size = std::size_t(geometry.vertex_count) * 12;
+            deformed.push_back(checked(
+                Py_BuildValue("INN", geometry.object, view(geometry.positions, size).release(),
+                              geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
+        }
+        const Answer answer =
+            call("render", "KdNNNNIII", static_cast<unsigned long long>(request.sequence), request.time_s,
+                 view_of(&request.camera).release(),
+                 view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
+                     .release(),
+                 tuple_of(std::move(deformed)).release(),
+                 view(image.rgba, std::size_t(image.stride) * (image.height - 1) + std::size_t(4) * image.width,
+                      PyBUF_WRITE)
+                     .release(),
+                 image.height, image.width, image.stride);
+        if (answer.value.get() != Py_None) {
+            info.has_region = 1;
+            require(PyArg_ParseTuple(answer.value.get(), "IIII", &info.region_x, &info.region_y, &info.region_width,
+                                     &info.region_height));
+        }
+    }
+
+    // sinks
+    void start(const arhost_sink_setup &setup) {
+        const Locked locked;
+        call("start_sink", "IIdKsN", setup.width, setup.height, setup.fps,
+             static_cast<unsigned long long>(setup.first_sequence), path_.c_str(),
+             view_of(setup.intrinsics).release());
+    }
+    arhost_status write(const arhost_output &output) {
+        const Locked locked;
+        return call("write", "NIIIN",
+                    view(output.bgr, std::size_t(output.stride) * (output.height - 1) + std::size_t(3) * output.width)
+                        .release(),
+                    output.height, output.width, output.stride, view_of(output.record).release())
+            .status;
+    }
+
+private:
+    struct Answer {
+        arhost_status status;
+        Object value;
+    };
+
+    // A method of _Adapter. Throws what it says has failed.
+    template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
+        const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
+        Answer answer{ARHOST_ERROR_INTERNAL, {}};
+        PyObject *value = nullptr;
+        require(PyArg_ParseTuple(pair.get(), "iO", &answer.status, &value));
+        answer.value = Py_NewRef(value);
+        if (answer.status < 0)
+            throw Failure(answer.status, text_of(value));
+        return answer;
+    }
+    static void require(int succeeded) {
+        if (!succeeded)
+            throw Failure(ARHOST_ERROR_INTERNAL, "Python: " + take_error());
+    }
+
+    Host host_;
+    std::string path_;
+    Object adapter_;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INPUT_PATH, "script", nullptr, "The Python script that has the class."),
+    option(ARHOST_OPTION_TEXT, "class", "", "The class; empty: the only one with a method '" METHOD "'."),
+    option(ARHOST_OPTION_TEXT, "arguments", "{}", "Further arguments of its constructor, a JSON object."),
+    option(ARHOST_OPTION_INPUT_PATH, "interpreter", "/usr/bin/python3",
+           "The python whose packages are used: that of a virtual environment, say."),
+#if defined(KIND_SINK)
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", "", "The file to write, for classes that write one."),
+#endif
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    KIND,
+    ID,
+    "Python",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Runs a class of a Python script.",
+    0,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+} // namespace
+
+#if defined(KIND_SOURCE)
+ARHOST_SOURCE(PythonAdapter, descriptor)
+#elif defined(KIND_TRACKER)
+ARHOST_TRACKER(PythonAdapter, descriptor)
+#elif defined(KIND_RAYTRACER)
+ARHOST_RAYTRACER(PythonAdapter, descriptor)
+#else
+ARHOST_SINK(PythonAdapter, descriptor)
+#endif

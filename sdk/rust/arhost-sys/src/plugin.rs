@@ -1,0 +1,422 @@
+// SPDX-License-Identifier: Apache-2.0
+//! What turns a Rust type into a plugin.
+
+use crate::abi::*;
+use crate::views::*;
+use std::ffi::{CStr, CString};
+use std::os::raw::{c_char, c_void};
+use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::slice;
+
+/// An error for the user: which `ARHOST_ERROR_…`, and a sentence that names what to mend.
+#[derive(Debug)]
+pub struct Failure {
+    pub status: arhost_status,
+    pub message: String,
+}
+
+impl Failure {
+    pub fn new(status: arhost_status, message: impl Into<String>) -> Self {
+        Failure { status, message: message.into() }
+    }
+}
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Failure::new(ARHOST_ERROR_IO, error.to_string())
+    }
+}
+
+/// The host's callbacks; every function may be called on any thread.
+#[derive(Clone, Copy)]
+pub struct Host(*const arhost_host);
+unsafe impl Send for Host {}
+unsafe impl Sync for Host {}
+
+impl Host {
+    pub fn log(&self, severity: arhost_severity, text: &str) {
+        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        unsafe {
+            if let Some(log) = (*self.0).log {
+                log(self.0, severity, text.as_ptr());
+            }
+        }
+    }
+    pub fn info(&self, text: &str) {
+        self.log(ARHOST_SEVERITY_INFO, text);
+    }
+    pub fn warn(&self, text: &str) {
+        self.log(ARHOST_SEVERITY_WARNING, text);
+    }
+    /// Tells that long work goes on: at least every few seconds in `new` and `start`.
+    pub fn progress(&self, fraction: f64, what: &str) {
+        let what = CString::new(what.replace('\0', " ")).unwrap_or_default();
+        unsafe {
+            if let Some(progress) = (*self.0).progress {
+                progress(self.0, fraction, what.as_ptr());
+            }
+        }
+    }
+    /// True once the running call is to return soon, with `ARHOST_ERROR_CANCELLED`.
+    pub fn cancelled(&self) -> bool {
+        unsafe { (*self.0).cancelled.map_or(false, |cancelled| cancelled(self.0) != 0) }
+    }
+}
+
+/// The option values. A key that the plugin does not declare is a defect, and panics.
+pub struct Options<'a>(&'a [arhost_option]);
+
+impl Options<'_> {
+    fn find(&self, key: &str) -> &arhost_option {
+        self.0
+            .iter()
+            .find(|option| unsafe { CStr::from_ptr(option.key) }.to_bytes() == key.as_bytes())
+            .unwrap_or_else(|| panic!("the option '{}' is not declared", key))
+    }
+    pub fn boolean(&self, key: &str) -> bool {
+        self.find(key).integer != 0
+    }
+    pub fn integer(&self, key: &str) -> i64 {
+        self.find(key).integer
+    }
+    pub fn real(&self, key: &str) -> f64 {
+        self.find(key).real
+    }
+    pub fn text(&self, key: &str) -> String {
+        unsafe { CStr::from_ptr(self.find(key).text) }.to_string_lossy().into_owned()
+    }
+}
+
+/// What every plugin is.
+pub trait Plugin: Sized {
+    fn new(host: Host, options: &Options) -> Result<Self, Failure>;
+    fn stop(&mut self) -> Result<(), Failure> {
+        Ok(())
+    }
+}
+
+pub trait Source: Plugin {
+    /// `properties.format` needs pixel_format, width, height, fps; its layout is filled in afterwards.
+    fn start(&mut self, setup: &arhost_source_setup, properties: &mut arhost_source_properties) -> Result<(), Failure>;
+    /// False: there are no more frames.
+    fn read(&mut self, buffer: &mut FrameBuffer, info: &mut arhost_frame_info) -> Result<bool, Failure>;
+}
+
+pub trait Tracker: Plugin {
+    fn start(&mut self, setup: &arhost_tracker_setup) -> Result<(), Failure>;
+    fn track(&mut self, frame: &Frame, result: &mut arhost_tracker_result) -> Result<(), Failure>;
+}
+
+pub trait Raytracer: Plugin {
+    fn start(&mut self, setup: &arhost_raytracer_setup) -> Result<(), Failure>;
+    fn render(
+        &mut self,
+        request: &arhost_render_request,
+        image: &mut Image,
+        info: &mut arhost_render_info,
+    ) -> Result<(), Failure>;
+}
+
+pub trait Sink: Plugin {
+    fn start(&mut self, setup: &arhost_sink_setup) -> Result<(), Failure>;
+    /// False: the user closed the window, the run is to end.
+    fn write(&mut self, output: &Output) -> Result<bool, Failure>;
+}
+
+/// Defines `arhost_entry`, the one symbol of a plugin:
+///
+/// ```ignore
+/// arhost_sys::plugin! {
+///     sink MySink, "my_sink", "Counts frames.",
+///     capabilities: 0,
+///     options: [
+///         option!(ARHOST_OPTION_INTEGER, "every", "1", "Counts each so-many-th.", 1.0, 1e6),
+///         option!(ARHOST_OPTION_OUTPUT_PATH, "path", required, "The file to write."),
+///     ]
+/// }
+/// ```
+#[macro_export]
+macro_rules! plugin {
+    ($kind:ident $type:ty, $id:literal, $description:literal, capabilities: $capabilities:expr,
+     options: [$($option:expr),* $(,)?]) => {
+        const _: () = {
+            const OPTIONS: &[$crate::arhost_option_descriptor] = &[$($option),*];
+            static DESCRIPTOR: $crate::arhost_descriptor = $crate::arhost_descriptor {
+                struct_size: std::mem::size_of::<$crate::arhost_descriptor>() as u32,
+                kind: $crate::kind::$kind,
+                id: $crate::c_text!($id),
+                name: $crate::c_text!($id),
+                version: $crate::c_text!(env!("CARGO_PKG_VERSION")),
+                vendor: $crate::c_text!(env!("CARGO_PKG_AUTHORS")),
+                licence: $crate::c_text!(env!("CARGO_PKG_LICENSE")),
+                description: $crate::c_text!($description),
+                capabilities: $capabilities,
+                option_count: OPTIONS.len() as u32,
+                options: OPTIONS.as_ptr(),
+                devices: std::ptr::null(),
+            };
+            static FUNCTIONS: $crate::table::$kind = $crate::$kind::<$type>();
+            static PLUGIN: $crate::arhost_plugin = $crate::plugin_of::<$type>(
+                &DESCRIPTOR,
+                &FUNCTIONS as *const $crate::table::$kind as *const std::os::raw::c_void,
+            );
+            unsafe extern "C" fn negotiate(
+                offer: *const $crate::arhost_offer,
+                answer: *mut $crate::arhost_answer,
+            ) -> $crate::arhost_status {
+                $crate::negotiate(&*offer, &mut *answer, &PLUGIN)
+            }
+            #[no_mangle]
+            pub static arhost_entry: $crate::arhost_entry_point = $crate::arhost_entry_point {
+                struct_size: std::mem::size_of::<$crate::arhost_entry_point>() as u32,
+                negotiate: Some(negotiate),
+            };
+        };
+    };
+}
+
+/// One option of [`plugin!`]: type, key, default (as in YAML) or `required`, help, and a number's bounds.
+#[macro_export]
+macro_rules! option {
+    (@ $type:expr, $key:literal, $default:expr, $help:literal, $minimum:expr, $maximum:expr) => {
+        $crate::arhost_option_descriptor {
+            struct_size: std::mem::size_of::<$crate::arhost_option_descriptor>() as u32,
+            type_: $type,
+            key: $crate::c_text!($key),
+            default_value: $default,
+            minimum: $minimum,
+            maximum: $maximum,
+            choices: std::ptr::null(),
+            help: $crate::c_text!($help),
+        }
+    };
+    ($type:expr, $key:literal, required, $help:literal) => {
+        $crate::option!(@ $type, $key, std::ptr::null(), $help, 0.0, 0.0)
+    };
+    ($type:expr, $key:literal, $default:literal, $help:literal) => {
+        $crate::option!(@ $type, $key, $crate::c_text!($default), $help, 0.0, 0.0)
+    };
+    ($type:expr, $key:literal, $default:literal, $help:literal, $minimum:expr, $maximum:expr) => {
+        $crate::option!(@ $type, $key, $crate::c_text!($default), $help, $minimum, $maximum)
+    };
+}
+
+/// A literal as C has it.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! c_text {
+    ($text:expr) => {
+        concat!($text, "\0").as_ptr() as *const std::os::raw::c_char
+    };
+}
+
+// ---- what the macro uses ----
+
+#[doc(hidden)]
+#[allow(non_upper_case_globals)]
+pub mod kind {
+    pub const source: crate::arhost_kind = crate::ARHOST_KIND_SOURCE;
+    pub const tracker: crate::arhost_kind = crate::ARHOST_KIND_TRACKER;
+    pub const raytracer: crate::arhost_kind = crate::ARHOST_KIND_RAYTRACER;
+    pub const sink: crate::arhost_kind = crate::ARHOST_KIND_SINK;
+}
+#[doc(hidden)]
+pub mod table {
+    pub type source = crate::arhost_source;
+    pub type tracker = crate::arhost_tracker;
+    pub type raytracer = crate::arhost_raytracer;
+    pub type sink = crate::arhost_sink;
+}
+
+struct Instance<T> {
+    host: Host,
+    plugin: T,
+}
+
+/// Runs `call`; what it returns or panics with becomes a status, and a message where it failed.
+fn guarded(host: Host, call: impl FnOnce() -> Result<arhost_status, Failure>) -> arhost_status {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(status)) => status,
+        Ok(Err(failure)) => {
+            if failure.status != ARHOST_ERROR_CANCELLED {
+                host.log(ARHOST_SEVERITY_ERROR, &failure.message);
+            }
+            failure.status
+        }
+        Err(panic) => {
+            let text = panic
+                .downcast_ref::<String>()
+                .cloned()
+                .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
+            host.log(ARHOST_SEVERITY_ERROR, &format!("panicked: {}", text.as_deref().unwrap_or("no message")));
+            ARHOST_ERROR_INTERNAL
+        }
+    }
+}
+
+unsafe fn with<T>(
+    instance: *mut arhost_instance,
+    call: impl FnOnce(&mut T) -> Result<arhost_status, Failure>,
+) -> arhost_status {
+    let instance = &mut *instance.cast::<Instance<T>>();
+    let plugin = &mut instance.plugin;
+    guarded(instance.host, || call(plugin))
+}
+
+fn end_unless(more: bool) -> arhost_status {
+    if more {
+        ARHOST_OK
+    } else {
+        ARHOST_END
+    }
+}
+
+unsafe extern "C" fn create<T: Plugin>(
+    host: *const arhost_host,
+    options: *const arhost_option,
+    option_count: u32,
+    instance: *mut *mut arhost_instance,
+) -> arhost_status {
+    guarded(Host(host), || {
+        let values = if option_count == 0 { &[] } else { slice::from_raw_parts(options, option_count as usize) };
+        let plugin = T::new(Host(host), &Options(values))?;
+        *instance = Box::into_raw(Box::new(Instance { host: Host(host), plugin })).cast();
+        Ok(ARHOST_OK)
+    })
+}
+unsafe extern "C" fn destroy<T: Plugin>(instance: *mut arhost_instance) {
+    let instance = Box::from_raw(instance.cast::<Instance<T>>());
+    guarded(instance.host, || {
+        drop(instance.plugin);
+        Ok(ARHOST_OK)
+    });
+}
+unsafe extern "C" fn stop<T: Plugin>(instance: *mut arhost_instance) {
+    stop_sink::<T>(instance);
+}
+unsafe extern "C" fn stop_sink<T: Plugin>(instance: *mut arhost_instance) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.stop().map(|()| ARHOST_OK))
+}
+unsafe extern "C" fn no_extension(_id: *const c_char) -> *const c_void {
+    std::ptr::null()
+}
+
+#[doc(hidden)]
+pub const fn plugin_of<T: Plugin>(descriptor: &'static arhost_descriptor, functions: *const c_void) -> arhost_plugin {
+    arhost_plugin {
+        struct_size: std::mem::size_of::<arhost_plugin>() as u32,
+        descriptor,
+        functions,
+        create: Some(create::<T>),
+        destroy: Some(destroy::<T>),
+        get_extension: Some(no_extension),
+    }
+}
+
+#[doc(hidden)]
+pub fn negotiate(offer: &arhost_offer, answer: &mut arhost_answer, plugin: &'static arhost_plugin) -> arhost_status {
+    if !(offer.oldest_abi_version..=offer.newest_abi_version).contains(&ARHOST_ABI_VERSION) {
+        return ARHOST_ERROR_UNSUPPORTED;
+    }
+    answer.abi_version = ARHOST_ABI_VERSION;
+    answer.plugin = plugin;
+    ARHOST_OK
+}
+
+unsafe extern "C" fn start_source<T: Source>(
+    instance: *mut arhost_instance,
+    setup: *const arhost_source_setup,
+    properties: *mut arhost_source_properties,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| {
+        plugin.start(&*setup, &mut *properties)?;
+        if !(*properties).format.lay_out() {
+            return Err(Failure::new(ARHOST_ERROR_CONFIGURATION, "the frames' format or size is not valid"));
+        }
+        Ok(ARHOST_OK)
+    })
+}
+unsafe extern "C" fn read<T: Source>(
+    instance: *mut arhost_instance,
+    buffer: *const arhost_frame_buffer,
+    info: *mut arhost_frame_info,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.read(&mut FrameBuffer(&*buffer), &mut *info).map(end_unless))
+}
+#[doc(hidden)]
+pub const fn source<T: Source>() -> arhost_source {
+    arhost_source {
+        struct_size: std::mem::size_of::<arhost_source>() as u32,
+        start: Some(start_source::<T>),
+        read: Some(read::<T>),
+        stop: Some(stop::<T>),
+    }
+}
+
+unsafe extern "C" fn start_tracker<T: Tracker>(
+    instance: *mut arhost_instance,
+    setup: *const arhost_tracker_setup,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+}
+unsafe extern "C" fn track<T: Tracker>(
+    instance: *mut arhost_instance,
+    frame: *const arhost_frame,
+    result: *mut arhost_tracker_result,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.track(&Frame(&*frame), &mut *result).map(|()| ARHOST_OK))
+}
+#[doc(hidden)]
+pub const fn tracker<T: Tracker>() -> arhost_tracker {
+    arhost_tracker {
+        struct_size: std::mem::size_of::<arhost_tracker>() as u32,
+        start: Some(start_tracker::<T>),
+        track: Some(track::<T>),
+        stop: Some(stop::<T>),
+    }
+}
+
+unsafe extern "C" fn start_raytracer<T: Raytracer>(
+    instance: *mut arhost_instance,
+    setup: *const arhost_raytracer_setup,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+}
+unsafe extern "C" fn render<T: Raytracer>(
+    instance: *mut arhost_instance,
+    request: *const arhost_render_request,
+    image: *const arhost_image,
+    info: *mut arhost_render_info,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| {
+        plugin.render(&*request, &mut Image(&*image), &mut *info).map(|()| ARHOST_OK)
+    })
+}
+#[doc(hidden)]
+pub const fn raytracer<T: Raytracer>() -> arhost_raytracer {
+    arhost_raytracer {
+        struct_size: std::mem::size_of::<arhost_raytracer>() as u32,
+        start: Some(start_raytracer::<T>),
+        render: Some(render::<T>),
+        stop: Some(stop::<T>),
+    }
+}
+
+unsafe extern "C" fn start_sink<T: Sink>(
+    instance: *mut arhost_instance,
+    setup: *const arhost_sink_setup,
+) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+}
+unsafe extern "C" fn write<T: Sink>(instance: *mut arhost_instance, output: *const arhost_output) -> arhost_status {
+    with(instance, |plugin: &mut T| plugin.write(&Output(&*output)).map(end_unless))
+}
+#[doc(hidden)]
+pub const fn sink<T: Sink>() -> arhost_sink {
+    arhost_sink {
+        struct_size: std::mem::size_of::<arhost_sink>() as u32,
+        start: Some(start_sink::<T>),
+        write: Some(write::<T>),
+        idle: None,
+        stop: Some(stop_sink::<T>),
+    }
+}

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+//! What a call is given, without pointers. All of it is valid during that call.
+
+use crate::abi::*;
+use std::ops::Deref;
+use std::slice;
+
+/// A frame to read.
+pub struct Frame<'a>(pub(crate) &'a arhost_frame);
+
+impl Frame<'_> {
+    pub fn format(&self) -> &arhost_frame_format {
+        unsafe { &*self.0.format }
+    }
+    /// Full-range luma.
+    pub fn grey_row(&self, row: u32) -> &[u8] {
+        let format = self.format();
+        assert!(row < format.height);
+        unsafe {
+            slice::from_raw_parts(self.0.grey.add(row as usize * format.grey_stride as usize), format.width as usize)
+        }
+    }
+    /// One plane as it lies in memory: `format().stride[plane]` bytes a row.
+    pub fn plane(&self, plane: usize) -> &[u8] {
+        let format = self.format();
+        unsafe { slice::from_raw_parts(self.0.plane[plane], plane_size(format, plane)) }
+    }
+}
+impl Deref for Frame<'_> {
+    type Target = arhost_frame;
+    fn deref(&self) -> &arhost_frame {
+        self.0
+    }
+}
+
+/// A frame to write.
+pub struct FrameBuffer<'a>(pub(crate) &'a arhost_frame_buffer);
+
+impl FrameBuffer<'_> {
+    pub fn format(&self) -> &arhost_frame_format {
+        unsafe { &*self.0.format }
+    }
+    /// One plane as it lies in memory: `format().stride[plane]` bytes a row.
+    pub fn plane_mut(&mut self, plane: usize) -> &mut [u8] {
+        let size = plane_size(self.format(), plane);
+        unsafe { slice::from_raw_parts_mut(self.0.plane[plane], size) }
+    }
+}
+impl Deref for FrameBuffer<'_> {
+    type Target = arhost_frame_buffer;
+    fn deref(&self) -> &arhost_frame_buffer {
+        self.0
+    }
+}
+
+fn plane_size(format: &arhost_frame_format, plane: usize) -> usize {
+    assert!(plane < format.plane_count as usize);
+    let halved = plane > 0; // of NV12 and I420, the formats that have more planes than one
+    format.stride[plane] as usize * (format.height as usize / if halved { 2 } else { 1 })
+}
+
+/// The image to write: RGBA8, straight alpha, sRGB-encoded, alpha exactly 0 where no ray hit.
+pub struct Image<'a>(pub(crate) &'a arhost_image);
+
+impl Image<'_> {
+    pub fn width(&self) -> u32 {
+        self.0.width
+    }
+    pub fn height(&self) -> u32 {
+        self.0.height
+    }
+    pub fn row_mut(&mut self, row: u32) -> &mut [[u8; 4]] {
+        assert!(row < self.0.height);
+        unsafe {
+            let first = self.0.rgba.add(row as usize * self.0.stride as usize);
+            slice::from_raw_parts_mut(first.cast(), self.0.width as usize)
+        }
+    }
+}
+
+/// An augmented frame to read: B, G, R bytes.
+pub struct Output<'a>(pub(crate) &'a arhost_output);
+
+impl Output<'_> {
+    pub fn record(&self) -> &arhost_record {
+        unsafe { &*self.0.record }
+    }
+    pub fn row(&self, row: u32) -> &[[u8; 3]] {
+        assert!(row < self.0.height);
+        unsafe {
+            let first = self.0.bgr.add(row as usize * self.0.stride as usize);
+            slice::from_raw_parts(first.cast(), self.0.width as usize)
+        }
+    }
+}
+impl Deref for Output<'_> {
+    type Target = arhost_output;
+    fn deref(&self) -> &arhost_output {
+        self.0
+    }
+}
+
+/// The scene's arena, valid until `stop`.
+#[derive(Clone, Copy)]
+pub struct Scene(pub(crate) *const arhost_scene);
+
+impl Scene {
+    /// The elements of one of its buffers: `scene.elements::<arhost_object>(scene.objects)`.
+    ///
+    /// # Safety
+    /// `T` is what `arhost/scene.h` says that the buffer holds, without holes (its stride is `T`'s size), and the
+    /// slice is not used after `stop`.
+    pub unsafe fn elements<'a, T>(self, buffer: arhost_buffer) -> &'a [T] {
+        if buffer.count == 0 {
+            return &[];
+        }
+        assert_eq!(buffer.stride as usize, std::mem::size_of::<T>());
+        slice::from_raw_parts(self.0.cast::<u8>().add(buffer.offset as usize).cast(), buffer.count as usize)
+    }
+}
+impl Deref for Scene {
+    type Target = arhost_scene;
+    fn deref(&self) -> &arhost_scene {
+        unsafe { &*self.0 }
+    }
+}
+
+impl arhost_tracker_setup {
+    /// The markers to look for.
+    pub fn markers(&self) -> &[arhost_marker_config] {
+        unsafe { slice::from_raw_parts(self.markers, self.marker_count as usize) }
+    }
+    pub fn intrinsics(&self) -> &arhost_intrinsics {
+        unsafe { &*self.intrinsics }
+    }
+}
+
+impl arhost_raytracer_setup {
+    pub fn scene(&self) -> Scene {
+        Scene(self.scene)
+    }
+}
+
+impl arhost_frame_format {
+    /// arhost_frame_layout of `arhost/frame.h`: fills the second group of fields from the first. False where the
+    /// first group is not valid.
+    pub fn lay_out(&mut self) -> bool {
+        let (w, h) = (u64::from(self.width), u64::from(self.height));
+        let sides = 1..=ARHOST_MAX_IMAGE_SIDE as u64;
+        if !sides.contains(&w) || !sides.contains(&h) {
+            return false;
+        }
+        let even = w % 2 == 0 && h % 2 == 0;
+        // Bytes a row and rows of each plane, and whether the first one is luma.
+        let (planes, grey_is_plane_0) = match self.pixel_format {
+            ARHOST_GREY8 => (vec![(w, h)], true),
+            ARHOST_RGB8 | ARHOST_BGR8 => (vec![(3 * w, h)], false),
+            ARHOST_YUYV if w % 2 == 0 => (vec![(2 * w, h)], false),
+            ARHOST_NV12 if even => (vec![(w, h), (w, h / 2)], true),
+            ARHOST_I420 if even => (vec![(w, h), (w / 2, h / 2), (w / 2, h / 2)], true),
+            _ => return false,
+        };
+        let stride_of = |bytes: u64| (bytes + 63) / 64 * 64;
+        let mut end = 0;
+        self.plane_count = planes.len() as u32;
+        self.stride = [0; ARHOST_MAX_PLANES];
+        self.offset = [0; ARHOST_MAX_PLANES];
+        for (i, (bytes, rows)) in planes.into_iter().enumerate() {
+            self.stride[i] = stride_of(bytes) as u32;
+            self.offset[i] = end;
+            end += stride_of(bytes) * rows;
+        }
+        if grey_is_plane_0 {
+            self.grey_stride = self.stride[0];
+            self.grey_offset = 0;
+        } else {
+            self.grey_stride = stride_of(w) as u32;
+            self.grey_offset = end;
+            end += stride_of(w) * h;
+        }
+        self.byte_size = end;
+        true
+    }
+}

@@ -1,0 +1,122 @@
+/* @NAME@: a tracker for arhost. It takes the brightest patch of the image for a white square that faces the camera:
+ * its middle gives the direction, its area the distance. */
+#include <arhost/arhost.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct arhost_instance {
+    const arhost_host *host;
+    int64_t threshold;
+    arhost_intrinsics lens;
+    arhost_marker_config marker; /* the first that the configuration lists: the only one that is looked for */
+};
+
+static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
+    self->lens = *setup->intrinsics;
+    self->marker = setup->markers[0];
+    return ARHOST_OK;
+}
+
+static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
+    const arhost_frame_format *format = frame->format;
+    double area = 0, sum_x = 0, sum_y = 0, x, y, half, distance;
+    arhost_marker *marker = &result->markers[0];
+    uint32_t column, row;
+    int i;
+
+    /* FILL IN: your detector. Without `return ARHOST_OK` before the end, it has found self->marker. */
+    for (row = 0; row < format->height; ++row) {
+        const uint8_t *grey = frame->grey + (size_t)row * format->grey_stride;
+        for (column = 0; column < format->width; ++column)
+            if (grey[column] >= self->threshold) {
+                area += 1;
+                sum_x += column;
+                sum_y += row;
+            }
+    }
+    if (area < 100)
+        return ARHOST_OK; /* nothing found is no error: the video goes on without an overlay */
+    x = sum_x / area;
+    y = sum_y / area;
+    half = sqrt(area) / 2;
+    distance = self->lens.fx * self->marker.side_mm / (2 * half);
+
+    result->marker_count = 1;
+    marker->struct_size = sizeof *marker;
+    marker->id = self->marker.id;
+    strcpy(marker->family, "bright");
+    marker->state = ARHOST_MARKER_DETECTED;
+    for (i = 0; i < 4; ++i) { /* top left, top right, bottom right, bottom left of the upright print */
+        marker->corners_px[i][0] = x + (i == 1 || i == 2 ? half : -half);
+        marker->corners_px[i][1] = y + (i >= 2 ? half : -half);
+    }
+    /* Marker to camera, column-major, x right, y up, looking along -z, in mm. Not turned: it faces the camera. */
+    for (i = 0; i < 16; i += 5)
+        marker->mt[i] = 1;
+    marker->mt[12] = distance * (x - self->lens.cx) / self->lens.fx;
+    marker->mt[13] = -distance * (y - self->lens.cy) / self->lens.fy;
+    marker->mt[14] = -distance;
+    return ARHOST_OK;
+}
+
+static void stop(arhost_instance *self) {
+    (void)self;
+}
+
+static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
+                            arhost_instance **instance) {
+    arhost_instance *self = calloc(1, sizeof *self);
+    uint32_t i;
+    if (!self)
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    self->host = host;
+    for (i = 0; i < option_count; ++i)
+        if (!strcmp(options[i].key, "threshold"))
+            self->threshold = options[i].integer;
+    *instance = self;
+    return ARHOST_OK;
+}
+
+static void destroy(arhost_instance *self) {
+    free(self);
+}
+
+static const void *get_extension(const char *id) {
+    (void)id;
+    return NULL;
+}
+
+/* ---- what it is ---- */
+
+/* arhost checks the configuration against these before create sees a value. */
+static const arhost_option_descriptor options[] = {
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "threshold", "200", 1, 255, NULL,
+     "Grey level from which on a pixel counts as bright."},
+};
+static const arhost_tracker functions = {sizeof functions, start, track, stop};
+static const arhost_descriptor descriptor = {
+    .struct_size = sizeof descriptor,
+    .kind = ARHOST_KIND_TRACKER,
+    .id = "@NAME@", /* the file's name */
+    .name = "@NAME@",
+    .version = "0.1.0",
+    .vendor = "",  /* FILL IN */
+    .licence = "", /* FILL IN: SPDX, "Apache-2.0" */
+    .description = "Takes the brightest patch for the marker.",
+    .option_count = sizeof options / sizeof *options,
+    .options = options,
+};
+static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+
+static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    const uint32_t spoken = ARHOST_ABI_VERSION;
+    if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
+        return ARHOST_ERROR_UNSUPPORTED;
+    answer->abi_version = spoken;
+    answer->plugin = &plugin;
+    return ARHOST_OK;
+}
+
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What `arhost new-plugin` writes and refuses; that the skeletons work is tested in tests/sdk.
+#include "host/new_plugin.hpp"
+
+#include "plugin_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+using namespace arhost::host;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path prefix = ARHOST_BINARY_DIRECTORY;
+
+std::string text_of(const fs::path &file) {
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+}
+
+std::string reason_for_refusing(const NewPlugin &plugin) {
+    try {
+        new_plugin(plugin, prefix);
+    } catch (const std::runtime_error &error) {
+        return error.what();
+    }
+    return "not refused";
+}
+
+} // namespace
+
+TEST(NewPlugin, FillsInEveryPlaceholder) {
+    const arhost::test::ScratchFolder folder;
+    const std::regex placeholder("@[A-Z]+@");
+    for (const std::string &kind : plugin_kinds)
+        for (const std::string &language : plugin_languages) {
+            const fs::path into = folder.path() / language;
+            EXPECT_EQ(new_plugin({kind, "my_" + kind, language, into}, prefix), 0);
+            int files = 0;
+            for (const auto &entry : fs::recursive_directory_iterator(into / ("my_" + kind))) {
+                EXPECT_FALSE(std::regex_search(entry.path().string(), placeholder)) << entry.path();
+                if (entry.is_regular_file()) {
+                    ++files;
+                    EXPECT_FALSE(std::regex_search(text_of(entry.path()), placeholder)) << entry.path();
+                }
+            }
+            EXPECT_GE(files, 5) << kind << " in " << language;
+            EXPECT_THAT(text_of(into / ("my_" + kind) / "README.md"), HasSubstr("my_" + kind));
+        }
+}
+
+TEST(NewPlugin, NamesTheClassAfterThePlugin) {
+    const arhost::test::ScratchFolder folder;
+    new_plugin({"sink", "a_b2_cd", "python", folder.path()}, prefix);
+    EXPECT_THAT(text_of(folder.path() / "a_b2_cd/a_b2_cd.py"), HasSubstr("class AB2Cd:"));
+}
+
+TEST(NewPlugin, RefusesNamesThatToolsCannotTake) {
+    const arhost::test::ScratchFolder folder;
+    for (const char *name : {"", "Tracer", "2d", "my-tracer", "a b", "../up", "_x", "größe"})
+        EXPECT_THAT(reason_for_refusing({"sink", name, "c", folder.path()}),
+                    HasSubstr("must be 1 to 64 small letters"));
+    EXPECT_THAT(reason_for_refusing({"sink", "test", "c", folder.path()}), HasSubstr("choose another, as 'my_test'"));
+    EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(NewPlugin, RefusesTheNamesOfArhostsOwnPlugins) {
+    const arhost::test::ScratchFolder folder;
+    fs::create_directories(folder.path() / "lib/arhost/plugins");
+    std::ofstream(folder.path() / "lib/arhost/plugins/sink_null.so") << "x";
+    EXPECT_THROW(new_plugin({"sink", "sink_null", "c", folder.path()}, folder.path()), std::runtime_error);
+    EXPECT_FALSE(fs::exists(folder.path() / "sink_null"));
+}
+
+TEST(NewPlugin, LeavesWhatIsThereAsItIs) {
+    const arhost::test::ScratchFolder folder;
+    const fs::path there = folder.path() / "mine";
+    std::ofstream(there) << "precious";
+    EXPECT_THAT(reason_for_refusing({"sink", "mine", "c", folder.path()}), HasSubstr("is there already"));
+    EXPECT_EQ(text_of(there), "precious");
+}
+
+TEST(NewPlugin, SaysWhereTheTemplatesShouldBe) {
+    const arhost::test::ScratchFolder folder;
+    try {
+        new_plugin({"sink", "mine", "c", folder.path()}, folder.path());
+        FAIL();
+    } catch (const std::runtime_error &error) {
+        EXPECT_THAT(error.what(), HasSubstr("share/arhost/templates"));
+    }
+    EXPECT_TRUE(fs::is_empty(folder.path()));
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-inprocess does what arhost does, but for processes and deadlines.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+// Returns the exit status; what it printed lies in said.txt.
+int run_in_process(const ArhostRun &run) {
+    const std::string command = "cd " + run.path("").string() +
+                                " && ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
+                                " timeout 60 " ARHOST_BINARY_DIRECTORY
+                                "/bin/arhost-inprocess --config run.yaml >said.txt 2>&1";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+} // namespace
+
+TEST(InProcess, LeavesTheSameBytesAsProcesses) {
+    ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 5, lost_to: 9", "error_at: 20"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const std::string of_processes = run.read("counted.txt");
+    std::filesystem::remove(run.path("counted.txt"));
+    ASSERT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    EXPECT_EQ(run.read("counted.txt"), of_processes);
+    EXPECT_EQ(counted(run).size(), 30u);
+}
+
+TEST(InProcess, WaitsAsLongAsAFrameTakes) {
+    ArhostRun run(counting("lockstep", "frames: 2", "", "delay_ms: 300"));
+    run.write("run.yaml", run.read("run.yaml").replace(run.read("run.yaml").rfind("700"), 3, "100"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 2);
+}
+
+TEST(InProcess, ReportsAPluginThatRefusesLikeArhost) {
+    ArhostRun run(counting("lockstep", "frames: 2", "", "refuse: true"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run_in_process(run), 2);
+    EXPECT_THAT(run.read("said.txt"), HasSubstr("run.yaml:5:"));
+    EXPECT_THAT(run.read("said.txt"), HasSubstr("refused, as the option 'refuse' asks"));
+}

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Scripts in the real arhost: what they see, and what becomes of their errors.
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace {
+
+class PythonAdapter : public testing::Test {
+protected:
+    void SetUp() override {
+        if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0)
+            GTEST_SKIP() << "python3-numpy is not installed";
+    }
+};
+
+// The counting plugins, but for the one under test; six frames.
+std::string chain(const std::string &replaced, const std::string &by) {
+    std::istringstream lines(counting("lockstep", "frames: 6", "", ""));
+    std::string result;
+    for (std::string line; std::getline(lines, line);)
+        result += line.starts_with(replaced) ? by + "\n" : line + "\n";
+    return result;
+}
+const std::string tracker = chain(
+    "tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, markers: [{id: 3, side_mm: 80}]}");
+const std::string raytracer =
+    chain("raytracer:", "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}");
+const char *const sink = "version: 1\nsource: {plugin: source_counter, options: {frames: 1000}}\n"
+                         "outputs: [{plugin: sink_python, options: {script: script.py}}]\nstats: stats.json\n";
+
+int run_script(ArhostRun &run, const std::string &script) {
+    run.write("scene.yaml", small_scene);
+    run.write("script.py", script);
+    return run.run({"--config", "run.yaml", "--verbose"});
+}
+
+const char *const idle_tracker = "class T:\n"
+                                 "    def __init__(self, host): pass\n"
+                                 "    def start(self, setup): pass\n"
+                                 "    def track(self, frame, markers): return 0\n";
+
+} // namespace
+
+TEST_F(PythonAdapter, TrackerSeesFramesAndFillsInMarkersInPlace) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, R"(
+import arhost, numpy as np
+class Tracker:
+    def __init__(self, host): self.host = host
+    def start(self, setup):
+        self.id = setup.markers[0].id
+        assert setup.markers[0].side_mm == 80 and setup.intrinsics.width == setup.format.width
+    def track(self, frame, markers):
+        pixels = frame.planes[0].reshape(-1)
+        assert pixels[0] + 256 * int(pixels[1]) == frame.sequence
+        assert frame.grey.shape == (frame.format.height, frame.format.width)
+        try:
+            frame.grey[0, 0] = 1
+            return 0
+        except ValueError: # arhost's memory is read-only to it
+            pass
+        m = markers[0]
+        m["id"], m["family"], m["state"] = self.id, b"python", arhost.DETECTED
+        mt = np.eye(4)
+        mt[2, 3] = -500 - frame.sequence
+        m["mt"] = mt.T.reshape(16)
+        return 1
+)"),
+              0)
+        << run.output();
+    // rt_counter writes the number that the pose says into the image, sink_counter compares it with the frame's.
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 6);
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 6u);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        EXPECT_EQ(lines[i].overlay, std::to_string(i));
+    EXPECT_THAT(run.output(), Not(HasSubstr("warning")));
+}
+
+TEST_F(PythonAdapter, RayTracerReadsTheSceneAndWritesTheImage) {
+    ArhostRun run(raytracer);
+    EXPECT_EQ(run_script(run, R"(
+import arhost
+class Tracer:
+    def __init__(self, host): pass
+    def start(self, setup):
+        scene = setup.scene
+        assert scene.axes == arhost.Z_UP and len(scene.objects) == 1 and scene.objects[0]["role"] == arhost.VIRTUAL
+        sphere = scene.elements(scene.geometries[0]["positions"], "4f4")
+        assert sphere.tolist() == [[0, 0, 10, 10]], sphere
+        assert scene.bounds_max.tolist() == [10, 10, 20] and scene.materials[0]["diffuse"].tolist() == [0.5] * 3
+    def render(self, request, image):
+        number = round(request.camera.eye[2] - 500)
+        assert number == request.sequence and len(request.moved) == 0 and request.deformed == []
+        image[...] = 0
+        image[:16, :16] = number, 0, 170, 255
+        return 0, 0, 16, 16
+)"),
+              0)
+        << run.output();
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 6);
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 6u);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        EXPECT_EQ(lines[i].overlay, std::to_string(i));
+}
+
+TEST_F(PythonAdapter, SourceAndSinkPassFramesOn) {
+    ArhostRun run(
+        "version: 1\nsource: {plugin: source_python, options: {script: script.py, class: Source, "
+        "arguments: '{\"frames\": 3}'}}\n"
+        "outputs: [{plugin: sink_python, path: out.txt, options: {script: script.py}}]\nstats: stats.json\n");
+    EXPECT_EQ(run_script(run, R"(
+import arhost
+class Source:
+    def __init__(self, host, frames): self.frames = frames
+    def start(self, setup): return {"width": 66, "height": 34, "pixel_format": arhost.NV12, "fps": 25}
+    def read(self, buffer):
+        if buffer.sequence >= self.frames: return None
+        y, uv = buffer.planes
+        y[...], uv[...] = 16 + 20 * buffer.sequence, 128
+        return 40_000_000 * buffer.sequence
+class Sink:
+    def __init__(self, host): pass
+    def start(self, setup): self.file = open(setup.path, "w")
+    def write(self, output):
+        r = output.record
+        print(r.sequence, r.capture_ns // 1000000, r.overlay, output.bgr.shape, output.bgr[0, 0], file=self.file)
+    def stop(self): self.file.close()
+)"),
+              0)
+        << run.output();
+    EXPECT_EQ(run.read("out.txt"), "0 0 3 (34, 66, 3) [0 0 0]\n"
+                                   "1 40 3 (34, 66, 3) [23 23 23]\n"
+                                   "2 80 3 (34, 66, 3) [47 47 47]\n");
+}
+
+TEST_F(PythonAdapter, ASinkEndsTheRunByReturningFalse) {
+    ArhostRun run(sink);
+    EXPECT_EQ(run_script(run, R"(
+class Sink:
+    def __init__(self, host): pass
+    def start(self, setup): pass
+    def write(self, output): return output.record.sequence < 2
+)"),
+              0)
+        << run.output();
+    EXPECT_LT(run.stats()["frames"]["in"], 1000);
+}
+
+TEST_F(PythonAdapter, ThreadsOfAScriptRunBetweenItsCalls) {
+    ArhostRun run(chain("tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, "
+                                    "markers: [{id: 3, side_mm: 80}]}") +
+                  "\n");
+    EXPECT_EQ(run_script(run, R"(
+import threading
+class Tracker:
+    def __init__(self, host):
+        self.done = threading.Event()
+        self.host = host
+    def start(self, setup): threading.Thread(target=lambda: (self.host.info("from a thread"), self.done.set())).start()
+    def track(self, frame, markers):
+        assert self.done.wait(20)
+        return 0
+)"),
+              0)
+        << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("from a thread"));
+}
+
+TEST_F(PythonAdapter, AnExceptionCostsItsFrameAndNamesItsLine) {
+    for (const auto &[statement, message] :
+         {std::pair{"1 / 0", "script.py:6: ZeroDivisionError: division by zero"},
+          {"sys.exit(3)", "the script called sys.exit(3)"},
+          {"raise KeyboardInterrupt", "script.py:6: KeyboardInterrupt"},
+          {"raise arhost.Failure('the lamp is off', arhost.ERROR_IO)", "the lamp is off"}}) {
+        ArhostRun run(tracker);
+        EXPECT_EQ(
+            run_script(run, std::string("import arhost, sys\nclass T:\n    def __init__(self, host): pass\n"
+                                        "    def start(self, setup): pass\n    def track(self, frame, markers):\n"
+                                        "        if frame.sequence == 2: ") +
+                                statement + "\n        return 0\n"),
+            0)
+            << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(message));
+        EXPECT_EQ(counted(run).size(), 6u) << message;
+        EXPECT_EQ(run.stats()["restarts"].dump().find('1'), std::string::npos) << message;
+    }
+}
+
+TEST_F(PythonAdapter, AnArrayThatIsKeptIsToldOf) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, "class T:\n    def __init__(self, host): pass\n    def start(self, setup): pass\n"
+                              "    def track(self, frame, markers):\n        self.last = frame.grey[10:20]\n"
+                              "        return 0\n"),
+              0);
+    EXPECT_THAT(run.output(), HasSubstr("'track' has kept an array"));
+}
+
+// What can't work is told before the run, at the component's line, and not tried again.
+TEST_F(PythonAdapter, ScriptsThatCannotWorkAreConfigurationErrors) {
+    const std::string two = std::string(idle_tracker) + "class U(T): pass\n";
+    for (const auto &[script, message] :
+         {std::pair<std::string, const char *>{"class T\n", "script.py:1: SyntaxError"},
+          {"import no_such_module\n", "script.py:1: ModuleNotFoundError: No module named 'no_such_module'"},
+          {"class T: pass\n", "has no classes with a method 'track'"},
+          {two, "has 2 classes with a method 'track'; name one in the option 'class'"},
+          {"class T:\n    def track(self): pass\n", "TypeError"}}) {
+        ArhostRun run(tracker);
+        EXPECT_EQ(run_script(run, script), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(message));
+        EXPECT_THAT(run.output(), HasSubstr("run.yaml:4:"));
+    }
+    const auto with_options = [](const std::string &options) {
+        return chain("tracker:", "tracker: {plugin: tracker_python, options: {" + options +
+                                     "}, markers: [{id: 3, side_mm: 80}]}");
+    };
+    for (const auto &[options, message] :
+         {std::pair{"script: none.py", "there is no file"},
+          {"script: script.py, arguments: '{'", "the option 'arguments' is not valid JSON"},
+          {"script: script.py, arguments: '[1]'", "must be a JSON object"},
+          {"script: script.py, class: U", "has no classes named 'U'"}}) {
+        ArhostRun run(with_options(options));
+        EXPECT_EQ(run_script(run, idle_tracker), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(message));
+    }
+}
