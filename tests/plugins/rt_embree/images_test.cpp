@@ -111,6 +111,21 @@ TEST(Texture, RepeatsClampsAndMirrors) {
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_MIRROR, 3).at(89, 24), Pixel{0, 255, 0, 255}));
 }
 
+TEST(Texture, TimesTheEmissionGlowsInTheDark) {
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    arhost_material material = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    set3(material.emission, 0.5f, 1, 1);
+    material.emission_texture = builder.add_texture("two", texture_of(2, 1, {{255, 0, 0, 255}, {0, 255, 0, 255}}));
+    scene::TriangleMesh mesh = square(60);
+    mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    builder.add_object("screen", builder.add_triangles(std::move(mesh)), builder.add_material(material));
+    builder.settings.background = glm::vec3(0);
+    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    EXPECT_TRUE(is_nearly(picture.at(70, 74), Pixel{shading::srgb8_exact(0.5), 0, 0, 255}));
+    EXPECT_TRUE(is_nearly(picture.at(130, 74), Pixel{0, 255, 0, 255}));
+}
+
 // ---- Holes -----------------------------------------------------------------------------------------
 
 // A square of 60 mm half a side whose texture is solid on its left half and has a hole on its right one.

@@ -163,6 +163,8 @@ TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
     // Straight on, 4 % are reflected on entering, and 4 % of the rest on leaving: only these stand in for rays.
     const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
     EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
+    // These rays bring 4 % at most, the others 92 % at least.
+    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 0.05f; }), thin);
 }
 
 TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
