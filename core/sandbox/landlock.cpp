@@ -99,7 +99,7 @@ Layer enter_landlock(const Policy &policy) {
         layer.lacks = error_text("no ruleset");
         return layer;
     }
-    const std::uint64_t execute = policy.allows("processes") ? access::execute : 0;
+    const std::uint64_t execute = may_start_processes(policy) ? access::execute : 0;
     const Paths paths = paths_of(policy);
     for (const fs::path &path : paths.readable)
         rules.allow(path, access::read | execute);

@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-// Sanitizers reserve terabytes of addresses, and the leak checker stops its process from a child of it.
+// Sanitizers reserve terabytes of addresses, and start processes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ARHOST_UNDER_SANITIZER 1
 #elif defined(__has_feature)
@@ -28,6 +28,15 @@ constexpr bool under_sanitizer = false;
 
 inline std::string error_text(const char *what) {
     return std::string(what) + ": " + std::strerror(errno);
+}
+
+inline void add_to(std::string &list, const std::string &what) {
+    list += (list.empty() ? "" : ", ") + what;
+}
+
+// The leak checker is a process beside its own, and stack traces are another program's work.
+inline bool may_start_processes(const Policy &policy) {
+    return under_sanitizer || policy.allows("processes");
 }
 
 // Memory that no limit on a process counts: memfds, shared anonymous mappings.

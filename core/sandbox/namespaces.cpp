@@ -56,19 +56,16 @@ bool make_mounts_read_only(const Policy &policy) {
 
 Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
-    const auto reached = [&](const char *what) {
-        layer.reached += (layer.reached.empty() ? "" : ", ") + std::string(what);
-    };
-    const auto lacks = [&](const char *what) { layer.lacks += (layer.lacks.empty() ? "" : ", ") + error_text(what); };
-    // Another namespace's owner may do in it what root may: mount, say.
-    if (::unshare(CLONE_NEWNS) == 0)
-        ;
-    else if (!enter_user_namespace())
-        return lacks("user"), layer;
-    else if (reached("user"); ::unshare(CLONE_NEWNS) != 0)
-        lacks("mount");
-    if (layer.lacks.empty())
-        make_mounts_read_only(policy) ? reached("mount") : lacks("mount");
+    const auto reached = [&](const char *what) { add_to(layer.reached, what); };
+    const auto lacks = [&](const char *what) { add_to(layer.lacks, error_text(what)); };
+    const bool is_root = ::unshare(CLONE_NEWNS) == 0;
+    if (!is_root && !enter_user_namespace()) { // in which all may unshare
+        lacks("user");
+        return layer;
+    }
+    if (!is_root)
+        reached("user");
+    (is_root || ::unshare(CLONE_NEWNS) == 0) && make_mounts_read_only(policy) ? reached("mount") : lacks("mount");
     if (!policy.allows("network"))
         ::unshare(CLONE_NEWNET) == 0 ? reached("net") : lacks("net");
     if (!policy.allows("display")) // X takes pictures through shared memory

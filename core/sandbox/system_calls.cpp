@@ -161,8 +161,8 @@ Layer filter_system_calls(const Policy &policy) {
     filter.deny("utimensat", {differs(1, 0)}); // futimens passes no name
     if (policy.writable.empty())
         filter.deny("truncate"); // which Landlock knows since its third version
-    deny_reaching_others(filter, policy.allows("processes") || under_sanitizer);
-    deny_new_processes(filter, policy.allows("processes") || under_sanitizer);
+    deny_reaching_others(filter, may_start_processes(policy));
+    deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);

@@ -175,6 +175,19 @@ private:
     bool stopped_ = false;
 };
 
+// A GPU's driver keeps the shaders that it has compiled: where each plugin has a place of its own.
+void give_shader_cache(sandbox::Policy &policy, const std::filesystem::path &plugin) {
+    const char *caches = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
+    if (policy.mode == sandbox::Mode::none || !policy.allows("gpu") || (!caches && !home))
+        return;
+    const auto folder =
+        (caches ? std::filesystem::path(caches) : std::filesystem::path(home) / ".cache") / "arhost" / plugin.stem();
+    policy.writable.push_back(folder);
+    for (const char *variable : {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH",
+                                 "CUDA_CACHE_PATH", "OPTIX_CACHE_PATH"})
+        ::setenv(variable, folder.c_str(), 1);
+}
+
 // Before anything is opened that nobody vouches for: a library's constructors run when it is loaded.
 sandbox::Level enter_sandbox(const Link &link, const sandbox::Policy &policy) {
     sandbox::Level level = sandbox::enter(policy);
@@ -201,6 +214,7 @@ int serve(Link &link) {
     std::error_code ignored;
     policy.readable.push_back(std::filesystem::path(file).parent_path());
     policy.readable.push_back(std::filesystem::weakly_canonical(file, ignored).parent_path());
+    give_shader_cache(policy, file);
     const sandbox::Level level = enter_sandbox(link, policy);
     const arhost_plugin *plugin = nullptr;
     {

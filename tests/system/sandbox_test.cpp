@@ -29,6 +29,7 @@ public:
               "outputs: [{plugin: sink_counter, path: out/counted.txt}]\nstats: stats.json\n" +
               settings) {
         write("scene.yaml", small_scene);
+        fs::create_directories(path("out"));
         std::ofstream(target()) << "secret";
     }
     fs::path target() const { return elsewhere_.path() / "target"; }
@@ -181,16 +182,18 @@ TEST(Sandbox, SharedMemoryIsNotTruncated) {
 }
 
 TEST(Sandbox, MalformedMessagesEndTheirWorker) {
-    for (const char *attack : {"no_json", "wrong_types", "out_of_turn", "nested", "empty"}) {
+    for (const char *attack : {"no_json", "wrong_types", "out_of_turn", "nested"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack);
         ASSERT_EQ(run.attack(), 0) << run.output();
         EXPECT_GT(run.stats()["restarts"]["tracker"], 0) << run.output();
         expect_whole_video(run);
     }
-    HostileRun run("oversized"); // the socket refuses it, or the host its sender
-    ASSERT_EQ(run.attack(), 0) << run.output();
-    expect_whole_video(run);
+    for (const char *attack : {"empty", "oversized"}) { // as if it had closed its end; refused by the socket
+        HostileRun run(attack);
+        ASSERT_EQ(run.attack(), 0) << run.output();
+        expect_whole_video(run);
+    }
 }
 
 TEST(Sandbox, AFloodedDoorbellEndsItsWorker) {
