@@ -255,7 +255,7 @@ int check(const Arguments &arguments, supervise::Launcher &launcher) {
 
     const auto check_component = [&](const config::ComponentConfiguration &component, arhost_kind kind) {
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
-            const ProbeResult result = probe(context, component.plugins[i], configuration.sandbox);
+            const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
             config::options_for(std::get<ring::PluginDescription>(result), kind, component, i);
@@ -293,7 +293,7 @@ int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher)
     int status = success;
     std::string level;
     for (const fs::path &file : files) {
-        const ProbeResult result = probe(context, file, sandbox::Mode::permissive, &level);
+        const ProbeResult result = probe(context, file, {}, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
             std::printf("%-18s can't be used: %s\n", file.stem().c_str(), reason->c_str());
             status = run_failed;

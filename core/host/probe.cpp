@@ -5,8 +5,9 @@ namespace arhost::host {
 
 using namespace ring;
 
-ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Mode sandbox,
+ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                   std::string *level) {
+    policy.writable.clear();
     ProbeResult result = std::string();
     bool done = false;
     supervise::Process *running = nullptr;
@@ -34,7 +35,7 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
     };
     supervise::Process process(
         context, plugin.stem().string(), std::move(events),
-        Json{{"type", "open"}, {"plugin", plugin.string()}, {"sandbox", sandbox::to_json({.mode = sandbox})}});
+        Json{{"type", "open"}, {"plugin", plugin.string()}, {"sandbox", sandbox::to_json(policy)}});
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + std::chrono::seconds(10),
                                              [&] { process.end("did not say hello within 10 s"); });

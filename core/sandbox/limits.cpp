@@ -39,8 +39,9 @@ Layer set_limits(const Policy &policy) {
     if (policy.writable.empty() && !may_share_memory(policy))
         lower(layer, "files", RLIMIT_FSIZE, 0); // a full file system in /tmp, say, where no other layer is
     // Half of the usual 1024: descriptors that are under way in messages count for all processes of a user
-    // together, and the host must be able to send some whatever a worker has under way.
-    lower(layer, "descriptors", RLIMIT_NOFILE, 512);
+    // together, and who has to send some, as host and scene loader do, must be able to whatever a plugin has
+    // under way.
+    lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "threads", RLIMIT_NPROC, 8192); // in its user namespace; none for root
