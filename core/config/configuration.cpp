@@ -2,6 +2,7 @@
 #include "config/configuration.hpp"
 
 #include "camera/calibration.hpp"
+#include "config/access.hpp"
 #include "config/options.hpp"
 #include "config/schema.hpp"
 
@@ -47,13 +48,19 @@ supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     return limits;
 }
 
-ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path,
-                                       const PluginPath &plugin_path, const supervise::RestartLimits &restart) {
+// What all components share.
+struct Shared {
+    PluginPath plugin_path;
+    supervise::RestartLimits restart;
+    sandbox::Mode sandbox;
+};
+
+ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
-        node, {plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}};
+        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {}};
     if (const auto fallback = node.find("fallback"))
-        component.plugins.push_back(plugin_path.resolve(*fallback));
+        component.plugins.push_back(shared.plugin_path.resolve(*fallback));
     // "options:" with nothing behind it is an empty map.
     if (component.options && component.options->is_null())
         component.options.reset();
@@ -63,13 +70,16 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, longest_ms));
     component.limits.stop =
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, longest_ms));
-    component.limits.restart = restart;
+    component.limits.restart = shared.restart;
+    component.policy = access_of(node, schema_path == "outputs[]");
+    component.policy.mode = shared.sandbox;
+    component.policy.memory_bytes =
+        static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     return component;
 }
 
-TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plugin_path,
-                                   const supervise::RestartLimits &restart) {
-    TrackerConfiguration tracker{parse_component(node, "tracker", plugin_path, restart), {}, 0};
+TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared) {
+    TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}, 0};
     const yaml::Node markers = node.require("markers");
     std::set<std::int64_t> ids;
     for (const yaml::Node &marker : markers.items()) {
@@ -91,21 +101,13 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const PluginPath &plu
 // That no file is written which the run reads, or writes elsewhere.
 class FilesInUse {
 public:
-    void read(const std::filesystem::path &file) { files_.try_emplace(real(file), false); }
+    void read(const std::filesystem::path &file) { files_.try_emplace(real_path(file), false); }
     void write(const yaml::Node &path) {
-        const auto [found, fresh] = files_.try_emplace(real(path.text()), true);
+        const auto [found, fresh] = files_.try_emplace(real_path(path.text()), true);
         if (!fresh && found->second)
             path.fail("another output writes '" + path.text() + "' already; choose another path");
         if (!fresh)
             path.fail("'" + path.text() + "' is a file that this run reads; choose another path");
-    }
-
-    // The same for all paths to a file, links included.
-    static std::filesystem::path real(const std::filesystem::path &file) {
-        std::error_code error;
-        const std::filesystem::path canonical =
-            std::filesystem::weakly_canonical(std::filesystem::absolute(file), error);
-        return error ? std::filesystem::absolute(file).lexically_normal() : canonical;
     }
 
 private:
@@ -120,6 +122,11 @@ std::vector<ring::OptionValue> options_for(const ring::PluginDescription &plugin
     if (plugin.kind != kind)
         component.node.require(configured ? "plugin" : "fallback")
             .fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a " + ring::to_text(kind));
+    for (const std::string &need : plugin.needs)
+        if (component.policy.mode != sandbox::Mode::none && !component.policy.allows(need))
+            component.node.require(configured ? "plugin" : "fallback")
+                .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox keeps from it: add 'allow: [" +
+                      need + "]' to " + component.node.path() + " (docs/security.md)");
     return resolve_options(plugin, configured ? component.options : std::nullopt, component.path, component.node);
 }
 
@@ -132,15 +139,21 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("plugin_path"))
         for (const yaml::Node &folder : node->items())
             folders.push_back(folder.input_path());
-    const PluginPath plugin_path(folders, built_in_plugins);
-    const supervise::RestartLimits restart = parse_restart(root.find("restart"));
-
     Configuration configuration{.node = root};
+    if (const auto node = root.find("sandbox")) {
+        const std::string mode = node->choice(key_at("sandbox").choices);
+        configuration.sandbox = mode == "strict" ? sandbox::Mode::strict
+                                : mode == "none" ? sandbox::Mode::none
+                                                 : sandbox::Mode::permissive;
+    }
+    const Shared shared{PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
+                        configuration.sandbox};
+
     const auto trajectory_node = root.find("trajectory");
     if (trajectory_node)
         configuration.trajectory = camera::read_trajectory(trajectory_node->input_path());
     if (const auto node = trajectory_node ? root.find("source") : root.require("source")) {
-        configuration.source = SourceConfiguration{parse_component(*node, "source", plugin_path, restart)};
+        configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
         if (const auto fps = node->find("fps"))
             configuration.source->fps = fps->real(0, 10'000);
     }
@@ -165,14 +178,14 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         }
     }
     if (const auto node = root.find("tracker")) {
-        configuration.tracker = parse_tracker(*node, plugin_path, restart);
+        configuration.tracker = parse_tracker(*node, shared);
         if (!configuration.source)
             node->fail("a tracker needs a 'source' that gives it frames");
     }
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
-        configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", plugin_path, restart),
-                                                         scene.input_path(), scene};
+        configuration.raytracer =
+            RaytracerConfiguration{parse_component(*node, "raytracer", shared), scene.input_path(), scene};
         if (!configuration.tracker && !configuration.trajectory)
             node->fail("a ray tracer needs a 'tracker' or a 'trajectory' that tells where the camera is");
         if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
@@ -184,7 +197,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     }
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
-            configuration.outputs.push_back(parse_component(output, "outputs[]", plugin_path, restart));
+            configuration.outputs.push_back(parse_component(output, "outputs[]", shared));
     FilesInUse files;
     files.read(root.file());
     for (const auto &node : {configuration.source ? configuration.source->path : std::nullopt,
@@ -203,7 +216,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = FilesInUse::real(node->text()); // of a link, which is not to be replaced, where it leads to
+            *file = real_path(node->text()); // of a link, which is not to be replaced, where it leads to
             std::error_code error;
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;

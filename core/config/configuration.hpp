@@ -6,6 +6,7 @@
 #include "camera/coordinates.hpp"
 #include "camera/trajectory.hpp"
 #include "config/plugin_path.hpp"
+#include "sandbox/sandbox.hpp"
 #include "supervise/component.hpp"
 #include "yaml/yaml.hpp"
 
@@ -27,6 +28,7 @@ struct ComponentConfiguration {
     std::vector<std::filesystem::path> plugins; // the shared object, then its fallback
     std::optional<yaml::Node> path, options;
     supervise::Limits limits;
+    sandbox::Policy policy; // what its worker may touch (docs/security.md)
 };
 
 struct SourceConfiguration : ComponentConfiguration {
@@ -46,6 +48,7 @@ struct RaytracerConfiguration : ComponentConfiguration {
 struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
+    sandbox::Mode sandbox = sandbox::Mode::permissive;
     std::uint64_t frames = 0;                       // 0: all
     std::optional<SourceConfiguration> source{};    // none: black frames for a trajectory
     std::optional<camera::Trajectory> trajectory{}; // where cameras come from in place of the tracker
@@ -59,9 +62,9 @@ struct Configuration {
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
 };
 
-// The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind
-// or the configured options do not fit it. `candidate` 0 is the plugin, 1 its fallback, which takes its
-// own defaults.
+// The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind,
+// needs what the configuration does not allow, or the configured options do not fit it. `candidate` 0 is the plugin,
+// 1 its fallback, which takes its own defaults.
 std::vector<ring::OptionValue> options_for(const ring::PluginDescription &plugin, arhost_kind kind,
                                            const ComponentConfiguration &component, std::size_t candidate);
 

@@ -78,10 +78,12 @@ config::Configuration parse_configuration(yaml::Node &root, const Arguments &arg
     }
     if (arguments.frames)
         root.override_value("frames", std::to_string(*arguments.frames), "--frames");
+    if (arguments.in_process)
+        root.override_value("sandbox", "none");
     config::Configuration configuration = config::parse(root, built_in_plugins());
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
-    if (arguments.without_deadlines)
+    if (arguments.in_process)
         lift_deadlines(configuration);
     return configuration;
 }
@@ -183,10 +185,11 @@ bool write_whole(const fs::path &file, const char *key, Console &console, const 
     }
     fs::create_directories(file.parent_path(), ignored);
     const fs::path temporary = file.string() + ".tmp";
-    std::ofstream stream(temporary);
-    stream << text << std::flush;
-    stream.close();
-    if (stream && ::rename(temporary.c_str(), file.c_str()) == 0)
+    // A new file, whatever lies there: an output may share the folder, and leave a link or a pipe under this name.
+    fs::remove(temporary, ignored);
+    std::FILE *stream = std::fopen(temporary.c_str(), "wx");
+    const bool complete = stream && std::fwrite(text.data(), 1, text.size(), stream) == text.size();
+    if (stream && std::fclose(stream) == 0 && complete && ::rename(temporary.c_str(), file.c_str()) == 0)
         return true;
     console.log(ARHOST_SEVERITY_ERROR, key, "can't write " + file.string() + ": " + std::strerror(errno));
     fs::remove(temporary, ignored);
@@ -275,7 +278,7 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
 
     const auto check_component = [&](const config::ComponentConfiguration &component, arhost_kind kind) {
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
-            const ProbeResult result = probe(context, component.plugins[i]);
+            const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
             config::options_for(std::get<ring::PluginDescription>(result), kind, component, i);
@@ -292,7 +295,8 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
 
     if (configuration.raytracer) {
         std::optional<std::string> outcome;
-        const SceneLoading loading(context, configuration.raytracer->scene, configuration.raytracer->limits.start,
+        const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
+                                   configuration.raytracer->limits.start,
                                    {[&](const ring::SharedMemory &) { outcome = ""; },
                                     [&](const std::string &reason) { outcome = reason; }});
         while (!outcome)
@@ -310,8 +314,9 @@ int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher) 
     supervise::Context context = make_context(reactor, launcher, console);
     const std::vector<fs::path> files = config::PluginPath({}, built_in_plugins()).all();
     int status = success;
+    std::string level;
     for (const fs::path &file : files) {
-        const ProbeResult result = probe(context, file);
+        const ProbeResult result = probe(context, file, {}, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
             std::printf("%-18s can't be used: %s\n", file.stem().c_str(), reason->c_str());
             status = run_failed;
@@ -321,6 +326,8 @@ int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher) 
         std::printf("%-18s %-10s %-8s %s\n", plugin.id.c_str(), ring::to_text(plugin.kind), plugin.version.c_str(),
                     file.c_str());
         std::printf("%-18s %s\n", "", plugin.description.c_str());
+        for (const std::string &need : plugin.needs)
+            std::printf("%-18s needs 'allow: [%s]'\n", "", need.c_str());
         if (!with_options)
             continue;
         for (const ring::OptionDeclaration &option : plugin.options) {
@@ -335,6 +342,8 @@ int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher) 
             }
         }
     }
+    if (!level.empty())
+        std::printf("\nsandbox on this machine: %s\n", level.c_str());
     if (files.empty())
         std::printf("no plugins in %s\n", built_in_plugins().c_str());
     return status;

@@ -24,7 +24,7 @@ struct Arguments {
     std::optional<double> g1, g2;
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
-    bool without_deadlines = false; // for debuggers
+    bool in_process = false; // plugins in this process, for debuggers: no deadlines, no sandbox
 };
 
 // `arhost replay`.

@@ -48,8 +48,9 @@ bool Pipeline::run() {
             fail(reason, true);
             scene_loading_.reset();
         };
-        scene_loading_ = std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene,
-                                                        configuration_.raytracer->limits.start, std::move(hooks));
+        scene_loading_ =
+            std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene, configuration_.sandbox,
+                                           configuration_.raytracer->limits.start, std::move(hooks));
     }
     while (phase_ != Phase::over) {
         context_.reactor.run_once();
@@ -121,7 +122,8 @@ void Pipeline::make_source() {
             fail("source: " + source_->description().id + " died, and can't go on in the middle", false);
         }
     };
-    source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, std::move(hooks));
+    source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, source.policy,
+                                          std::move(hooks));
 }
 
 // What a trajectory without a source is composited over.
@@ -160,7 +162,8 @@ void Pipeline::make_tracker() {
     hooks.lost = [this](const std::vector<Command> &unanswered) {
         on_stage_lost(unanswered, Frame::Stage::to_track, "tracker");
     };
-    tracker_ = std::make_unique<Component>(context_, "tracker", tracker.plugins, tracker.limits, std::move(hooks));
+    tracker_ = std::make_unique<Component>(context_, "tracker", tracker.plugins, tracker.limits, tracker.policy,
+                                           std::move(hooks));
 }
 
 void Pipeline::make_raytracer() {
@@ -189,8 +192,8 @@ void Pipeline::make_raytracer() {
     hooks.lost = [this](const std::vector<Command> &unanswered) {
         on_stage_lost(unanswered, Frame::Stage::to_render, "raytracer");
     };
-    raytracer_ =
-        std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits, std::move(hooks));
+    raytracer_ = std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits,
+                                             raytracer.policy, std::move(hooks));
 }
 
 void Pipeline::make_outputs() {
@@ -241,8 +244,8 @@ void Pipeline::make_outputs() {
             give_up(name, output.node, reason, by_configuration);
             give_up_sink(*sink);
         };
-        sink->component =
-            std::make_unique<Component>(context_, name, output.plugins, output.limits, std::move(hooks));
+        sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, output.policy,
+                                                      std::move(hooks));
         sink->component->start();
     }
 }

@@ -5,7 +5,9 @@ namespace arhost::host {
 
 using namespace ring;
 
-ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin) {
+ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
+                  std::string *level) {
+    policy.writable.clear();
     ProbeResult result = std::string();
     bool done = false;
     supervise::Process *running = nullptr;
@@ -13,10 +15,13 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
     events.message = [&](Message &message) {
         const std::string type = message.body.at("type").get<std::string>();
         try {
-            if (type == "hello")
+            if (type == "hello") {
                 result = description_from_json(message.body.at("descriptor"));
-            else if (type == "failed")
+                if (level)
+                    *level = message.body.at("sandbox").get<std::string>();
+            } else if (type == "failed") {
                 result = message.body.at("text").get<std::string>();
+            }
         } catch (const std::exception &error) {
             result = std::string("its descriptor is not valid: ") + error.what();
         }
@@ -28,8 +33,9 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
             *reason = death.how;
         done = true;
     };
-    supervise::Process process(context, plugin.stem().string(), std::move(events),
-                               Json{{"type", "open"}, {"plugin", plugin.string()}});
+    supervise::Process process(
+        context, plugin.stem().string(), std::move(events),
+        Json{{"type", "open"}, {"plugin", plugin.string()}, {"sandbox", sandbox::to_json(policy)}});
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + std::chrono::seconds(10),
                                              [&] { process.end("did not say hello within 10 s"); });

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "ring/json_abi.hpp"
+#include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
 #include <filesystem>
@@ -15,6 +16,9 @@ namespace arhost::host {
 // The description, or the reason why the plugin can't be used.
 using ProbeResult = std::variant<ring::PluginDescription, std::string>;
 
-ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin);
+// It may read what `policy` says and write nothing: who it is, a plugin tells before it is asked to do anything.
+// Where it answers, `level` gets how far the sandbox was reached.
+ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
+                  std::string *level = nullptr);
 
 } // namespace arhost::host

@@ -7,7 +7,23 @@ namespace arhost::host {
 
 using namespace ring;
 
-SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene,
+namespace {
+
+// Which files a scene, and the meshes that it names, name in turn is known when they have been parsed. So all
+// may be read, but for the kernel's; what comes out is an arena and no file.
+sandbox::Policy policy_of(sandbox::Mode mode) {
+    sandbox::Policy policy;
+    policy.mode = mode;
+    policy.makes_shared_memory = true;
+    for (const auto &entry : std::filesystem::directory_iterator("/"))
+        if (const auto name = entry.path().filename(); name != "proc" && name != "sys" && name != "dev")
+            policy.readable.push_back(entry.path());
+    return policy;
+}
+
+} // namespace
+
+SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
                            std::chrono::milliseconds patience, Hooks hooks)
     : context_(context), hooks_(std::move(hooks)), scene_(scene.string()), patience_(patience) {
     supervise::Process::Events events;
@@ -23,8 +39,9 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
     };
     events.result = [](const Result &) {};
     events.died = [this](const supervise::Death &death) { on_died(death); };
-    process_ = std::make_unique<supervise::Process>(context, "scene", std::move(events),
-                                                    Json{{"type", "load"}, {"scene", scene.string()}});
+    process_ = std::make_unique<supervise::Process>(
+        context, "scene", std::move(events),
+        Json{{"type", "load"}, {"scene", scene.string()}, {"sandbox", sandbox::to_json(policy_of(sandbox))}});
     watch();
 }
 

@@ -4,6 +4,7 @@
 // comes back before anyone else sees it.
 #pragma once
 
+#include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
 #include <arhost/scene.h>
@@ -22,8 +23,8 @@ public:
         std::function<void(const std::string &reason)> failed;
     };
     // `patience`: the longest time without a word of progress.
-    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, std::chrono::milliseconds patience,
-                 Hooks hooks);
+    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
+                 std::chrono::milliseconds patience, Hooks hooks);
 
 private:
     void watch();

@@ -17,7 +17,7 @@ int main(int argc, char **argv) {
                  "and without deadlines: for debuggers.");
     app.set_version_flag("--version", "arhost-inprocess " ARHOST_VERSION);
     host::Arguments arguments;
-    arguments.without_deadlines = true;
+    arguments.in_process = true;
     app.add_option("--config", arguments.file, "The configuration to run (docs/config.md)")
         ->type_name("FILE")
         ->required();

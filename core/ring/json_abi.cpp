@@ -46,9 +46,9 @@ Json to_json(const arhost_descriptor &d) {
             option["choices"].push_back(*choice);
         options.push_back(std::move(option));
     }
-    Json devices = Json::array();
-    for (const char *const *device = d.devices; device && *device; ++device)
-        devices.push_back(*device);
+    Json needs = Json::array();
+    for (const char *const *need = d.needs; need && *need; ++need)
+        needs.push_back(*need);
     return {{"kind", d.kind},
             {"id", text_or_empty(d.id)},
             {"name", text_or_empty(d.name)},
@@ -58,7 +58,7 @@ Json to_json(const arhost_descriptor &d) {
             {"description", text_or_empty(d.description)},
             {"capabilities", d.capabilities},
             {"options", std::move(options)},
-            {"devices", std::move(devices)}};
+            {"needs", std::move(needs)}};
 }
 
 PluginDescription description_from_json(const Json &json) {
@@ -73,8 +73,8 @@ PluginDescription description_from_json(const Json &json) {
     d.licence = text_of(json, "licence");
     d.description = text_of(json, "description");
     d.capabilities = json.at("capabilities").get<std::uint32_t>();
-    for (const Json &device : json.at("devices"))
-        d.devices.push_back(device.get<std::string>());
+    for (const Json &need : json.at("needs"))
+        d.needs.push_back(need.get<std::string>());
     for (const Json &o : json.at("options")) {
         OptionDeclaration option;
         option.key = text_of(o, "key");

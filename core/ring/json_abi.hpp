@@ -28,7 +28,7 @@ struct PluginDescription {
     std::string id, name, version, vendor, licence, description;
     std::uint32_t capabilities = 0;
     std::vector<OptionDeclaration> options;
-    std::vector<std::string> devices;
+    std::vector<std::string> needs; // of sandbox::allowances
 };
 struct OptionValue {
     std::string key;

@@ -5,7 +5,7 @@
 // core/supervise the other.
 //
 //   host → worker                                        worker → host
-//   {type: open, plugin} + host page      , worker page   {type: hello, descriptor}
+//   {type: open, plugin, sandbox} + host and worker page  {type: hello, descriptor, sandbox: how far it was reached}
 //   {type: create, options, setup…} [+ arena, inputs]     {type: ready, properties…}
 //   {type: attach, role, generation, layout} + memory     {type: attached, role, generation}
 //   {type: detach, generation}                            {type: detached, generation}
@@ -13,7 +13,7 @@
 //   at any time                                           {type: log, severity, text}, {type: progress, what,
 //   fraction},
 //                                                         {type: failed, status, text}, {type: end}
-//   the loader: {type: load, scene}                       {type: loaded, …} + arena
+//   the loader: {type: load, scene, sandbox}             {type: loaded, …} + arena
 //
 // Once a worker is ready, the host announces each further message by a `control` command in the ring, so
 // that the order of messages and frames is fixed.

@@ -31,9 +31,9 @@ RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
 }
 
 Component::Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
-                     const Limits &limits, Hooks hooks)
+                     const Limits &limits, sandbox::Policy policy, Hooks hooks)
     : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
-      hooks_(std::move(hooks)), policy_(limits.restart) {}
+      sandbox_(std::move(policy)), hooks_(std::move(hooks)), policy_(limits.restart) {}
 
 void Component::start() {
     spawn();
@@ -51,8 +51,9 @@ void Component::spawn() {
     events.result = [this](const Result &result) { on_result(result); };
     events.died = [this](const Death &death) { on_died(death); };
     try {
-        process_ = std::make_unique<Process>(context_, name_, std::move(events),
-                                             Json{{"type", "open"}, {"plugin", plugin().string()}});
+        process_ = std::make_unique<Process>(
+            context_, name_, std::move(events),
+            Json{{"type", "open"}, {"plugin", plugin().string()}, {"sandbox", sandbox::to_json(sandbox_)}});
     } catch (const std::exception &error) { // no process or memory to be had: as if it had died at once
         state_ = State::waiting;
         return try_again(error.what());

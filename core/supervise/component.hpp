@@ -5,6 +5,7 @@
 #pragma once
 
 #include "ring/json_abi.hpp"
+#include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 #include "supervise/restart_policy.hpp"
 
@@ -66,9 +67,9 @@ public:
         static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
     };
 
-    // `plugins`: the shared object, and the ones to fall back to when it is given up.
+    // `plugins`: the shared object, and the ones to fall back to when it is given up. `policy` holds for all.
     Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins, const Limits &limits,
-              Hooks hooks);
+              sandbox::Policy policy, Hooks hooks);
     Component(const Component &) = delete;
     Component &operator=(const Component &) = delete;
 
@@ -122,6 +123,7 @@ private:
     std::vector<std::filesystem::path> plugins_;
     std::size_t candidate_ = 0;
     Limits limits_;
+    sandbox::Policy sandbox_;
     Hooks hooks_;
     RestartPolicy policy_;
     State state_ = State::idle;

@@ -236,7 +236,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_BOOL, "vsync", "true", "Whether frames wait for the screen, which avoids tearing."),
 };
 
-constexpr const char *devices[] = {"/dev/dri/*", "/dev/nvidia*", nullptr}; // OpenGL's; it does without
+constexpr const char *needs[] = {"display", nullptr};
 
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
@@ -247,10 +247,10 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Shows frames in a window.",
-    ARHOST_NEEDS_DISPLAY | ARHOST_IS_REALTIME_SINK,
+    ARHOST_IS_REALTIME_SINK,
     std::size(options),
     options,
-    devices,
+    needs,
 };
 
 } // namespace

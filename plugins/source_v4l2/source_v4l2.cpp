@@ -324,7 +324,7 @@ constexpr arhost_option_descriptor options[] = {
            "How the camera sends its pictures; auto: yuyv if that is fast enough, else mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "How many frames the driver may hold.", 2, 32),
 };
-constexpr const char *devices[] = {"/dev/video*", nullptr};
+constexpr const char *needs[] = {"video", nullptr};
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,
@@ -337,7 +337,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_IS_LIVE,
                                           std::size(options),
                                           options,
-                                          devices};
+                                          needs};
 
 } // namespace
 

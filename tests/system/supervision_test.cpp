@@ -138,7 +138,7 @@ TEST(Supervision, AWorkerThatSealsItsMemoryDoesNoHarm) {
         ArhostRun run(
             counting("lockstep", "frames: 30", std::string("seal: ") + seal, "", "restart: {first_delay_ms: 1}\n"));
         run.write("scene.yaml", small_scene);
-        ASSERT_EQ(run.run(), 0) << run.output();
+        ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.writes=[.]"}), 0) << run.output();
         expect_all_frames_in_order(run, 30);
         EXPECT_EQ(run.stats()["restarts"]["tracker"], 1) << seal;
         EXPECT_EQ(run.stats()["frames"]["augmented"], 30) << seal;
@@ -151,7 +151,7 @@ TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
     for (const End end : {End::worker_dies, End::run_stops, End::host_is_killed}) {
         ArhostRun run(yaml);
         run.write("scene.yaml", small_scene);
-        run.start();
+        run.start({"--config", "run.yaml", "--set", "tracker.allow=[processes]", "--set", "tracker.writes=[.]"});
         wait_for_frames(run, 20);
         const std::vector<pid_t> children = forked_children(run);
         ASSERT_EQ(children.size(), 2u);

@@ -58,7 +58,7 @@ struct Bench {
         hooks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
         component = std::make_unique<Component>(
             context, "source", std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
-            limits, std::move(hooks));
+            limits, arhost::sandbox::Policy{}, std::move(hooks));
         component->start();
     }
     // Runs until the event has come, or the time is over.

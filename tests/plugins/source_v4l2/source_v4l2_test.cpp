@@ -143,9 +143,9 @@ TEST(V4l2, DeclaresItsDevicesAndThatItIsLive) {
     const arhost_descriptor &descriptor = source.plugin().descriptor();
     EXPECT_STREQ(descriptor.id, "source_v4l2");
     EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_IS_LIVE));
-    ASSERT_NE(descriptor.devices, nullptr);
-    EXPECT_STREQ(descriptor.devices[0], "/dev/video*");
-    EXPECT_EQ(descriptor.devices[1], nullptr);
+    ASSERT_NE(descriptor.needs, nullptr);
+    EXPECT_STREQ(descriptor.needs[0], "video");
+    EXPECT_EQ(descriptor.needs[1], nullptr);
 }
 
 // ---- Motion-JPEG ----

@@ -135,7 +135,6 @@ enum {
     ARHOST_CAN_SEEK = 1 << 0,        /* source: start at any sequence number gives the same frames */
     ARHOST_IS_LIVE = 1 << 1,         /* source: a camera; frames that are not read in time are gone */
     ARHOST_TRACES_LENS = 1 << 2,     /* raytracer: applies the distortion of arhost_intrinsics */
-    ARHOST_NEEDS_DISPLAY = 1 << 3,   /* sink: opens a window */
     ARHOST_IS_REALTIME_SINK = 1 << 4 /* sink: wants the newest frame rather than every frame */
 };
 
@@ -152,8 +151,10 @@ typedef struct arhost_descriptor {
     uint32_t capabilities;   /* ARHOST_CAN_SEEK | … */
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count of them; NULL where there are none */
-    const char *const *devices;              /* NULL-terminated list of the device nodes needed, as glob patterns
-                                                ("/dev/video*"), or NULL: the sandbox allows no other */
+    /* NULL-terminated list of what the sandbox must allow, or NULL: "video" (/dev/video*), "usb", "gpu",
+     * "display" (X or Wayland, and the GPU), "network", "processes" (of its own: fork and exec). It is the
+     * configuration that allows (`allow: [video]`); where it does not, the plugin is refused before create. */
+    const char *const *needs;
 } arhost_descriptor;
 
 /* One made plugin; what is in it is the plugin's own affair. */

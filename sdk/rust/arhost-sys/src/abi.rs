@@ -102,7 +102,6 @@ abi_constants! {
     pub const ARHOST_CAN_SEEK: u32 = 1 << 0;
     pub const ARHOST_IS_LIVE: u32 = 1 << 1;
     pub const ARHOST_TRACES_LENS: u32 = 1 << 2;
-    pub const ARHOST_NEEDS_DISPLAY: u32 = 1 << 3;
     pub const ARHOST_IS_REALTIME_SINK: u32 = 1 << 4;
     // arhost/frame.h
     pub const ARHOST_GREY8: arhost_pixel_format = 1;
@@ -216,7 +215,7 @@ abi_structs! {
         capabilities: u32,
         option_count: u32,
         options: *const arhost_option_descriptor,
-        devices: *const *const c_char,
+        needs: *const *const c_char,
     }
     struct arhost_plugin {
         struct_size: u32,

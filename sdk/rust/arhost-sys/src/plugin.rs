@@ -152,7 +152,7 @@ macro_rules! plugin {
                 capabilities: $capabilities,
                 option_count: OPTIONS.len() as u32,
                 options: OPTIONS.as_ptr(),
-                devices: std::ptr::null(),
+                needs: std::ptr::null(),
             };
             static FUNCTIONS: $crate::table::$kind = $crate::$kind::<$type>();
             static PLUGIN: $crate::arhost_plugin = $crate::plugin_of::<$type>(

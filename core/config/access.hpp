@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a component's worker may touch, out of the configuration alone: what a plugin says about itself is
+// known only when its code has run.
+#pragma once
+
+#include "sandbox/sandbox.hpp"
+#include "yaml/yaml.hpp"
+
+namespace arhost::config {
+
+// Of the component at `node`: `allow`, `reads`, `writes`, `path` (an output's folder may be written, a
+// source's file read), and each option whose value is the name of a file or folder that is there, which may
+// be read. Throws yaml::Error.
+sandbox::Policy access_of(const yaml::Node &node, bool is_output);
+
+// The same for all paths to a file, links included; absolute.
+std::filesystem::path real_path(const std::filesystem::path &file);
+
+} // namespace arhost::config

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The layers, in the order in which sandbox::enter applies them: each only takes away, and so may take away
+// what the ones before it needed.
+#pragma once
+
+#include "sandbox/sandbox.hpp"
+
+#include <cerrno>
+#include <cstring>
+
+// Sanitizers reserve terabytes of addresses, and start processes.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ARHOST_UNDER_SANITIZER 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define ARHOST_UNDER_SANITIZER 1
+#endif
+#endif
+
+namespace arhost::sandbox {
+
+#ifdef ARHOST_UNDER_SANITIZER
+constexpr bool under_sanitizer = true;
+#else
+constexpr bool under_sanitizer = false;
+#endif
+
+inline std::string error_text(const char *what) {
+    return std::string(what) + ": " + std::strerror(errno);
+}
+
+inline void add_to(std::string &list, const std::string &what) {
+    list += (list.empty() ? "" : ", ") + what;
+}
+
+// The leak checker is a process beside its own, and stack traces are another program's work.
+inline bool may_start_processes(const Policy &policy) {
+    return under_sanitizer || policy.allows("processes");
+}
+
+// Memory that no limit on a process counts: memfds, shared anonymous mappings.
+inline bool may_share_memory(const Policy &policy) {
+    return policy.makes_shared_memory || policy.allows("gpu") || policy.allows("display") ||
+           policy.allows("processes");
+}
+inline bool has_memory_limit(const Policy &policy) {
+    return !under_sanitizer && !policy.allows("gpu"); // a driver maps what it likes
+}
+
+Layer enter_namespaces(const Policy &policy);
+Layer set_limits(const Policy &policy);
+Layer drop_capabilities();
+Layer enter_landlock(const Policy &policy); // needs no_new_privs, as the next
+Layer filter_system_calls(const Policy &policy);
+
+// What `allow` stands for, as paths; those with a wildcard filled in, and only those that are there.
+struct Paths {
+    std::vector<std::filesystem::path> readable, devices; // devices: read, write, ioctl
+};
+Paths paths_of(const Policy &policy);
+
+} // namespace arhost::sandbox

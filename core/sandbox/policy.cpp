@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sandbox/layers.hpp"
+
+#include <cstdlib>
+#include <glob.h>
+#include <sstream>
+
+namespace arhost::sandbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+using PathList = std::initializer_list<const char *>;
+
+// What every library expects to be there. Other processes' /proc, /home, /tmp and /run are not among it.
+constexpr PathList system_readable = {"/usr",
+                                      "/lib",
+                                      "/lib32",
+                                      "/lib64",
+                                      "/libx32",
+                                      "/bin",
+                                      "/sbin",
+                                      "/opt",
+                                      "/nix/store",
+                                      "/gnu/store",
+                                      "/etc/ld.so.cache",
+                                      "/etc/ld.so.conf",
+                                      "/etc/ld.so.conf.d",
+                                      "/etc/localtime",
+                                      "/etc/alternatives",
+                                      "/etc/fonts",
+                                      "/etc/OpenCL",
+                                      "/etc/vulkan",
+                                      "/etc/glvnd",
+                                      "/etc/drirc",
+                                      "/etc/python3",
+                                      "/etc/mime.types",
+                                      "/proc/self",
+                                      "/proc/cpuinfo",
+                                      "/proc/meminfo",
+                                      "/proc/stat",
+                                      "/proc/version",
+                                      "/proc/filesystems",
+                                      "/proc/sys/vm/overcommit_memory",
+                                      "/proc/sys/vm/max_map_count",
+                                      "/proc/sys/kernel/osrelease",
+                                      "/sys/devices/system",
+                                      "/sys/fs/cgroup",
+                                      "/sys/kernel/mm/transparent_hugepage"};
+constexpr PathList system_devices = {"/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"};
+
+constexpr PathList gpu_readable = {"/sys/dev",    "/sys/bus/pci", "/sys/class/drm", "/sys/devices",
+                                   "/sys/module", "/proc/driver", "/proc/devices",  "/proc/modules"};
+constexpr PathList gpu_devices = {"/dev/dri", "/dev/nvidia*", "/dev/kfd"};
+
+struct Allowance {
+    std::string_view name;
+    PathList readable, devices;
+};
+constexpr Allowance meanings[] = {
+    {"video",
+     {"/sys/class/video4linux", "/sys/devices", "/sys/dev/char"},
+     {"/dev/video*", "/dev/media*", "/dev/v4l-subdev*"}},
+    {"usb", {"/sys/bus/usb", "/sys/devices", "/sys/class", "/run/udev/data"}, {"/dev/bus/usb"}},
+    {"gpu", gpu_readable, gpu_devices},
+    {"display", gpu_readable, gpu_devices},
+    {"network",
+     {"/etc/resolv.conf", "/etc/hosts", "/etc/host.conf", "/etc/nsswitch.conf", "/etc/gai.conf", "/etc/services",
+      "/etc/protocols", "/etc/ssl", "/etc/ca-certificates", "/run/systemd/resolve"},
+     {}},
+    {"processes", {"/etc/passwd", "/etc/group", "/etc/nsswitch.conf"}, {"/dev/tty"}},
+};
+
+void append(std::vector<fs::path> &paths, PathList patterns) {
+    for (const char *pattern : patterns) {
+        glob_t found{};
+        if (::glob(pattern, GLOB_NOSORT, nullptr, &found) == 0)
+            paths.insert(paths.end(), found.gl_pathv, found.gl_pathv + found.gl_pathc);
+        ::globfree(&found);
+    }
+}
+
+// The folders of a variable such as LD_LIBRARY_PATH.
+void append_folders(std::vector<fs::path> &paths, const char *variable) {
+    const char *value = std::getenv(variable);
+    std::istringstream list(value ? value : "");
+    for (std::string folder; std::getline(list, folder, ':');)
+        if (!folder.empty())
+            paths.emplace_back(folder);
+}
+
+} // namespace
+
+Paths paths_of(const Policy &policy) {
+    Paths paths;
+    append(paths.readable, system_readable);
+    append(paths.devices, system_devices);
+    append_folders(paths.readable, "LD_LIBRARY_PATH");
+    for (const Allowance &meaning : meanings)
+        if (policy.allows(meaning.name)) {
+            append(paths.readable, meaning.readable);
+            append(paths.devices, meaning.devices);
+        }
+    if (policy.allows("display")) {
+        if (const char *authority = std::getenv("XAUTHORITY"))
+            paths.readable.emplace_back(authority);
+        else if (const char *home = std::getenv("HOME"))
+            paths.readable.push_back(fs::path(home) / ".Xauthority");
+    }
+    paths.readable.insert(paths.readable.end(), policy.readable.begin(), policy.readable.end());
+    return paths;
+}
+
+nlohmann::json to_json(const Policy &policy) {
+    const auto texts = [](const std::vector<fs::path> &paths) {
+        return std::vector<std::string>(paths.begin(), paths.end());
+    };
+    return {{"mode", static_cast<int>(policy.mode)}, {"allow", policy.allow},
+            {"readable", texts(policy.readable)},    {"writable", texts(policy.writable)},
+            {"memory_bytes", policy.memory_bytes},   {"makes_shared_memory", policy.makes_shared_memory}};
+}
+
+Policy policy_from_json(const nlohmann::json &json) {
+    const auto paths = [&](const char *key) {
+        const auto texts = json.at(key).get<std::vector<std::string>>();
+        return std::vector<fs::path>(texts.begin(), texts.end());
+    };
+    Policy policy;
+    policy.mode = static_cast<Mode>(json.at("mode").get<int>());
+    for (const auto &what : json.at("allow"))
+        policy.allow.insert(what.get<std::string>());
+    policy.readable = paths("readable");
+    policy.writable = paths("writable");
+    policy.memory_bytes = json.at("memory_bytes").get<std::uint64_t>();
+    policy.makes_shared_memory = json.at("makes_shared_memory").get<bool>();
+    return policy;
+}
+
+} // namespace arhost::sandbox

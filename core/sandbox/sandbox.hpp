@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a process gives up before it runs code or reads data that nobody vouches for (docs/security.md).
+// Layer lies on layer: what one can't do on a machine, another does in part. None needs rights or set-up.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace arhost::sandbox {
+
+// What a policy can allow beyond computing: what arhost_descriptor.needs and the key `allow` are made of.
+constexpr std::array<std::string_view, 6> allowances = {"video", "usb", "gpu", "display", "network", "processes"};
+
+enum class Mode {
+    permissive = 1, // each layer as far as the machine has it
+    strict,         // all layers, or the process does not begin
+    none            // for debuggers and for what the sandbox should not stop
+};
+
+struct Policy {
+    Mode mode = Mode::permissive;
+    std::set<std::string, std::less<>> allow{}; // of `allowances`
+    // Absolute; a folder stands for all below it. The system's libraries and settings are readable anyway.
+    std::vector<std::filesystem::path> readable{};
+    std::vector<std::filesystem::path> writable{}; // folders; made where they are missing
+    std::uint64_t memory_bytes = 0;                // of its own; 0: three quarters of the machine's
+    bool makes_shared_memory = false;              // what arhost's scene loader does; evades the limit
+
+    bool allows(std::string_view what) const { return allow.contains(what); }
+};
+
+nlohmann::json to_json(const Policy &policy);
+Policy policy_from_json(const nlohmann::json &json); // throws nlohmann::json::exception
+
+// How far a layer was reached.
+struct Layer {
+    std::string name;
+    std::string reached; // "" where it was not at all
+    std::string lacks;   // and why; "" where nothing does
+};
+using Level = std::vector<Layer>;
+
+bool whole(const Level &level);
+// "no_new_privs; namespaces: user, net; … lacking landlock: not in this kernel".
+std::string to_text(const Level &level);
+
+// Puts the calling process, which must have one thread, into the sandbox for good. A layer that the machine
+// lacks is told in the result and is no error: who wants Mode::strict looks at it. Mode::none does nothing.
+Level enter(const Policy &policy);
+
+} // namespace arhost::sandbox

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A list of system calls that no plugin needs, refused with EPERM (libseccomp). A list of what is allowed
+// would break with each new driver or libc; what is dangerous and new is named here instead.
+#include "sandbox/layers.hpp"
+
+#include <fcntl.h>
+#include <memory>
+#include <sched.h>
+#include <seccomp.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace arhost::sandbox {
+namespace {
+
+// Newer than Debian 12's libseccomp, which knows them by number only; the same on every architecture.
+constexpr std::pair<const char *, int> newer_calls[] = {
+    {"fchmodat2", 452}, {"setxattrat", 463}, {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
+
+// An empty place: this architecture has no such call.
+constexpr const char *never[] = {
+    // into other processes
+    "ptrace", "process_vm_readv", "process_vm_writev", "process_madvise", "process_mrelease", "kcmp", "pidfd_open",
+    "pidfd_getfd", "pidfd_send_signal", "tkill", "move_pages", "migrate_pages", "perf_event_open", "lookup_dcookie",
+    // into the kernel
+    "bpf", "userfaultfd", "io_uring_setup", "io_uring_enter", "io_uring_register", "kexec_load", "kexec_file_load",
+    "init_module", "finit_module", "delete_module", "iopl", "ioperm", "modify_ldt", "syslog", "nfsservctl",
+    // keys, which namespaces do not hide
+    "keyctl", "add_key", "request_key",
+    // out of the view of files
+    "mount", "umount", "umount2", "pivot_root", "chroot", "mount_setattr", "move_mount", "open_tree",
+    "open_tree_attr", "fsopen", "fsconfig", "fsmount", "fspick", "unshare", "setns", "open_by_handle_at",
+    "name_to_handle_at", "fanotify_init", "quotactl", "quotactl_fd", "swapon", "swapoff", "acct", "mknod", "mknodat",
+    // what Landlock lets pass: files' owners, modes, attributes
+    "chmod", "fchmodat", "fchmodat2", "chown", "lchown", "fchownat", "setxattr", "lsetxattr", "setxattrat",
+    "removexattr", "lremovexattr", "removexattrat", "file_setattr", "utime", "utimes", "futimesat",
+    // the whole machine
+    "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
+    "stime", "sethostname", "setdomainname", "vhangup", "mq_open", "msgget", "semget"};
+
+class Filter {
+public:
+    Filter() : context_(seccomp_init(SCMP_ACT_ALLOW)) {
+        if (context_)
+            (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // a binary tree: cost log n
+    }
+    bool made() const { return context_ && !failed_; }
+
+    void deny(const char *name, std::initializer_list<scmp_arg_cmp> when = {}, int error = EPERM) {
+        int call = seccomp_syscall_resolve_name(name);
+        if (call == __NR_SCMP_ERROR)
+            for (const auto &[newer, number] : newer_calls)
+                if (!std::strcmp(newer, name))
+                    call = number;
+        if (call == __NR_SCMP_ERROR)
+            return;
+        failed_ |= seccomp_rule_add_array(context_.get(), SCMP_ACT_ERRNO(static_cast<unsigned>(error)), call,
+                                          static_cast<unsigned>(when.size()), when.begin()) != 0;
+    }
+    bool load() const { return seccomp_load(context_.get()) == 0; }
+
+private:
+    struct Release {
+        void operator()(void *context) const { seccomp_release(context); }
+    };
+    std::unique_ptr<void, Release> context_;
+    bool failed_ = false;
+};
+
+// The kernel takes these arguments as 32 bits; the filter sees 64, and the upper ones must not matter.
+scmp_arg_cmp equals(unsigned argument, std::uint64_t value) {
+    return {argument, SCMP_CMP_MASKED_EQ, 0xffffffffu, value & 0xffffffffu};
+}
+scmp_arg_cmp has_bits(unsigned argument, std::uint64_t mask, std::uint64_t value) {
+    return {argument, SCMP_CMP_MASKED_EQ, mask, value};
+}
+scmp_arg_cmp differs(unsigned argument, std::uint64_t value) {
+    return {argument, SCMP_CMP_NE, value, 0};
+}
+scmp_arg_cmp from(unsigned argument, std::uint64_t value) {
+    return {argument, SCMP_CMP_GE, value, 0};
+}
+
+// To this process alone, and not to a thread's or a group's number, which could be another's.
+void deny_reaching_others(Filter &filter, bool has_children) {
+    const auto self = static_cast<std::uint64_t>(::getpid());
+    if (!has_children) {
+        for (const char *call : {"kill", "tgkill", "rt_sigqueueinfo", "rt_tgsigqueueinfo"})
+            filter.deny(call, {differs(0, self)});
+        for (const char *call : {"setpgid", "setsid"}) // into the group that a signal to a group then meets
+            filter.deny(call);
+    }
+    // 0 is the caller. Their limits, priority and processors are all open to whoever has the same user.
+    for (const char *call :
+         {"prlimit64", "sched_setaffinity", "sched_setscheduler", "sched_setparam", "sched_setattr"})
+        filter.deny(call, {differs(0, 0)});
+    filter.deny("setpriority", {differs(0, PRIO_PROCESS)});
+    filter.deny("setpriority", {differs(1, 0)});
+    filter.deny("ioprio_set", {differs(0, 1 /* IOPRIO_WHO_PROCESS */)});
+    filter.deny("ioprio_set", {differs(1, 0)});
+    // A descriptor's owner gets any signal that F_SETSIG names; a lease halts who opens the file.
+    for (const int command : {F_SETOWN, F_SETOWN_EX, F_SETSIG, F_SETLEASE, F_NOTIFY})
+        filter.deny("fcntl", {equals(1, static_cast<unsigned>(command))});
+    for (const unsigned long request :
+         {0x8901ul /* FIOSETOWN */, 0x8902ul /* SIOCSPGRP */, std::uint64_t(TIOCSTI), std::uint64_t(TIOCLINUX)})
+        filter.deny("ioctl", {equals(1, request)});
+    filter.deny("prctl", {equals(0, PR_SET_PDEATHSIG)});
+}
+
+void deny_new_processes(Filter &filter, bool may_fork) {
+    // clone3 has its flags in memory, where a filter can't see them; without it libraries take clone.
+    filter.deny("clone3", {}, ENOSYS);
+    for (const std::uint64_t space :
+         {CLONE_NEWNS, CLONE_NEWCGROUP, CLONE_NEWUTS, CLONE_NEWIPC, CLONE_NEWUSER, CLONE_NEWPID, CLONE_NEWNET})
+        filter.deny("clone", {has_bits(0, space, space)});
+    if (may_fork)
+        return;
+    filter.deny("clone", {has_bits(0, CLONE_THREAD, 0)});
+    for (const char *call : {"fork", "vfork", "execve", "execveat"})
+        filter.deny(call);
+}
+
+void deny_sockets(Filter &filter, const Policy &policy) {
+    std::set<unsigned> families;
+    if (policy.allows("display") || policy.allows("network"))
+        families.insert(AF_UNIX);
+    if (policy.allows("network"))
+        families.insert({AF_INET, AF_INET6, AF_NETLINK}); // getaddrinfo asks netlink for addresses
+    if (policy.allows("usb"))
+        families.insert(AF_NETLINK); // what is plugged in
+    constexpr unsigned end = 64;     // beyond all families
+    for (unsigned family = 0; family < end; ++family)
+        if (!families.contains(family))
+            filter.deny("socket", {equals(0, family)});
+    filter.deny("socket", {from(0, end)});
+    if (!families.contains(AF_UNIX))
+        for (const int type : {SOCK_DGRAM, SOCK_RAW}) // with these, a pair reaches any other socket
+            filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
+}
+
+// What the limit of memory does not count.
+void deny_uncounted_memory(Filter &filter) {
+    for (const char *call : {"memfd_create", "memfd_secret", "shmget"})
+        filter.deny(call);
+    filter.deny("mmap", {has_bits(3, MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED | MAP_ANONYMOUS)});
+}
+
+} // namespace
+
+Layer filter_system_calls(const Policy &policy) {
+    Layer layer{"seccomp", "", ""};
+    Filter filter;
+    for (const char *call : never)
+        if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
+            filter.deny(call);
+    filter.deny("utimensat", {differs(1, 0)}); // futimens passes no name
+    if (policy.writable.empty())
+        filter.deny("truncate"); // which Landlock knows since its third version
+    deny_reaching_others(filter, may_start_processes(policy));
+    deny_new_processes(filter, may_start_processes(policy));
+    deny_sockets(filter, policy);
+    if (has_memory_limit(policy) && !may_share_memory(policy))
+        deny_uncounted_memory(filter);
+    if (!filter.made() || !filter.load())
+        layer.lacks = error_text("the filter can't be loaded");
+    else
+        layer.reached = "yes";
+    return layer;
+}
+
+} // namespace arhost::sandbox

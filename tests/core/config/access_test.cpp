@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/access.hpp"
+#include "plugin_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+using namespace arhost::config;
+using namespace arhost::yaml;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Access : testing::Test {
+    arhost::sandbox::Policy of(const std::string &component, bool is_output) {
+        std::ofstream(folder / "run.yaml") << component;
+        return access_of(Node::load(folder / "run.yaml"), is_output);
+    }
+    void file(const std::string &name) {
+        fs::create_directories((folder / name).parent_path());
+        std::ofstream(folder / name) << "x";
+    }
+    arhost::test::ScratchFolder scratch;
+    const fs::path folder = fs::canonical(scratch.path());
+};
+
+} // namespace
+
+TEST_F(Access, IsNothingByItself) {
+    const auto policy = of("{plugin: tracker_aruco, options: {dictionary: DICT_6X6_250, threads: 4}}", false);
+    EXPECT_THAT(policy.readable, IsEmpty());
+    EXPECT_THAT(policy.writable, IsEmpty());
+    EXPECT_THAT(policy.allow, IsEmpty());
+}
+
+TEST_F(Access, OfASourceIsItsFile) {
+    file("film.mp4");
+    file("film.mp4.key");
+    EXPECT_THAT(of("{plugin: source_file, path: film.mp4}", false).readable, ElementsAre(folder / "film.mp4"));
+    EXPECT_THAT(of("{plugin: source_file, options: {path: film.mp4}}", false).readable,
+                ElementsAre(folder / "film.mp4"));
+}
+
+TEST_F(Access, OfAPatternIsItsFolder) {
+    file("frames/0001.png");
+    EXPECT_THAT(of("{plugin: source_file, path: frames/%04d.png}", false).readable, ElementsAre(folder / "frames"));
+}
+
+TEST_F(Access, OfAnOutputIsItsFolder) {
+    const std::string path = (folder / "out/film.mp4").string();
+    EXPECT_THAT(of("{plugin: sink_video, path: " + path + "}", true).writable, ElementsAre(folder / "out"));
+    EXPECT_THAT(of("{plugin: sink_video, options: {path: " + path + "}}", true).writable,
+                ElementsAre(folder / "out"));
+}
+
+TEST_F(Access, OfALinkedOutputIsTheTargetsFolderToo) {
+    file("there/film.mp4");
+    fs::create_symlink(folder / "there/film.mp4", folder / "link.mp4");
+    EXPECT_THAT(of("{plugin: sink_video, path: " + (folder / "link.mp4").string() + "}", true).writable,
+                ElementsAre(folder, folder / "there"));
+}
+
+TEST_F(Access, OfOptionsIsTheFilesThatTheyName) {
+    file("tags.txt");
+    const auto policy = of("{plugin: p, options: {file: tags.txt, device: /dev/null, other: none.txt}}", false);
+    EXPECT_THAT(policy.readable, ElementsAre(folder / "tags.txt"));
+}
+
+TEST_F(Access, IsWidenedByKeys) {
+    const auto policy = of("{plugin: p, allow: [gpu, video], reads: [data], writes: [/var/x]}", false);
+    EXPECT_THAT(policy.allow, ElementsAre("gpu", "video"));
+    EXPECT_THAT(policy.readable, ElementsAre(folder / "data"));
+    EXPECT_THAT(policy.writable, ElementsAre("/var/x"));
+}
+
+TEST_F(Access, ToUnknownThingsIsAnError) {
+    try {
+        of("{plugin: p, allow: [everything]}", false);
+        FAIL();
+    } catch (const Error &error) {
+        EXPECT_THAT(error.what(), HasSubstr("allow[0]"));
+        EXPECT_THAT(error.what(), HasSubstr("network"));
+    }
+}

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Each layer alone, and all together, in a child process each: what is shut, and what must stay open.
+#include "plugin_under_test.hpp"
+#include "sandbox/layers.hpp"
+
+#include <csignal>
+#include <fcntl.h>
+#include <fstream>
+#include <functional>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <thread>
+
+using namespace arhost::sandbox;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int layer_is_missing = 77;
+
+// Runs it in a child of its own, and returns the number of the first check that failed there; 0: none.
+int in_child(const std::function<int()> &checks) {
+    const pid_t child = ::fork();
+    if (child == 0)
+        ::_exit(checks());
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+// Tells by number, since a child can't use the test's expectations.
+class Checks {
+public:
+    void that(bool holds) {
+        ++count_;
+        if (!holds && first_failed_ == 0)
+            first_failed_ = count_;
+    }
+    int result() const { return first_failed_; }
+
+private:
+    int count_ = 0, first_failed_ = 0;
+};
+
+bool opens(const fs::path &file, int flags) {
+    const int fd = ::open(file.c_str(), flags | O_CLOEXEC, 0600);
+    if (fd >= 0)
+        ::close(fd);
+    return fd >= 0;
+}
+bool opens_socket(int family, int type = SOCK_STREAM) {
+    const int fd = ::socket(family, type | SOCK_CLOEXEC, 0);
+    if (fd >= 0)
+        ::close(fd);
+    return fd >= 0;
+}
+bool forks() {
+    const pid_t child = ::fork();
+    if (child == 0)
+        ::_exit(0);
+    return child > 0 && ::waitpid(child, nullptr, 0) == child;
+}
+
+struct Sandbox : testing::Test {
+    void SetUp() override {
+        for (const char *folder : {"inside", "outside"})
+            fs::create_directories(scratch.path() / folder);
+        std::ofstream(inside / "old") << "old";
+        std::ofstream(outside / "old") << "old";
+        policy.writable = {inside};
+    }
+    arhost::test::ScratchFolder scratch;
+    const fs::path inside = scratch.path() / "inside", outside = scratch.path() / "outside";
+    Policy policy;
+};
+
+#define EXPECT_CHECKS(result)                                                                                        \
+    if (const int failed = (result); failed == layer_is_missing)                                                     \
+        GTEST_SKIP() << "this machine lacks the layer";                                                              \
+    else                                                                                                             \
+        EXPECT_EQ(failed, 0) << "the number of the check that failed"
+
+} // namespace
+
+TEST_F(Sandbox, NamespacesLeaveNothingWritableButTheFolders) {
+    EXPECT_CHECKS(in_child([&] {
+        if (enter_namespaces(policy).reached.find("mount") == std::string::npos)
+            return layer_is_missing;
+        Checks check;
+        check.that(opens(inside / "new", O_WRONLY | O_CREAT));
+        check.that(opens(inside / "old", O_RDWR));
+        check.that(!opens(outside / "new", O_WRONLY | O_CREAT));
+        check.that(!opens(outside / "old", O_WRONLY));
+        check.that(::chmod((outside / "old").c_str(), 0700) != 0);
+        check.that(opens(outside / "old", O_RDONLY));
+        check.that(opens("/dev/null", O_WRONLY));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, NamespacesKeepTheWorkingDirectoryWritableWhereItIsOne) {
+    EXPECT_CHECKS(in_child([&] {
+        fs::current_path(inside);
+        if (enter_namespaces(policy).reached.find("mount") == std::string::npos)
+            return layer_is_missing;
+        return opens("new", O_WRONLY | O_CREAT) ? 0 : 1;
+    }));
+}
+
+TEST_F(Sandbox, NamespacesHaveNoNetworkUnlessAllowed) {
+    EXPECT_CHECKS(in_child([&] {
+        if (enter_namespaces(policy).reached.find("net") == std::string::npos)
+            return layer_is_missing;
+        std::ifstream devices("/proc/self/net/dev");
+        int lines = 0;
+        for (std::string line; std::getline(devices, line);)
+            ++lines;
+        return lines <= 3 ? 0 : 1; // two of heading, and lo
+    }));
+}
+
+TEST_F(Sandbox, LandlockLetsThroughWhatIsListed) {
+    policy.readable = {outside / "old"};
+    EXPECT_CHECKS(in_child([&] {
+        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+        if (enter_landlock(policy).reached.empty())
+            return layer_is_missing;
+        Checks check;
+        check.that(opens(outside / "old", O_RDONLY));
+        check.that(!opens(outside / "old", O_WRONLY));
+        check.that(!opens(outside / "new", O_WRONLY | O_CREAT));
+        check.that(opens(inside / "new", O_RDWR | O_CREAT));
+        check.that(::rename((inside / "new").c_str(), (inside / "old").c_str()) == 0);
+        check.that(::unlink((inside / "old").c_str()) == 0);
+        check.that(::mkdir((inside / "folder").c_str(), 0700) == 0);
+        check.that(!opens("/etc/passwd", O_RDONLY));
+        check.that(!opens("/proc/1/status", O_RDONLY));
+        check.that(opens("/proc/self/status", O_RDONLY));
+        check.that(opens("/usr/bin/env", O_RDONLY));
+        check.that(opens("/dev/null", O_RDWR));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, LandlockMakesNothingThatLiesInWaitForOthers) {
+    EXPECT_CHECKS(in_child([&] {
+        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+        if (enter_landlock(policy).reached.empty())
+            return layer_is_missing;
+        Checks check;
+        check.that(::symlink("/etc/passwd", (inside / "link").c_str()) != 0);
+        check.that(::mkfifo((inside / "pipe").c_str(), 0600) != 0);
+        check.that(::link((outside / "old").c_str(), (inside / "link").c_str()) != 0);
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, SystemCallsDoNotReachOthers) {
+    EXPECT_CHECKS(in_child([&] {
+        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+        if (filter_system_calls(policy).reached.empty())
+            return layer_is_missing;
+        Checks check;
+        const rlimit limit{1000, 1000};
+        check.that(::kill(::getpid(), 0) == 0);
+        check.that(::getrlimit(RLIMIT_CPU, const_cast<rlimit *>(&limit)) == 0);
+        check.that(::fcntl(0, F_GETFD) >= 0);
+        check.that(::fcntl(0, F_SETOWN, ::getpid()) != 0);
+        check.that(::syscall(SYS_fcntl, 0, 0x100000000ul | F_SETOWN, ::getpid()) != 0);
+        check.that(::prlimit(::getppid(), RLIMIT_CPU, &limit, nullptr) != 0);
+        check.that(::prctl(PR_SET_PDEATHSIG, 0) != 0);
+        check.that(::chmod((inside / "old").c_str(), 0777) != 0);
+        if (!under_sanitizer) {
+            check.that(::kill(::getppid(), 0) != 0);
+            check.that(::kill(0, 0) != 0);
+            check.that(::kill(-1, 0) != 0);
+        }
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, SystemCallsMakeThreadsButNoProcesses) {
+    EXPECT_CHECKS(in_child([&] {
+        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+        if (filter_system_calls(policy).reached.empty())
+            return layer_is_missing;
+        Checks check;
+        bool ran = false;
+        std::thread([&] { ran = true; }).join();
+        check.that(ran);
+        check.that(under_sanitizer || !forks());
+        check.that(::unshare(CLONE_NEWNS) != 0);
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, SystemCallsOpenNoSocketThatLeadsOut) {
+    EXPECT_CHECKS(in_child([&] {
+        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+        if (filter_system_calls(policy).reached.empty())
+            return layer_is_missing;
+        Checks check;
+        int ends[2];
+        for (const int family : {AF_UNIX, AF_INET, AF_INET6, AF_NETLINK, AF_PACKET, AF_VSOCK, 63, 64, 1000})
+            check.that(!opens_socket(family));
+        check.that(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
+        check.that(::socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, ends) != 0);
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, AllowancesOpenWhatTheyName) {
+    struct Case {
+        const char *allow;
+        bool forks, unix, internet;
+    };
+    for (const Case &c : {Case{"processes", true, false, false}, Case{"display", false, true, false},
+                          Case{"network", false, true, true}, Case{"gpu", false, false, false},
+                          Case{"video", false, false, false}, Case{"usb", false, false, false}}) {
+        policy.allow = {c.allow};
+        EXPECT_EQ(in_child([&] {
+                      enter(policy);
+                      Checks check;
+                      check.that((forks() == c.forks) || under_sanitizer);
+                      check.that(opens_socket(AF_UNIX) == c.unix);
+                      check.that(opens_socket(AF_INET) == c.internet);
+                      return check.result();
+                  }),
+                  0)
+            << c.allow;
+    }
+}
+
+TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
+    policy.writable.clear();
+    policy.memory_bytes = 256u << 20;
+    EXPECT_EQ(in_child([&] {
+                  enter(policy);
+                  Checks check;
+                  const auto map = [](std::size_t size, int flags) {
+                      return ::mmap(nullptr, size, PROT_READ | PROT_WRITE, flags | MAP_ANONYMOUS, -1, 0) !=
+                             MAP_FAILED;
+                  };
+                  check.that(map(64u << 20, MAP_PRIVATE));
+                  check.that(!map(512u << 20, MAP_PRIVATE) || under_sanitizer);
+                  check.that(!map(64u << 20, MAP_SHARED) || under_sanitizer);
+                  check.that(::memfd_create("mine", 0) < 0 || under_sanitizer);
+                  int held = 0;
+                  while (held < 2000 && ::open("/dev/null", O_RDONLY) >= 0)
+                      ++held;
+                  check.that(held < 512);
+                  return check.result();
+              }),
+              0);
+}
+
+TEST_F(Sandbox, WhatAGpuNeedsIsNotLimited) {
+    policy.allow = {"gpu"};
+    policy.memory_bytes = 256u << 20;
+    EXPECT_EQ(in_child([&] {
+                  enter(policy);
+                  Checks check;
+                  check.that(::mmap(nullptr, 512u << 20, PROT_READ | PROT_WRITE,
+                                    MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0) != MAP_FAILED);
+                  check.that(::memfd_create("mine", 0) >= 0);
+                  check.that(::mmap(nullptr, 4096, PROT_READ | PROT_WRITE | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS,
+                                    -1, 0) != MAP_FAILED); // a shader compiler
+                  return check.result();
+              }),
+              0);
+}
+
+TEST_F(Sandbox, MakesTheFoldersThatMayBeWritten) {
+    policy.writable = {outside / "a/b"};
+    EXPECT_EQ(in_child([&] {
+                  enter(policy);
+                  return opens(outside / "a/b/new", O_WRONLY | O_CREAT) ? 0 : 1;
+              }),
+              0);
+}
+
+TEST_F(Sandbox, DiesWithItsParentAsBefore) {
+    EXPECT_EQ(in_child([&] {
+                  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+                  enter(policy);
+                  int signal = 0;
+                  ::prctl(PR_GET_PDEATHSIG, &signal);
+                  return signal == SIGKILL ? 0 : 1;
+              }),
+              0);
+}
+
+TEST_F(Sandbox, TellsEachLayer) {
+    EXPECT_EQ(in_child([&] {
+                  const Level level = enter(policy);
+                  Checks check;
+                  check.that(level.size() == 6);
+                  for (const Layer &layer : level)
+                      check.that(!layer.reached.empty() || !layer.lacks.empty());
+                  return check.result();
+              }),
+              0);
+    const Level level = {{"a", "x, y", ""}, {"b", "z", "no w"}, {"c", "", "no v"}};
+    EXPECT_EQ(to_text(level), "a: x, y; b: z; LACKING b: no w; c: no v");
+    EXPECT_FALSE(whole(level));
+    EXPECT_TRUE(whole({level.front()}));
+}
+
+TEST_F(Sandbox, ModeNoneTakesNothing) {
+    policy.mode = Mode::none;
+    EXPECT_EQ(in_child([&] {
+                  Checks check;
+                  check.that(enter(policy).empty());
+                  check.that(forks());
+                  check.that(opens(outside / "old", O_RDWR));
+                  return check.result();
+              }),
+              0);
+}
+
+TEST_F(Sandbox, PoliciesTravelAsJson) {
+    policy.mode = Mode::strict;
+    policy.allow = {"gpu", "video"};
+    policy.readable = {"/a", "/b"};
+    policy.memory_bytes = 1ull << 40;
+    policy.makes_shared_memory = true;
+    const Policy read = policy_from_json(to_json(policy));
+    EXPECT_EQ(to_json(read), to_json(policy));
+    EXPECT_EQ(read.writable, policy.writable);
+    EXPECT_TRUE(read.allows("gpu"));
+    EXPECT_FALSE(read.allows("network"));
+    EXPECT_THROW(policy_from_json({{"mode", 1}}), nlohmann::json::exception);
+}

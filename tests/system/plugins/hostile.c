@@ -1,0 +1,429 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A tracker that does its work, and at one frame tries something that a plugin must not be able to do. Each
+ * try is logged, "NAME: what: stopped" or "NAME: what: SUCCEEDED"; each is bounded, should it succeed.
+ */
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE
+#endif
+#include <arhost/arhost.h>
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/ptrace.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { control = 3, doorbell = 4 };
+
+struct arhost_instance {
+    const arhost_host *host;
+    char attack[64], target[1024];
+    int64_t at;
+    int32_t marker_id;
+};
+typedef struct arhost_instance tracker;
+
+static void tell(const tracker *self, const char *what, int succeeded) {
+    char text[256];
+    const char *why = succeeded ? "" : strerror(errno);
+    snprintf(text, sizeof text, "%s: %s: %s%s%s", self->attack, what, succeeded ? "SUCCEEDED" : "stopped",
+             succeeded ? "" : ", ", why);
+    self->host->log(self->host, ARHOST_SEVERITY_INFO, text);
+}
+
+/* The host's process; the test gives it, the worker's own parent is the launcher. */
+static pid_t host_pid(void) {
+    const char *text = getenv("HOSTILE_HOST");
+    return text ? (pid_t)atoi(text) : getppid();
+}
+
+static int opens(const char *file, int flags) {
+    const int fd = open(file, flags | O_CLOEXEC, 0600);
+    if (fd >= 0)
+        close(fd);
+    return fd >= 0;
+}
+
+static void read_files(const tracker *self) {
+    char file[64];
+    tell(self, "a file outside its list", opens(self->target, O_RDONLY));
+    tell(self, "the passwords", opens("/etc/shadow", O_RDONLY));
+    snprintf(file, sizeof file, "/proc/%d/environ", (int)host_pid());
+    tell(self, "the host's environment", opens(file, O_RDONLY));
+    snprintf(file, sizeof file, "/proc/%d/maps", (int)host_pid());
+    tell(self, "the host's addresses", opens(file, O_RDONLY));
+}
+
+static void write_files(const tracker *self) {
+    char other[1100];
+    snprintf(other, sizeof other, "%s.new", self->target);
+    tell(self, "a new file", opens(other, O_WRONLY | O_CREAT));
+    tell(self, "an old file", opens(self->target, O_WRONLY));
+    tell(self, "truncate", truncate(self->target, 0) == 0);
+    tell(self, "chmod", chmod(self->target, 0777) == 0);
+    tell(self, "chown", chown(self->target, getuid(), getgid()) == 0);
+    tell(self, "rename", rename(self->target, other) == 0);
+    tell(self, "link", link(self->target, other) == 0);
+    tell(self, "symlink", symlink(self->target, other) == 0);
+    tell(self, "mkdir", mkdir(other, 0700) == 0);
+    tell(self, "mkfifo", mkfifo(other, 0600) == 0);
+    tell(self, "unlink", unlink(self->target) == 0);
+}
+
+static int connects(const char *path, size_t length) {
+    struct sockaddr_un address = {AF_UNIX, {0}};
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    int result;
+    if (fd < 0)
+        return 0;
+    memcpy(address.sun_path, path, length);
+    result = connect(fd, (struct sockaddr *)&address, (socklen_t)(sizeof(sa_family_t) + length));
+    close(fd);
+    return result == 0;
+}
+
+static void open_sockets(const tracker *self) {
+    int ends[2];
+    tell(self, "internet", socket(AF_INET, SOCK_STREAM, 0) >= 0);
+    tell(self, "datagrams", socket(AF_INET6, SOCK_DGRAM, 0) >= 0);
+    tell(self, "netlink", socket(AF_NETLINK, SOCK_RAW, 0) >= 0);
+    tell(self, "packets", socket(AF_PACKET, SOCK_RAW, 0) >= 0);
+    tell(self, "virtual machines", socket(AF_VSOCK, SOCK_STREAM, 0) >= 0);
+    tell(self, "a family with upper bits", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
+    tell(self, "a path", connects(self->target, strlen(self->target) + 1));
+    tell(self, "an abstract name", connects("\0hostile", 8));
+    tell(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
+}
+
+static void make_processes(const tracker *self) {
+    char *arguments[] = {(char *)"true", NULL};
+    int i, made = 0;
+    for (i = 0; i < 100; ++i) {
+        const pid_t child = fork();
+        if (child == 0)
+            _exit(0);
+        if (child > 0) {
+            ++made;
+            waitpid(child, NULL, 0);
+        }
+    }
+    tell(self, "fork", made > 0);
+    tell(self, "a namespace", unshare(CLONE_NEWUSER) == 0);
+    execv("/bin/true", arguments); /* succeeds without a word: the worker ends */
+    tell(self, "exec", 0);
+}
+
+static void trace_host(const tracker *self) {
+    static char byte;
+    struct iovec mine = {&byte, 1}, theirs = {&byte, 1};
+    char file[64];
+    tell(self, "attach", ptrace(PTRACE_SEIZE, host_pid(), NULL, NULL) == 0);
+    tell(self, "attach to the launcher", ptrace(PTRACE_SEIZE, getppid(), NULL, NULL) == 0);
+    tell(self, "read memory", process_vm_readv(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
+    tell(self, "write memory", process_vm_writev(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
+    snprintf(file, sizeof file, "/proc/%d/mem", (int)host_pid());
+    tell(self, "open memory", opens(file, O_RDWR));
+    tell(self, "take a descriptor", syscall(SYS_pidfd_getfd, syscall(SYS_pidfd_open, host_pid(), 0), 1, 0) >= 0);
+}
+
+static void signal_host(const tracker *self) {
+    const struct rlimit second = {1, 1};
+    const struct f_owner_ex owner = {F_OWNER_PID, host_pid()};
+    cpu_set_t processor;
+    siginfo_t info;
+    memset(&info, 0, sizeof info);
+    info.si_code = SI_QUEUE;
+    CPU_ZERO(&processor);
+    CPU_SET(0, &processor);
+    tell(self, "kill", kill(host_pid(), SIGKILL) == 0);
+    tell(self, "kill the launcher", kill(getppid(), SIGKILL) == 0);
+    tell(self, "reach all", kill(-1, 0) == 0);
+    tell(self, "join the host's group", setpgid(0, getpgid(host_pid())) == 0);
+    tell(self, "tkill", syscall(SYS_tkill, host_pid(), SIGKILL) == 0);
+    tell(self, "tgkill", syscall(SYS_tgkill, host_pid(), host_pid(), SIGKILL) == 0);
+    tell(self, "queue", syscall(SYS_rt_sigqueueinfo, host_pid(), SIGKILL, &info) == 0);
+    tell(self, "pidfd",
+         syscall(SYS_pidfd_send_signal, syscall(SYS_pidfd_open, host_pid(), 0), SIGKILL, NULL, 0) == 0);
+    tell(self, "a descriptor's owner", fcntl(control, F_SETOWN_EX, &owner) == 0);
+    tell(self, "a descriptor's signal", fcntl(control, F_SETSIG, SIGKILL) == 0);
+    tell(self, "a limit", prlimit(host_pid(), RLIMIT_CPU, &second, NULL) == 0);
+    tell(self, "a priority", setpriority(PRIO_PROCESS, (id_t)host_pid(), 19) == 0);
+    tell(self, "a processor", sched_setaffinity(host_pid(), sizeof processor, &processor) == 0);
+}
+
+static void *wait_for_ever(void *nothing) {
+    for (;;)
+        pause();
+    return nothing;
+}
+
+static void fill_memory(const tracker *self) {
+    enum { step = 16 << 20, most = 1024 };
+    size_t taken = 0;
+    pthread_t thread;
+    int fd, threads = 0;
+    while (taken < most) {
+        char *bytes = malloc(step);
+        if (!bytes)
+            break;
+        memset(bytes, 1, step);
+        taken += step >> 20;
+    }
+    tell(self, "a GiB", taken >= most);
+    tell(self, "shared", mmap(NULL, step, PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
+    fd = memfd_create("hostile", 0);
+    tell(self, "a memfd", fd >= 0);
+    while (threads < 1000 && pthread_create(&thread, NULL, wait_for_ever, NULL) == 0)
+        ++threads;
+    tell(self, "a thousand threads", threads == 1000);
+}
+
+static void fill_disk(const tracker *self) {
+    const char *const folders[] = {".", "/tmp", "/var/tmp", "/dev/shm", "/run", "/", getenv("HOME")};
+    size_t i;
+    for (i = 0; i < sizeof folders / sizeof *folders; ++i) {
+        char file[1100];
+        snprintf(file, sizeof file, "%s/hostile-%d", folders[i] ? folders[i] : ".", (int)getpid());
+        const int fd = open(file, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+        tell(self, folders[i] ? folders[i] : "no home", fd >= 0 && write(fd, file, sizeof file) > 0);
+        if (fd >= 0) {
+            close(fd);
+            unlink(file);
+        }
+    }
+}
+
+/* As many as there are, and as many again in messages that nobody takes. */
+static void hold_descriptors(const tracker *self) {
+    enum { pairs = 20 };
+    int held = 0, under_way = 0, pair[pairs][2], i, fd;
+    for (i = 0; i < pairs; ++i)
+        (void)!socketpair(AF_UNIX, SOCK_STREAM, 0, pair[i]);
+    while (held < 100000 && (fd = open("/dev/null", O_RDONLY)) >= 0)
+        ++held;
+    tell(self, "more than 1024", held > 1024);
+    for (i = 0; i < pairs;) {
+        char byte = 0;
+        _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
+        struct iovec part = {&byte, 1};
+        struct msghdr message = {0};
+        message.msg_iov = &part;
+        message.msg_iovlen = 1;
+        message.msg_control = ancillary;
+        message.msg_controllen = sizeof ancillary;
+        CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
+        CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
+        CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof(int));
+        memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), &pair[i][0], sizeof(int));
+        if (sendmsg(pair[i][1], &message, MSG_DONTWAIT) < 0)
+            ++i;
+        else
+            ++under_way;
+    }
+    tell(self, "a thousand under way", under_way > 1000);
+}
+
+/* Calls back for each mapping of memory that is shared with the host. */
+static void each_shared(const tracker *self, void (*visit)(const tracker *, void *, size_t, int writable)) {
+    FILE *maps = fopen("/proc/self/maps", "r");
+    char line[512], mode[8];
+    unsigned long begin, end;
+    while (maps && fgets(line, sizeof line, maps))
+        if (strstr(line, "memfd:arhost") && sscanf(line, "%lx-%lx %7s", &begin, &end, mode) == 3)
+            visit(self, (void *)begin, end - begin, mode[1] == 'w');
+    if (maps)
+        fclose(maps);
+}
+
+static void scribble_on(const tracker *self, void *bytes, size_t size, int writable) {
+    if (writable)
+        memset(bytes, 0xa5, size);
+    else
+        tell(self, "make input writable", mprotect(bytes, size, PROT_READ | PROT_WRITE) == 0);
+}
+
+static void truncate_one(const tracker *self, void *bytes, size_t size, int writable) {
+    char file[128];
+    int fd;
+    snprintf(file, sizeof file, "/proc/self/map_files/%lx-%lx", (unsigned long)bytes, (unsigned long)bytes + size);
+    fd = open(file, O_RDWR | O_CLOEXEC);
+    tell(self, "open and truncate", fd >= 0 && ftruncate(fd, 0) == 0);
+    if (writable)
+        madvise(bytes, size, MADV_REMOVE); /* a hole reads as zeros: no harm, but a broken contract */
+}
+
+/* Clears and sets what flags there are on all that came from the host, and fills what can be filled. */
+static void change_flags(const tracker *self) {
+    const int small = 1;
+    int fd, i;
+    (void)self;
+    for (fd = 0; fd <= doorbell; ++fd) {
+        fcntl(fd, F_SETFL, 0);
+        fcntl(fd, F_SETFL, O_NONBLOCK | O_ASYNC | O_DIRECT);
+        setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
+        setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &small, sizeof small);
+    }
+    for (i = 0; i < 100000; ++i)
+        if (write(STDOUT_FILENO, "\n", 1) < 0)
+            break;
+    for (fd = 0; fd <= doorbell; ++fd)
+        fcntl(fd, F_SETFL, 0);
+    tell(self, "stand still", 0);
+}
+
+static void say(const char *text, size_t size) {
+    (void)!send(control, text, size, MSG_NOSIGNAL);
+}
+static void say_text(const char *text) {
+    say(text, strlen(text));
+}
+
+static void attack(const tracker *self) {
+    const char *name = self->attack;
+    size_t i;
+    if (!strcmp(name, "read"))
+        read_files(self);
+    else if (!strcmp(name, "write"))
+        write_files(self);
+    else if (!strcmp(name, "sockets"))
+        open_sockets(self);
+    else if (!strcmp(name, "processes"))
+        make_processes(self);
+    else if (!strcmp(name, "trace"))
+        trace_host(self);
+    else if (!strcmp(name, "signal"))
+        signal_host(self);
+    else if (!strcmp(name, "memory"))
+        fill_memory(self);
+    else if (!strcmp(name, "disk"))
+        fill_disk(self);
+    else if (!strcmp(name, "descriptors"))
+        hold_descriptors(self);
+    else if (!strcmp(name, "scribble"))
+        each_shared(self, scribble_on);
+    else if (!strcmp(name, "truncate"))
+        each_shared(self, truncate_one);
+    else if (!strcmp(name, "flags"))
+        change_flags(self);
+    else if (!strcmp(name, "doorbell"))
+        for (i = 0; i < 4000000; ++i)
+            (void)!send(doorbell, name, 1, MSG_NOSIGNAL);
+    else if (!strcmp(name, "deaf")) {
+        for (i = 1; i < 32; ++i)
+            signal((int)i, SIG_IGN);
+        for (;;)
+            pause();
+    } else if (!strcmp(name, "no_json"))
+        say_text("{\"type\": ");
+    else if (!strcmp(name, "wrong_types"))
+        say_text("{\"type\": \"log\", \"severity\": [], \"text\": {}}");
+    else if (!strcmp(name, "out_of_turn"))
+        say_text("{\"type\": \"hello\", \"descriptor\": {}}");
+    else if (!strcmp(name, "nested") || !strcmp(name, "oversized")) {
+        const size_t size = !strcmp(name, "nested") ? 120 << 10 : 200 << 10;
+        char *text = malloc(size);
+        memset(text, '[', size);
+        say(text, size);
+        free(text);
+    } else if (!strcmp(name, "empty"))
+        say_text("");
+    else if (!strcmp(name, "link")) {
+        tell(self, "a link", symlink(self->target, "stats.json.tmp") == 0);
+    } else if (!strcmp(name, "pipe")) {
+        tell(self, "a pipe", mkfifo("stats.json.tmp", 0600) == 0);
+    }
+}
+
+static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
+                            arhost_instance **instance) {
+    tracker *self = calloc(1, sizeof *self);
+    uint32_t i;
+    if (!self)
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    self->host = host;
+    for (i = 0; i < option_count; ++i) {
+        if (!strcmp(options[i].key, "attack"))
+            snprintf(self->attack, sizeof self->attack, "%s", options[i].text);
+        else if (!strcmp(options[i].key, "target_file")) /* the base name: a whole path would be let through */
+            snprintf(self->target, sizeof self->target, "%s/%s", getenv("HOSTILE_FOLDER"), options[i].text);
+        else if (!strcmp(options[i].key, "at"))
+            self->at = options[i].integer;
+    }
+    *instance = self;
+    return ARHOST_OK;
+}
+static void destroy(arhost_instance *self) {
+    free(self);
+}
+static const void *get_extension(const char *id) {
+    return (void)id, (const void *)0;
+}
+
+static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
+    self->marker_id = setup->markers[0].id;
+    return ARHOST_OK;
+}
+
+/* As tracker_counter: a marker so many mm away as the frame's number says. */
+static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
+    const int number = frame->plane[0][0] + 256 * frame->plane[0][1];
+    arhost_marker *marker = &result->markers[0];
+    int i;
+    result->marker_count = 1;
+    marker->struct_size = sizeof *marker;
+    marker->id = self->marker_id;
+    strcpy(marker->family, "counter");
+    marker->state = ARHOST_MARKER_DETECTED;
+    for (i = 0; i < 16; i += 5)
+        marker->mt[i] = 1;
+    marker->mt[14] = -500.0 - number;
+    if (number == self->at)
+        attack(self);
+    return ARHOST_OK;
+}
+static void stop(arhost_instance *self) {
+    (void)self;
+}
+
+static const arhost_option_descriptor options[] = {
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "What it tries"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "target_file", "target", 0, 0, NULL, "On what"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "at", "20", 0, 0, NULL, "At this frame"},
+};
+static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                             ARHOST_KIND_TRACKER,
+                                             "hostile",
+                                             "Hostile",
+                                             "0.1.0",
+                                             "arhost",
+                                             "Apache-2.0",
+                                             "Tries what it must not be able to do, for tests.",
+                                             0,
+                                             sizeof options / sizeof *options,
+                                             options,
+                                             NULL};
+static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+
+static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    (void)offer;
+    answer->abi_version = ARHOST_ABI_VERSION;
+    answer->plugin = &plugin;
+    return ARHOST_OK;
+}
+
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
