@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/access.hpp"
 
+#include <cstdlib>
+
 namespace arhost::config {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool is_file_or_folder(const fs::path &path) { // and no device
+// Devices are for `allow` to give, everything or a whole home for `reads`.
+bool may_be_given(const fs::path &path) {
     std::error_code ignored;
     const auto type = fs::status(path, ignored).type();
-    return type == fs::file_type::regular || type == fs::file_type::directory;
+    const char *home = std::getenv("HOME");
+    const fs::path real = real_path(path);
+    return (type == fs::file_type::regular || type == fs::file_type::directory || type == fs::file_type::fifo) &&
+           real != "/" && !(home && real == real_path(home));
 }
 
 // Outputs are written beside their place and then renamed, so their folder it is; a link's target's too.
@@ -44,13 +50,16 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
         path = options->find("path");
     if (path && is_output)
         let_write(policy, path->text());
-    else if (path) { // a pattern names files of a folder
-        const fs::path file = fs::absolute(path->input_path());
-        policy.readable.push_back(is_file_or_folder(file) ? file : file.parent_path());
+    else if (path) {
+        const fs::path file = fs::absolute(path->input_path()), folder = file.parent_path();
+        if (may_be_given(file))
+            policy.readable.push_back(file);
+        else if (file.filename().string().find('%') != std::string::npos && may_be_given(folder)) // frame-%04d.png
+            policy.readable.push_back(folder);
     }
     if (options && options->is_map())
         for (const auto &[key, value] : options->entries())
-            if (value.is_scalar() && key != "path" && is_file_or_folder(value.input_path()))
+            if (value.is_scalar() && key != "path" && may_be_given(value.input_path()))
                 policy.readable.push_back(fs::absolute(value.input_path()));
     return policy;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-inprocess: `arhost --config FILE` in one process and without deadlines, so that a debugger, valgrind or a
-// sanitizer sees a plugin at work. A plugin that dies takes all along.
+// arhost-inprocess: `arhost --config FILE` in one process, without deadlines and sandbox, so that a debugger,
+// valgrind or a sanitizer sees a plugin at work. A plugin that dies takes all along.
 #include "host/commands.hpp"
 #include "inprocess/thread_starter.hpp"
 
@@ -14,7 +14,7 @@ int main(int argc, char **argv) {
     using namespace arhost;
     std::signal(SIGPIPE, SIG_IGN);
     CLI::App app("arhost-inprocess runs a configuration as arhost does, but with every plugin in this one process\n"
-                 "and without deadlines: for debuggers.");
+                 "and without deadlines and sandbox: for debuggers.");
     app.set_version_flag("--version", "arhost-inprocess " ARHOST_VERSION);
     host::Arguments arguments;
     arguments.in_process = true;

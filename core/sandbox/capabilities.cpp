@@ -9,18 +9,18 @@
 namespace arhost::sandbox {
 
 // All but the one that lets root write files of others, as in a container whose volumes belong to its user's
-// account: which files those are is for Landlock and the mounts to say.
+// account: which files those are is for Landlock and the mounts to say. Others than root keep none.
 Layer drop_capabilities() {
-    constexpr unsigned kept = CAP_DAC_OVERRIDE;
+    const unsigned kept = CAP_DAC_OVERRIDE, mask = ::geteuid() == 0 ? 1u << kept : 0;
     for (unsigned capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability)
-        if (capability != kept)
+        if (capability != kept || !mask)
             ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail without rights; those are lost below
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     __user_cap_data_struct data[2] = {};
     if (::syscall(SYS_capget, &header, data) != 0)
         return {"capabilities", "", error_text("capget")};
-    data[0].effective &= 1u << kept;
-    data[0].permitted &= 1u << kept;
+    data[0].effective &= mask;
+    data[0].permitted &= mask;
     data[0].inheritable = 0;
     data[1] = {};
     ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);

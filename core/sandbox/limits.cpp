@@ -29,10 +29,16 @@ std::uint64_t three_quarters_of_memory() {
 
 } // namespace
 
+Layer go_first_out_of_memory() {
+    std::ofstream file("/proc/self/oom_score_adj");
+    file << 1000 << std::flush;
+    if (!file)
+        return {"out of memory", "", error_text("oom_score_adj")};
+    return {"out of memory", "first to go", ""};
+}
+
 Layer set_limits(const Policy &policy) {
     Layer layer{"limits", "", ""};
-    // Where the machine runs out of memory all the same, the kernel ends a worker and never the host.
-    std::ofstream("/proc/self/oom_score_adj") << 1000;
     // Private writable memory, stacks of threads included; not what is reserved only (RLIMIT_AS would count it).
     if (has_memory_limit(policy))
         lower(layer, "memory", RLIMIT_DATA, policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory());

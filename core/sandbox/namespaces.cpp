@@ -9,23 +9,35 @@
 #include <linux/mount.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/statvfs.h>
 #include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 namespace arhost::sandbox {
 namespace {
 
-// Root needs no user namespace, and in one it would lose its rights over other users' files.
+// False where it can't be had, or not with this user in it.
 bool enter_user_namespace() {
     const uid_t user = ::geteuid();
     const gid_t group = ::getegid();
     if (::unshare(CLONE_NEWUSER) != 0)
         return false;
-    const auto write = [](const char *file, const std::string &text) { std::ofstream(file) << text << std::flush; };
-    write("/proc/self/setgroups", "deny"); // without that no group may be mapped
-    write("/proc/self/uid_map", std::to_string(user) + " " + std::to_string(user) + " 1");
-    write("/proc/self/gid_map", std::to_string(group) + " " + std::to_string(group) + " 1");
-    return true;
+    const auto write = [](const char *file, const std::string &text) {
+        return static_cast<bool>(std::ofstream(file) << text << std::flush);
+    };
+    return write("/proc/self/setgroups", "deny") && // without that no group may be mapped
+           write("/proc/self/uid_map", std::to_string(user) + " " + std::to_string(user) + " 1") &&
+           write("/proc/self/gid_map", std::to_string(group) + " " + std::to_string(group) + " 1");
+}
+
+// Some systems let a process into a user namespace and then map no user, and there is no way back: a child tries.
+bool may_enter_user_namespace() {
+    const pid_t child = ::fork();
+    if (child == 0)
+        ::_exit(enter_user_namespace() ? 0 : 1);
+    int status = 1;
+    return child > 0 && ::waitpid(child, &status, 0) == child && status == 0;
 }
 
 int set_attributes(const std::filesystem::path &path, unsigned flags, std::uint64_t set, std::uint64_t clear) {
@@ -40,11 +52,16 @@ int set_attributes(const std::filesystem::path &path, unsigned flags, std::uint6
 bool make_mounts_read_only(const Policy &policy) {
     if (::mount("", "/", nullptr, MS_REC | MS_SLAVE, nullptr) != 0)
         return false;
-    for (const std::filesystem::path &folder : policy.writable)
-        (void)::mount(folder.c_str(), folder.c_str(), nullptr, MS_BIND | MS_REC, nullptr);
+    std::vector<std::filesystem::path> writable; // but for those that are on a read-only mount already
+    for (const std::filesystem::path &folder : policy.writable) {
+        struct statvfs found {};
+        if (::statvfs(folder.c_str(), &found) == 0 && !(found.f_flag & ST_RDONLY) &&
+            ::mount(folder.c_str(), folder.c_str(), nullptr, MS_BIND | MS_REC, nullptr) == 0)
+            writable.push_back(folder);
+    }
     if (set_attributes("/", AT_RECURSIVE, MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID, 0) != 0)
         return false;
-    for (const std::filesystem::path &folder : policy.writable)
+    for (const std::filesystem::path &folder : writable)
         (void)set_attributes(folder, 0, 0, MOUNT_ATTR_RDONLY);
     std::error_code error; // the working directory still is the old mount's
     if (const auto here = std::filesystem::current_path(error); !error)
@@ -58,14 +75,17 @@ Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
     const auto reached = [&](const char *what) { add_to(layer.reached, what); };
     const auto lacks = [&](const char *what) { add_to(layer.lacks, error_text(what)); };
-    const bool is_root = ::unshare(CLONE_NEWNS) == 0;
-    if (!is_root && !enter_user_namespace()) { // in which all may unshare
-        lacks("user");
-        return layer;
-    }
-    if (!is_root)
+    // Root needs no user namespace, and in one it would lose its rights over other users' files. In one all may
+    // unshare.
+    const bool is_root = ::geteuid() == 0;
+    if (!is_root) {
+        if (!may_enter_user_namespace() || !enter_user_namespace()) {
+            lacks("user");
+            return layer;
+        }
         reached("user");
-    (is_root || ::unshare(CLONE_NEWNS) == 0) && make_mounts_read_only(policy) ? reached("mount") : lacks("mount");
+    }
+    ::unshare(CLONE_NEWNS) == 0 && make_mounts_read_only(policy) ? reached("mount") : lacks("mount");
     if (!policy.allows("network"))
         ::unshare(CLONE_NEWNET) == 0 ? reached("net") : lacks("net");
     if (!policy.allows("display")) // X takes pictures through shared memory

@@ -35,6 +35,7 @@ constexpr PathList system_readable = {"/usr",
                                       "/etc/drirc",
                                       "/etc/python3",
                                       "/etc/mime.types",
+                                      "/dev/zero", // to write to it makes shared memory, which no limit counts
                                       "/proc/self",
                                       "/proc/cpuinfo",
                                       "/proc/meminfo",
@@ -47,7 +48,7 @@ constexpr PathList system_readable = {"/usr",
                                       "/sys/devices/system",
                                       "/sys/fs/cgroup",
                                       "/sys/kernel/mm/transparent_hugepage"};
-constexpr PathList system_devices = {"/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"};
+constexpr PathList system_devices = {"/dev/null", "/dev/full", "/dev/random", "/dev/urandom"};
 
 constexpr PathList gpu_readable = {"/sys/dev",    "/sys/bus/pci", "/sys/class/drm", "/sys/devices",
                                    "/sys/module", "/proc/driver", "/proc/devices",  "/proc/modules"};

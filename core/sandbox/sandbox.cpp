@@ -40,6 +40,7 @@ Level enter(const Policy &policy) {
         std::error_code ignored; // who wants to write there says what is wrong with it
         std::filesystem::create_directories(folder, ignored);
     }
+    level.push_back(go_first_out_of_memory());
     level.push_back(enter_namespaces(policy));
     level.push_back(set_limits(policy));
     level.push_back(drop_capabilities());

@@ -37,8 +37,9 @@ constexpr const char *never[] = {
     "open_tree_attr", "fsopen", "fsconfig", "fsmount", "fspick", "unshare", "setns", "open_by_handle_at",
     "name_to_handle_at", "fanotify_init", "quotactl", "quotactl_fd", "swapon", "swapoff", "acct", "mknod", "mknodat",
     // what Landlock lets pass: files' owners, modes, attributes
-    "chmod", "fchmodat", "fchmodat2", "chown", "lchown", "fchownat", "setxattr", "lsetxattr", "setxattrat",
-    "removexattr", "lremovexattr", "removexattrat", "file_setattr", "utime", "utimes", "futimesat",
+    "chmod", "fchmod", "fchmodat", "fchmodat2", "chown", "fchown", "lchown", "fchownat", "setxattr", "fsetxattr",
+    "lsetxattr", "setxattrat", "removexattr", "fremovexattr", "lremovexattr", "removexattrat", "file_setattr",
+    "utime", "utimes", "futimesat", "truncate", // ftruncate is of what could be opened for writing
     // the whole machine
     "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
     "stime", "sethostname", "setdomainname", "vhangup", "mq_open", "msgget", "semget"};
@@ -109,6 +110,8 @@ void deny_reaching_others(Filter &filter, bool has_children) {
     for (const unsigned long request :
          {0x8901ul /* FIOSETOWN */, 0x8902ul /* SIOCSPGRP */, std::uint64_t(TIOCSTI), std::uint64_t(TIOCLINUX)})
         filter.deny("ioctl", {equals(1, request)});
+    for (const unsigned long request : {0x40086602ul /* FS_IOC_SETFLAGS */, 0x401c5820ul /* FS_IOC_FSSETXATTR */})
+        filter.deny("ioctl", {equals(1, request)});
     filter.deny("prctl", {equals(0, PR_SET_PDEATHSIG)});
 }
 
@@ -148,6 +151,7 @@ void deny_uncounted_memory(Filter &filter) {
     for (const char *call : {"memfd_create", "memfd_secret", "shmget"})
         filter.deny(call);
     filter.deny("mmap", {has_bits(3, MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED | MAP_ANONYMOUS)});
+    filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // counts as stack
 }
 
 } // namespace
@@ -159,8 +163,6 @@ Layer filter_system_calls(const Policy &policy) {
         if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
             filter.deny(call);
     filter.deny("utimensat", {differs(1, 0)}); // futimens passes no name
-    if (policy.writable.empty())
-        filter.deny("truncate"); // which Landlock knows since its third version
     deny_reaching_others(filter, may_start_processes(policy));
     deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);

@@ -173,9 +173,11 @@ Object import_arhost(const std::string &interpreter) {
     const Object code = checked(Py_CompileString(arhost_py, "arhost.py", Py_file_input));
     Object module = PyImport_ExecCodeModule("arhost", code.get());
     if (!module)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
-                                                      "; install python3-numpy, or name the python of a virtual "
-                                                      "environment that has numpy in the option 'interpreter'");
+        throw Failure(
+            ARHOST_ERROR_CONFIGURATION,
+            "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
+                "; install python3-numpy, or name the python of a virtual "
+                "environment that has numpy in the option 'interpreter' (and let it be read: 'reads: [FOLDER]')");
     // The structs of the headers, which arhost.py writes down once more.
     const std::pair<const char *, std::size_t> sizes[] = {{"INTRINSICS", sizeof(arhost_intrinsics)},
                                                           {"CAMERA", sizeof(arhost_camera)},

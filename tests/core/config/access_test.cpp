@@ -50,6 +50,17 @@ TEST_F(Access, OfAPatternIsItsFolder) {
     EXPECT_THAT(of("{plugin: source_file, path: frames/%04d.png}", false).readable, ElementsAre(folder / "frames"));
 }
 
+TEST_F(Access, IsNeverToDevicesNorToAllFiles) {
+    for (const char *path : {"/dev/null", "missing.mp4", "/", "/missing.mp4", "/%04d.png", "/dev/../"}) {
+        EXPECT_THAT(of("{plugin: source_file, path: " + std::string(path) + "}", false).readable, IsEmpty()) << path;
+        EXPECT_THAT(of("{plugin: p, options: {folder: " + std::string(path) + "}}", false).readable, IsEmpty())
+            << path;
+    }
+    const char *home = std::getenv("HOME");
+    EXPECT_THAT(of("{plugin: p, options: {folder: " + std::string(home ? home : "/") + "}}", false).readable,
+                IsEmpty());
+}
+
 TEST_F(Access, OfAnOutputIsItsFolder) {
     const std::string path = (folder / "out/film.mp4").string();
     EXPECT_THAT(of("{plugin: sink_video, path: " + path + "}", true).writable, ElementsAre(folder / "out"));

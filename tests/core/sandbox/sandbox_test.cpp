@@ -176,6 +176,11 @@ TEST_F(Sandbox, SystemCallsDoNotReachOthers) {
         check.that(::prlimit(::getppid(), RLIMIT_CPU, &limit, nullptr) != 0);
         check.that(::prctl(PR_SET_PDEATHSIG, 0) != 0);
         check.that(::chmod((inside / "old").c_str(), 0777) != 0);
+        check.that(::truncate((inside / "old").c_str(), 0) != 0);
+        const int old = ::open((inside / "old").c_str(), O_RDWR);
+        check.that(::fchmod(old, 04777) != 0);
+        check.that(::fchown(old, ::getuid(), ::getgid()) != 0);
+        check.that(::ftruncate(old, 1) == 0);
         if (!under_sanitizer) {
             check.that(::kill(::getppid(), 0) != 0);
             check.that(::kill(0, 0) != 0);
@@ -237,6 +242,18 @@ TEST_F(Sandbox, AllowancesOpenWhatTheyName) {
     }
 }
 
+TEST_F(Sandbox, ItsProcessIsTheFirstToGoWhereMemoryRunsOut) {
+    EXPECT_EQ(in_child([&] {
+                  const Level level = enter(policy);
+                  int score = 0;
+                  std::ifstream("/proc/self/oom_score_adj") >> score;
+                  Checks check;
+                  check.that((score == 1000) == level.front().lacks.empty());
+                  return check.result();
+              }),
+              0);
+}
+
 TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
     policy.writable.clear();
     policy.memory_bytes = 256u << 20;
@@ -250,6 +267,7 @@ TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
                   check.that(map(64u << 20, MAP_PRIVATE));
                   check.that(!map(512u << 20, MAP_PRIVATE) || under_sanitizer);
                   check.that(!map(64u << 20, MAP_SHARED) || under_sanitizer);
+                  check.that(!map(64u << 20, MAP_PRIVATE | MAP_GROWSDOWN) || under_sanitizer);
                   check.that(::memfd_create("mine", 0) < 0 || under_sanitizer);
                   int held = 0;
                   while (held < 2000 && ::open("/dev/null", O_RDONLY) >= 0)
@@ -300,7 +318,7 @@ TEST_F(Sandbox, TellsEachLayer) {
     EXPECT_EQ(in_child([&] {
                   const Level level = enter(policy);
                   Checks check;
-                  check.that(level.size() == 6);
+                  check.that(level.size() == 7);
                   for (const Layer &layer : level)
                       check.that(!layer.reached.empty() || !layer.lacks.empty());
                   return check.result();

@@ -185,6 +185,10 @@ static void fill_memory(const tracker *self) {
     }
     tell(self, "a GiB", taken >= most);
     tell(self, "shared", mmap(NULL, step, PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
+    tell(self, "a stack",
+         mmap(NULL, (size_t)400 << 20, PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0) != MAP_FAILED);
+    fd = open("/dev/zero", O_RDWR | O_CLOEXEC);
+    tell(self, "shared zeros", fd >= 0 && mmap(NULL, step, PROT_WRITE, MAP_SHARED, fd, 0) != MAP_FAILED);
     fd = memfd_create("hostile", 0);
     tell(self, "a memfd", fd >= 0);
     while (threads < 1000 && pthread_create(&thread, NULL, wait_for_ever, NULL) == 0)
