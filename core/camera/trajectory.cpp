@@ -56,6 +56,10 @@ std::string problem_with(const View &view) {
     const glm::dvec3 backwards = eye - glm::make_vec3(view.look_at_mm);
     if (!(glm::length(backwards) > 0))
         return "look_at must be another point than eye";
+    constexpr double limit_mm = 1e9; // as of scenes
+    for (const double number : {eye.x, eye.y, eye.z, view.look_at_mm[0], view.look_at_mm[1], view.look_at_mm[2]})
+        if (!(std::abs(number) <= limit_mm))
+            return "eye and look_at must lie within 1e9 mm";
     if (!(glm::length(glm::cross(up, backwards)) > 1e-9 * glm::length(up) * glm::length(backwards)))
         return "up must have a length, and not point along the line of sight";
     return "";
@@ -80,7 +84,12 @@ public:
     std::int64_t integer() const {
         if (!value_->is_number_integer() ||
             (value_->is_number_unsigned() && value_->get<std::uint64_t>() > std::uint64_t(INT64_MAX)))
-            fail("must be a whole number, is " + value_->dump(-1, ' ', false, Json::error_handler_t::replace));
+            fail("must be a whole number" +
+                 (value_->is_structured()
+                      ? ""
+                      : ", is " +
+                            value_->dump(-1, ' ', false,
+                                         Json::error_handler_t::replace))); // what is nested can be so without end
         return value_->get<std::int64_t>();
     }
     void read(double (&to)[3]) const {

@@ -7,6 +7,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
+#include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
 #include <algorithm>
@@ -45,8 +46,68 @@ bool read_file(std::vector<unsigned char> *content, std::string *error, const st
     return false;
 }
 
+std::uint32_t number_at(std::string_view bytes, std::size_t offset) { // little-endian
+    std::uint32_t number = 0;
+    for (std::size_t i = 4; i-- > 0;)
+        number = number << 8 | static_cast<unsigned char>(bytes[offset + i]);
+    return number;
+}
+
+// The JSON of a .gltf, or of a .glb whose chunks fit.
+std::string_view json_of(const MeshText &text) {
+    const std::string_view all = text.view();
+    if (!all.starts_with("glTF"))
+        return all;
+    constexpr std::size_t header = 12, chunk_header = 8;
+    std::string_view json;
+    for (std::size_t at = header; at < all.size();) {
+        const std::size_t left = all.size() - at;
+        const std::size_t size = left < chunk_header ? left : number_at(all, at);
+        if (left < chunk_header || size > left - chunk_header)
+            text.fail("is cut short: a chunk reaches past the file's end");
+        if (at == header)
+            json = all.substr(at + chunk_header, size);
+        at += chunk_header + size;
+    }
+    return json;
+}
+
+// What tinygltf does not look at before it reads memory, or calls itself for.
+void check_structure(const MeshText &text) {
+    using Json = nlohmann::json;
+    const auto refuse_depth = [&](int depth, Json::parse_event_t, Json &) {
+        constexpr int deepest = 64;
+        if (depth > deepest)
+            text.fail("is nested more than 64 deep");
+        return true;
+    };
+    const std::string_view json = json_of(text);
+    const Json root = Json::parse(json.begin(), json.end(), refuse_depth, false); // what is no JSON, tinygltf tells
+    if (!root.is_object())
+        return;
+    const auto list = [&](const char *key) {
+        const auto found = root.find(key);
+        return found != root.end() && found->is_array() ? *found : Json::array();
+    };
+    const auto number = [](const Json &object, const char *key) -> std::uint64_t {
+        const auto found = object.is_object() ? object.find(key) : object.end();
+        return object.is_object() && found != object.end() && found->is_number_unsigned()
+                   ? found->get<std::uint64_t>()
+                   : 0;
+    };
+    const Json buffers = list("buffers"), views = list("bufferViews");
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const std::uint64_t buffer = number(views[i], "buffer"), offset = number(views[i], "byteOffset"),
+                            size = number(views[i], "byteLength");
+        const std::uint64_t all = buffer < buffers.size() ? number(buffers[buffer], "byteLength") : 0;
+        if (offset > all || size > all - offset)
+            text.fail("buffer view " + std::to_string(i) + " reaches past the end of its buffer");
+    }
+}
+
 tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
     const MeshText text = MeshText::read(file, file_limit - 1, watch);
+    check_structure(text);
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
     parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, nullptr});
@@ -612,6 +673,10 @@ private:
                         count, mesh);
         if (attribute(primitive.attributes, "JOINTS_1") >= 0)
             watch_.info(name_ + ": of more than four joints a vertex, the first four are used");
+        constexpr std::size_t most_offsets = 100'000'000; // of all targets together
+        if (primitive.targets.size() > most_offsets / std::max<std::size_t>(count, 1))
+            accessors_.fail(std::to_string(primitive.targets.size()) + " morph targets of " + std::to_string(count) +
+                            " vertices are too many");
         const bool has_normals = !mesh.normals.empty();
         for (const auto &target : primitive.targets) {
             const auto append = [&](const char *name, std::vector<glm::vec3> &to) {

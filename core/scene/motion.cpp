@@ -43,8 +43,9 @@ glm::dmat4 matrix_of(const glm::vec3 &translation, const glm::quat &rotation, co
     return matrix;
 }
 
-// false where a ray tracer couldn't use it: extreme numbers have multiplied along the tree of nodes.
-bool write(const glm::dmat4 &matrix, float (&to)[12]) {
+// Where a ray tracer couldn't use it, since an animation scales to nothing, or extreme numbers have multiplied along
+// the tree of nodes, what is there has shrunk to a point.
+void write(const glm::dmat4 &matrix, float (&to)[12]) {
     std::array<float, 12> values;
     for (int column = 0; column < 4; ++column)
         for (int row = 0; row < 3; ++row)
@@ -52,10 +53,15 @@ bool write(const glm::dmat4 &matrix, float (&to)[12]) {
     const glm::dmat3 linear(matrix);
     const double size = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
     if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }) ||
-        !(std::abs(glm::determinant(linear)) > 1e-9 * size))
-        return false;
+        !(std::abs(glm::determinant(linear)) > 1e-9 * size)) {
+        constexpr float nothing = 1e-9f;
+        for (std::size_t i = 0; i < 9; ++i)
+            values[i] = i % 4 == 0 ? nothing : 0;
+        for (std::size_t i = 9; i < 12; ++i)
+            if (!(std::abs(values[i]) <= coordinate_limit_mm))
+                values[i] = 0;
+    }
     std::ranges::copy(values, to);
-    return true;
 }
 
 // NaN becomes the limit too.
@@ -112,7 +118,7 @@ arhost_motion MotionEvaluator::at(double time_s) {
     place_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within));
     const auto objects = view<arhost_object>(scene_.objects);
     for (arhost_moved_object &moved : moved_)
-        write(world_from_node_[objects[moved.object].node], moved.world_from_object); // else it stays
+        write(world_from_node_[objects[moved.object].node], moved.world_from_object);
     for (std::size_t i = 0; i < buffers_.size(); ++i)
         deform(objects[deformed_[i].object], buffers_[i]);
     return {sizeof(arhost_motion), static_cast<std::uint32_t>(moved_.size()),    moved_.data(),

@@ -66,6 +66,9 @@ struct Pose {
     explicit Pose(const arhost_camera &camera) {
         if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
             refuse("the camera's eye, look_at or up is not finite");
+        constexpr double limit_mm = 1e12; // Embree takes no ray from far beyond
+        if (std::any_of(camera.eye, camera.eye + 3, [](double number) { return std::abs(number) > limit_mm; }))
+            refuse("the camera's eye lies beyond 1e12 mm");
         eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
         const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
         const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};

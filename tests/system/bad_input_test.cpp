@@ -51,6 +51,10 @@ const std::vector<Case> cases = {
      replaced(good, "[{id: 3, side_mm: 80}]", "[{id: 3, side_mm: 80}, {id: 3, side_mm: 60}]"),
      small_scene,
      {"run.yaml:4:", "listed twice"}},
+    {"TrajectoryForNobody",
+     "version: 1\ntrajectory: path.txt\noutputs: [{plugin: sink_counter, path: counted.txt}]\n",
+     small_scene,
+     {"run.yaml:2:13", "trajectory", "needs a 'source'", "or a 'raytracer'"}},
     {"NoVersion", replaced(good, "version: 1\n", ""), small_scene, {"run.yaml:1:", "'version' is missing"}},
     {"WrongVersion", replaced(good, "version: 1\n", "version: 2\n"), small_scene, {"run.yaml:1:10", "must be 1"}},
     {"WrongMode", replaced(good, "lockstep", "lockstp"), small_scene, {"run.yaml:2:7", "did you mean 'lockstep'"}},
@@ -218,6 +222,7 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
     run.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
     run.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
     run.write("empty.obj", "v 0 0 0\n");
+    run.write("path.txt", "0 0 9 0 0 8 0 1 0\n");
     run.write("text.so", "This is no shared object, whatever its name says, and it is longer than an ELF header.\n");
     run.write("cut.so", "\177ELF");
     std::filesystem::create_symlink("scene.yaml", run.path("linked.yaml"));

@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 namespace {
 
@@ -122,7 +123,10 @@ int main(int argc, char **argv) {
         ->check(CLI::Range(1, 16384))
         ->capture_default_str();
     app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
-        ->check(CLI::Range(0.0, 1e6))
+        ->check([](const std::string &text) {
+            const double seconds = std::strtod(text.c_str(), nullptr);
+            return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
+        })
         ->capture_default_str();
     app.add_option("--samples", settings.samples, "A pixel")->check(CLI::Range(1, 256))->capture_default_str();
     app.add_option("--light-samples", settings.light_samples,
@@ -134,6 +138,8 @@ int main(int argc, char **argv) {
     app.add_option("--output,-o", output, "The file to write")->required();
     CLI11_PARSE(app, argc, argv);
     try {
+        if (!cv::haveImageWriter(output))
+            throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
         const cv::Mat rgba = render(scene, view, time_s, settings);
         cv::Mat picture;
         if (transparent)

@@ -147,7 +147,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         }
     });
 
-    s.geometric_normal = normalize(s.geometric_normal);
+    s.geometric_normal = unit_or(s.geometric_normal, -normalize(direction));
     s.from_behind = dot(s.geometric_normal, direction) > Float(0.0f);
     s.geometric_normal = facing(s.geometric_normal, -direction);
     s.normal = shading_normal(s.normal, s.geometric_normal);

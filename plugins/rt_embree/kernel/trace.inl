@@ -48,9 +48,17 @@ ARHOST_INLINE Vec3 direction_of(const RTCRay16 &ray) {
     return {load(ray.dir_x), load(ray.dir_y), load(ray.dir_z)};
 }
 
+// Not so where numbers have left the range of floats, among facets of 1e-15 mm say: Embree ends the process for rays
+// that are none.
+ARHOST_INLINE Bool is_ray(Vec3 origin, Vec3 direction) {
+    return (largest(origin) < Float(1e18f)) & (largest(direction) < Float(1e18f)) &
+           (dot(direction, direction) >= Float(0.0f));
+}
+
 // The closest hits of the active lanes. Returns which of them hit.
 ARHOST_INLINE Bool trace(const Scene &scene, RTCScene tree, Query query, RTCRayHit16 &rays, Bool active) {
     alignas(64) int valid[lanes];
+    active = active & is_ray(origin_of(rays.ray), direction_of(rays.ray));
     store(valid, active);
     store(rays.hit.geomID, Int(no_hit));
     store(rays.hit.instID[0], Int(no_hit));
@@ -61,6 +69,7 @@ ARHOST_INLINE Bool trace(const Scene &scene, RTCScene tree, Query query, RTCRayH
 // Whether anything lies on the active lanes' rays.
 ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     alignas(64) int valid[lanes];
+    active = active & is_ray(origin_of(rays), direction_of(rays));
     store(valid, active);
     // Embree 3.13.5 hangs in coherent occlusion queries through instances with AVX-512.
     Query query = make_query(scene.has_instances ? Coherence::incoherent : Coherence::coherent);

@@ -366,6 +366,17 @@ TEST(Gltf, TellsWhatIsWrong) {
     EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.more, "\"input\": 5", "\"input\": 6"); }), HasSubstr("wrong type"));
     EXPECT_THAT(spoilt([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
                 HasSubstr("needs the extension 'KHR_draco_mesh_compression'"));
+    // Before tinygltf reads memory that is not the file's, or calls itself without end.
+    EXPECT_THAT(
+        spoilt([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 18446744073709551615"); }),
+        HasSubstr("buffer view 0 reaches past the end of its buffer"));
+    std::string deep;
+    for (int i = 0; i < 20000; ++i)
+        deep += "{\"a\":";
+    EXPECT_THAT(spoilt([&](Gltf &g) { g.more += ", \"extras\": " + deep + "1" + std::string(20000, '}'); }),
+                HasSubstr("is nested more than 64 deep"));
+    EXPECT_THAT(error_of(std::string("glTF\2\0\0\0\x1c\0\0\0\xff\0\0\0JSON{}      ", 28)),
+                HasSubstr("a chunk reaches past the file's end"));
     Gltf points = triangle();
     points.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]})";
     EXPECT_THAT(error_of(points.text()), HasSubstr("there are no triangles in its default scene"));

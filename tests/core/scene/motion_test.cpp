@@ -144,6 +144,26 @@ TEST(Motion, CarriesJointsBelowOthers) {
     EXPECT_THAT(triple(motion.deformed[0].normals, 1), ElementsAre(near(0), near(0), near(1)));
 }
 
+TEST(Motion, WhatCanNotBePlacedIsAPointWhateverCameBefore) {
+    ArenaBuilder builder;
+    builder.settings.duration_s = 2;
+    MotionNode parent, child;
+    parent.animated = true;
+    child.parent = builder.add_node(parent);
+    child.parent_from_node[3] = glm::vec3(9e8f, 0, 0);
+    const std::uint32_t node = builder.add_node(child);
+    builder.add_channel(
+        {0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 1}, {-9e8f, 0, 0, 9e8f, 0, 0}});
+    builder.add_object("s", builder.add_triangles(square()), builder.add_material(grey()), ARHOST_VIRTUAL,
+                       glm::mat4x3(1), {true, false, node, ARHOST_NONE});
+    const Arena arena = std::move(builder).build();
+    MotionEvaluator fresh(arena.scene()), used(arena.scene());
+    EXPECT_EQ(used.at(0).moved[0].world_from_object[0], 1);
+    for (MotionEvaluator *evaluator : {&fresh, &used})
+        for (int i = 0; i < 12; ++i) // 1.8e9 mm away
+            EXPECT_LT(std::abs(evaluator->at(1.5).moved[0].world_from_object[i]), 1e-6f) << i;
+}
+
 TEST(Motion, MixesJointsByWeight) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;

@@ -99,6 +99,7 @@ const LeafFunction leaf_functions[] = {
     LEAF(way_to_disc),
     LEAF(place_in_step),
     LEAF(largest),
+    LEAF(unit_or),
     LEAF(offset_from_surface),
     LEAF(facing),
     LEAF(shading_normal),

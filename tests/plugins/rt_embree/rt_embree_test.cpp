@@ -826,6 +826,32 @@ TEST(OddScenes, DegenerateTrianglesAreHarmless) {
     EXPECT_LT(counts.at(255), 3500);
 }
 
+// Their normals have no length in floats, and Embree ends the process for rays that are none.
+TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
+    for (const float side : {1e-12f, 1e-16f, 1e-20f})
+        for (const bool glass : {false, true}) {
+            ArenaBuilder builder;
+            builder.settings.background = glm::vec3(0.5f);
+            arhost_material material = scene::make_material(glass ? ARHOST_GLASS : ARHOST_MIRROR);
+            set3(material.reflectivity, 1, 1, 1);
+            builder.add_object("speck", builder.add_triangles(square(side)), builder.add_material(material));
+            builder.add_light(light(0, 0, 150, 0.5f));
+            const arhost_camera near = camera({0, 0, 4.0 * side}, {0, 0, 0}, {0, 1, 0});
+            Tracer tracer(std::move(builder));
+            ASSERT_EQ(tracer.start(near.intrinsics), ARHOST_OK);
+            Picture picture(near.intrinsics);
+            EXPECT_EQ(tracer.try_render(near, picture), ARHOST_OK) << side;
+        }
+}
+
+TEST(OddScenes, ACameraBeyondAllRaysIsRefused) {
+    Tracer tracer(one_sphere({0, 0, 200, 30}));
+    const arhost_camera far = camera({0, -1e19, 0}, {0, 0, 0}, {0, 0, 1});
+    ASSERT_EQ(tracer.start(far.intrinsics), ARHOST_OK);
+    Picture picture(far.intrinsics);
+    EXPECT_EQ(tracer.try_render(far, picture), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
 TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
     scene::TriangleMesh mesh = square(200);
     mesh.normals = {{1, 0, 0}, {-1, 0, 0}, {1, 0, 0}, {-1, 0, 0}};

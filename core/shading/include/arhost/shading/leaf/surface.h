@@ -5,6 +5,13 @@ ARHOST_LEAF Float largest(Vec3 a) {
     return max(max(abs(a.x), abs(a.y)), abs(a.z));
 }
 
+// `a` at length 1, even where the square of its length is too small to be told from 0; where it has none, `fallback`.
+ARHOST_LEAF Vec3 unit_or(Vec3 a, Vec3 fallback) {
+    Vec3 scaled = a * (Float(1.0) / max(largest(a), Float(1e-37)));
+    Vec3 long_enough = select(dot(a, a) > Float(1e-30), a, scaled);
+    return select(dot(scaled, scaled) > Float(0.5), normalize(long_enough), fallback);
+}
+
 // How far from a facet rays start that go on from a hit. A hit is as exact as the floats that it was computed
 // from: 2^-24 of their size, a few times. `way` is the ray's, from its origin to the hit.
 ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 way) {
