@@ -183,10 +183,15 @@ int serve(Link &link) {
         throw HostGone("the host's first message is not 'open'");
     link.map_pages(open);
     const std::string file = open.body.at("plugin").get<std::string>();
-    const arhost_plugin *plugin = nullptr;
+    const arhost_entry_point *entry = nullptr;
     {
         Link::InCall call(link, Call::load);
-        plugin = &open_plugin(file);
+        entry = &open_library(file);
+    }
+    const arhost_plugin *plugin = nullptr;
+    {
+        Link::InCall call(link, Call::negotiate);
+        plugin = &negotiate(file, *entry);
     }
     ::prctl(PR_SET_NAME, plugin->descriptor->id);
     link.send({{"type", "hello"}, {"descriptor", to_json(*plugin->descriptor)}});
