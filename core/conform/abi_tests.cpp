@@ -53,8 +53,8 @@ public:
         const std::size_t end = sizeof memory_ - offsetof(Memory, answer);
         for (std::size_t i = std::min<std::size_t>(answer_size, sizeof(arhost_answer)); i < end; ++i)
             if (bytes[i] != garbage)
-                throw Failure(fmt::format("negotiate wrote byte {} of an answer with a struct_size of {}", i,
-                                          answer_size));
+                throw Failure(
+                    fmt::format("negotiate wrote byte {} of an answer with a struct_size of {}", i, answer_size));
     }
     const arhost_answer &answer() const { return memory_.answer; }
     arhost_status status;
@@ -91,8 +91,10 @@ void negotiation(Context &context) {
     constexpr auto short_answer = static_cast<std::uint32_t>(offsetof(arhost_answer, plugin));
     const Exchange shorter(context, {offer_size, spoken, spoken}, short_answer);
     if (shorter.status >= 0)
-        throw Failure(fmt::format("given an answer of {} bytes, without a place for the plugin, negotiate returned {}; "
-                                  "it must refuse", short_answer, status_name(shorter.status)));
+        throw Failure(
+            fmt::format("given an answer of {} bytes, without a place for the plugin, negotiate returned {}; "
+                        "it must refuse",
+                        short_answer, status_name(shorter.status)));
 }
 
 // ---- Descriptor ------------------------------------------------------------------------------------
@@ -110,7 +112,8 @@ void descriptor(Context &context) {
     constexpr std::uint32_t capabilities_of_kind[] = {0, ARHOST_CAN_SEEK | ARHOST_IS_LIVE, 0, ARHOST_TRACES_LENS,
                                                       ARHOST_NEEDS_DISPLAY | ARHOST_IS_REALTIME_SINK};
     if (const std::uint32_t others = d.capabilities & ~capabilities_of_kind[d.kind])
-        throw Failure(fmt::format("the descriptor's capabilities have the bits {:#x}, which its kind has not", others));
+        throw Failure(
+            fmt::format("the descriptor's capabilities have the bits {:#x}, which its kind has not", others));
     std::set<std::string> keys;
     for (const arhost_option_descriptor *option : options_of(d)) {
         if (!option->key || !*option->key)
@@ -180,13 +183,16 @@ void cancelled(Context &context) {
 }
 
 constexpr Test tests[] = {
-    {"abi.load", "arhost-worker takes it: it opens, agrees on the version, and describes itself under its file's name.",
-     0, "", 10s, load},
+    {"abi.load",
+     "arhost-worker takes it: it opens, agrees on the version, and describes itself under its file's name.", 0, "",
+     10s, load},
     {"abi.exports", "Its one exported symbol is arhost_entry.", 0, "abi.load", 10s, exports},
-    {"abi.negotiation", "It answers offers of every range, and structs longer or shorter than it knows, as the ABI says.",
-     0, "abi.load", 10s, negotiation},
-    {"abi.descriptor", "Its texts are there, its capabilities are its kind's, its options and their defaults make sense.",
-     0, "abi.load", 10s, descriptor},
+    {"abi.negotiation",
+     "It answers offers of every range, and structs longer or shorter than it knows, as the ABI says.", 0, "abi.load",
+     10s, negotiation},
+    {"abi.descriptor",
+     "Its texts are there, its capabilities are its kind's, its options and their defaults make sense.", 0,
+     "abi.load", 10s, descriptor},
     {"abi.unknown-extension", "It has no pointer for an extension that it can't know.", 0, "abi.load", 10s,
      unknown_extension},
     {"abi.create", "An instance is made with the default options and destroyed without a start.", 0, "abi.load", 20s,
@@ -194,7 +200,8 @@ constexpr Test tests[] = {
     {"abi.two-instances", "Two instances live at a time, and end in any order.", 0, "abi.create", 20s, two_instances},
     {"abi.create-200-times", "Created and destroyed 200 times it keeps no descriptor, no thread and no memory.", 0,
      "abi.create", 60s, create_again_and_again},
-    {"abi.cancelled-create", "Cancelled before, create returns soon, OK or CANCELLED.", 0, "abi.create", 10s, cancelled},
+    {"abi.cancelled-create", "Cancelled before, create returns soon, OK or CANCELLED.", 0, "abi.create", 10s,
+     cancelled},
 };
 
 } // namespace

@@ -51,11 +51,10 @@ int run_child(const std::string &name, const Subject &subject) {
         if (name != test.name)
             continue;
         PluginLibrary library(subject.plugin, subject.settings, calls);
-        Context context{library, subject.reference, std::mt19937_64(subject.seed), {}};
+        Context context{library, subject.reference, std::mt19937_64(subject.seed), ring::Json::object()};
         Result result = run(test, context);
         result.facts = context.facts;
-        const std::string line =
-            to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";
+        const std::string line = to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";
         std::FILE *pipe = ::fdopen(result_fd, "w");
         std::fwrite(line.data(), 1, line.size(), pipe);
         std::fclose(pipe);
@@ -65,17 +64,12 @@ int run_child(const std::string &name, const Subject &subject) {
 }
 
 ring::Json to_json(const Result &result) {
-    ring::Json json = {{"test", result.test},
-                       {"verdict", to_text(result.verdict)},
-                       {"message", result.message},
-                       {"seconds", result.seconds},
-                       {"facts", result.facts},
-                       {"images", ring::Json::array()}};
+    ring::Json json = {{"test", result.test},       {"verdict", to_text(result.verdict)},
+                       {"message", result.message}, {"seconds", result.seconds},
+                       {"facts", result.facts},     {"images", ring::Json::array()}};
     for (const Exhibit &exhibit : result.exhibits)
-        json["images"].push_back({{"label", exhibit.label},
-                                  {"width", exhibit.width},
-                                  {"height", exhibit.height},
-                                  {"png", exhibit.png}});
+        json["images"].push_back(
+            {{"label", exhibit.label}, {"width", exhibit.width}, {"height", exhibit.height}, {"png", exhibit.png}});
     if (result.wrong_pixel)
         json["wrong_pixel"] = *result.wrong_pixel;
     return json;
@@ -84,7 +78,8 @@ ring::Json to_json(const Result &result) {
 Result result_from_json(const ring::Json &json) {
     Result result;
     result.test = json.at("test").get<std::string>();
-    const auto verdict = std::find(verdict_texts.begin() + 1, verdict_texts.end(), json.at("verdict").get<std::string>());
+    const auto verdict =
+        std::find(verdict_texts.begin() + 1, verdict_texts.end(), json.at("verdict").get<std::string>());
     if (verdict == verdict_texts.end())
         throw std::runtime_error("a verdict that is none");
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());

@@ -38,7 +38,8 @@ template <class Holds> int count_pixels(const Picture &picture, Holds &&holds) {
 // The two are alike: at most `share` of the pixels differ by more than `tolerance` codes.
 inline void expect_alike(const Picture &is, const Picture &should, const std::string &what, int tolerance = 0,
                          double share = 0) {
-    const int count = count_pixels(is, [&](auto x, auto y) { return differs(is.at(x, y), should.at(x, y), tolerance); });
+    const int count =
+        count_pixels(is, [&](auto x, auto y) { return differs(is.at(x, y), should.at(x, y), tolerance); });
     if (count <= share * is.width() * is.height())
         return;
     const auto at = *first_difference(is, should, tolerance);

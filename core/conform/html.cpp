@@ -50,9 +50,10 @@ std::string as_html(const Report &report) {
             rows += figure(exhibit, result);
         rows += "</td></tr>\n";
     }
-    return fmt::format("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>"
-                       "<style>{1}</style></head>\n<body><h1>{0}</h1>\n<p>{2}</p>\n<table>\n{3}</table></body></html>\n",
-                       title, style, escaped(as_summary(report)), rows);
+    return fmt::format(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>"
+        "<style>{1}</style></head>\n<body><h1>{0}</h1>\n<p>{2}</p>\n<table>\n{3}</table></body></html>\n",
+        title, style, escaped(as_summary(report)), rows);
 }
 
 } // namespace arhost::conform

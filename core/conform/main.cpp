@@ -68,9 +68,8 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
         if (&test != &load && wanted(test) && (test.kind == 0 || test.kind == kind))
             selected.push_back(test);
     run_all(selected, settings, report.results, tell);
-    std::sort(report.results.begin(), report.results.end(), [&](const Result &a, const Result &b) {
-        return &report.test_of(a) < &report.test_of(b);
-    });
+    std::sort(report.results.begin(), report.results.end(),
+              [&](const Result &a, const Result &b) { return &report.test_of(a) < &report.test_of(b); });
     return report;
 }
 

@@ -60,7 +60,8 @@ std::string Picture::damage() const {
     if (const auto at = first_in(0, guard_size))
         return fmt::format("{} bytes before the image", guard_size - *at);
     for (std::uint32_t y = 0; y < height_; ++y)
-        if (const auto at = first_in(row(y) + std::size_t{4} * width_, y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Line)))
+        if (const auto at = first_in(row(y) + std::size_t{4} * width_,
+                                     y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Line)))
             return y + 1 < height_ ? fmt::format("in row {}, {} bytes behind its last pixel", y, *at)
                                    : fmt::format("{} bytes behind the image's last pixel", *at);
     return {};
@@ -82,8 +83,8 @@ std::string Picture::png_base64() const {
     png.format = PNG_FORMAT_RGBA;
     std::vector<std::uint8_t> file(PNG_IMAGE_PNG_SIZE_MAX(png));
     png_alloc_size_t size = file.size();
-    if (!png_image_write_to_memory(&png, file.data(), &size, 0, bytes() + row(0),
-                                   static_cast<png_int_32>(stride_), nullptr))
+    if (!png_image_write_to_memory(&png, file.data(), &size, 0, bytes() + row(0), static_cast<png_int_32>(stride_),
+                                   nullptr))
         throw std::runtime_error(std::string("libpng: ") + png.message);
     file.resize(size);
     return base64(file);
@@ -111,8 +112,8 @@ Picture difference(const Picture &a, const Picture &b) {
             const Pixel p = a.at(x, y), q = b.at(x, y);
             Pixel d{0, 0, 0, 255};
             for (int channel = 0; channel < 3; ++channel)
-                d[channel] = std::min(255, 5 * std::max(std::abs(p[channel] * p[3] - q[channel] * q[3]) / 255,
-                                                        std::abs(p[3] - q[3])));
+                d[channel] = std::min(
+                    255, 5 * std::max(std::abs(p[channel] * p[3] - q[channel] * q[3]) / 255, std::abs(p[3] - q[3])));
             result.set(x, y, d);
         }
     return result;

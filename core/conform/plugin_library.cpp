@@ -20,8 +20,8 @@ const arhost_entry_point &PluginLibrary::entry() {
 
 const arhost_plugin &PluginLibrary::plugin() {
     if (!plugin_)
-        plugin_ = in_call(calls_, Call::negotiate,
-                          [&, &opened = entry()] { return &worker::negotiate(file_, opened); });
+        plugin_ =
+            in_call(calls_, Call::negotiate, [&, &opened = entry()] { return &worker::negotiate(file_, opened); });
     return *plugin_;
 }
 
@@ -99,7 +99,8 @@ Host::Host()
         if (severity == ARHOST_SEVERITY_ERROR)
             self(host).last_error_ = line;
         if (self(host).log_.size() < 1000)
-            self(host).log_.push_back(fmt::format("{}: {}", names[severity > 0 && severity < 6 ? severity : 0], line));
+            self(host).log_.push_back(
+                fmt::format("{}: {}", names[severity > 0 && severity < 6 ? severity : 0], line));
     };
     host_.progress = [](const arhost_host *, double, const char *) {};
     host_.cancelled = [](const arhost_host *host) { return static_cast<std::int32_t>(self(host).cancelled_); };
@@ -130,7 +131,13 @@ arhost_status Instance::create() {
         if (set == settings_.end() && !option->default_value)
             throw std::runtime_error(fmt::format("the option '{0}' has no default; give --set {0}=…", option->key));
         texts.push_back(set != settings_.end() ? set->second : option->default_value);
-        values.push_back(parse_option(*option, texts.back()));
+        try {
+            values.push_back(parse_option(*option, texts.back()));
+        } catch (const std::runtime_error &error) {
+            if (set != settings_.end())
+                throw;
+            throw Failure(std::string("a default can't be: ") + error.what());
+        }
     }
     for (const auto &[key, value] : settings_)
         if (!library_.option(key))
@@ -148,7 +155,8 @@ void Instance::create_or_fail() {
 
 void Instance::destroy() {
     if (instance_)
-        in_call(library_.calls(), Call::destroy, [&] { library_.plugin().destroy(std::exchange(instance_, nullptr)); });
+        in_call(library_.calls(), Call::destroy,
+                [&] { library_.plugin().destroy(std::exchange(instance_, nullptr)); });
 }
 
 void Instance::expect_ok(const char *call, arhost_status status) const {

@@ -22,7 +22,8 @@ glm::dvec2 project(const arhost_intrinsics &in, const glm::dvec3 &point) {
     glm::dvec2 p(point.x / point.z, point.y / point.z);
     if (in.distortion == ARHOST_DISTORTION_BROWN) { // OpenCV's documentation of calib3d
         const double *k = in.coefficients;
-        const double r2 = glm::dot(p, p), radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * (in.coefficient_count > 4 ? k[4] : 0)));
+        const double r2 = glm::dot(p, p),
+                     radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * (in.coefficient_count > 4 ? k[4] : 0)));
         p = {p.x * radial + 2 * k[2] * p.x * p.y + k[3] * (r2 + 2 * p.x * p.x),
              p.y * radial + k[2] * (r2 + 2 * p.y * p.y) + 2 * k[3] * p.x * p.y};
     }

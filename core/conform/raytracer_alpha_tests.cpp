@@ -35,7 +35,8 @@ void hit_alpha(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const int alpha = picture.alpha(x, y);
         const bool hit = distance_from_centre(picture, x, y) < silhouette - rim;
-        return !hit || alpha == 255 ? "" : fmt::format("every ray hit the sphere, alpha is {} and must be 255", alpha);
+        return !hit || alpha == 255 ? ""
+                                    : fmt::format("every ray hit the sphere, alpha is {} and must be 255", alpha);
     });
 }
 
@@ -69,8 +70,9 @@ void occluder(Context &context) {
     const std::uint32_t material = builder.add_material(diffuse(glm::vec3(1)));
     const std::uint32_t screen = builder.add_triangles(box({10, 10, 1}));
     for (const float z : {-60.0f, 60.0f})
-        builder.add_object("screen", screen, material, ARHOST_OCCLUDER,
-                           glm::mat4x3(glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0, 0, z)));
+        builder.add_object(
+            "screen", screen, material, ARHOST_OCCLUDER,
+            glm::mat4x3(glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0, 0, z)));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
@@ -129,8 +131,10 @@ void stronger_shadow_wins(Context &context) {
     // The glass ball's shadow (20 mm about y = 17.5) covers the upper half of the other (15 mm about y = 0).
     const int both = picture.alpha(79, 59 - 6), one = picture.alpha(79, 59 + 8);
     if (std::abs(both - one) > 2)
-        throw Failure(fmt::format("where an opaque and a translucent shadow overlap, alpha is {}; it must be {} as in the "
-                                  "opaque one alone", both, one))
+        throw Failure(
+            fmt::format("where an opaque and a translucent shadow overlap, alpha is {}; it must be {} as in the "
+                        "opaque one alone",
+                        both, one))
             .with("rendered", picture);
 }
 
@@ -164,8 +168,9 @@ void straight_alpha(Context &context) {
         edges += edge ? 1 : 0;
         return !edge || std::abs(p[1] - inside) <= 4
                    ? ""
-                   : fmt::format("alpha is {}, green is {} and must be {} as where the sphere covers wholly (straight alpha)",
-                                 p[3], p[1], inside);
+                   : fmt::format(
+                         "alpha is {}, green is {} and must be {} as where the sphere covers wholly (straight alpha)",
+                         p[3], p[1], inside);
     });
     if (edges == 0)
         throw Skip("no pixel is partly covered");
@@ -176,19 +181,20 @@ constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
     {"raytracer.empty-scene", "Of a scene without objects every alpha is 0.", kind, gate, 20s, empty_scene},
     {"raytracer.miss-alpha", "Where no ray hits, alpha is exactly 0.", kind, gate, 20s, miss_alpha},
-    {"raytracer.hit-alpha", "Where every ray hits a virtual object, alpha is exactly 255.", kind, gate, 20s, hit_alpha},
+    {"raytracer.hit-alpha", "Where every ray hits a virtual object, alpha is exactly 255.", kind, gate, 20s,
+     hit_alpha},
     {"raytracer.straight-alpha", "Where an object covers a part of a pixel, its colour is not multiplied by alpha.",
      kind, gate, 20s, straight_alpha},
     {"raytracer.inside-sphere", "A camera inside an object sees it everywhere.", kind, gate, 20s, inside_sphere},
     {"raytracer.depth-order", "The nearer object hides the farther one.", kind, gate, 20s, depth_order},
     {"raytracer.occluder", "An occluder hides what is behind it, and nothing else.", kind, gate, 20s, occluder},
     {"raytracer.catcher-in-light", "A catcher in the light is not seen.", kind, gate, 20s, catcher_in_light},
-    {"raytracer.opaque-shadow", "On a catcher, the shadow of an opaque body is black with alpha 153.", kind, gate, 20s,
-     opaque_shadow},
+    {"raytracer.opaque-shadow", "On a catcher, the shadow of an opaque body is black with alpha 153.", kind, gate,
+     20s, opaque_shadow},
     {"raytracer.translucent-shadow", "On a catcher, the shadow of a glass body is black with alpha 77.", kind, gate,
      20s, translucent_shadow},
-    {"raytracer.stronger-shadow-wins", "Where shadows of both classes overlap, alpha is that of the opaque one.", kind,
-     gate, 20s, stronger_shadow_wins},
+    {"raytracer.stronger-shadow-wins", "Where shadows of both classes overlap, alpha is that of the opaque one.",
+     kind, gate, 20s, stronger_shadow_wins},
     {"raytracer.shadow-alpha-of-scene", "A scene that sets other shadow alphas gets these.", kind, gate, 20s,
      shadow_alpha_of_the_scene},
 };

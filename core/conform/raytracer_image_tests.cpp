@@ -16,15 +16,15 @@ void writes_every_pixel(Context &context) {
             const Pixel none{0, 0, 0, 0}, all{255, 255, 255, 255};
             return on_zeros.at(x, y) != none || on_ones.at(x, y) != all
                        ? ""
-                       : fmt::format("of a {}×{} image, it keeps what was there before, zeros or ones", width, height);
+                       : fmt::format("of a {}×{} image, it keeps what was there before, zeros or ones", width,
+                                     height);
         });
     }
 }
 
 void writes_nothing_else(Context &context) {
     for (const auto &[width, height] : {std::pair(160u, 120u), {1u, 1u}, {17u, 13u}, {33u, 65u}}) {
-        const Picture picture =
-            Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(width, height)));
+        const Picture picture = Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(width, height)));
         if (const std::string damage = picture.damage(); !damage.empty())
             throw Failure(fmt::format("of a {}×{} image, it wrote {}", width, height, damage));
     }
@@ -37,8 +37,9 @@ void sizes(Context &context) {
         expect_pixels(picture, [&](auto x, auto y) {
             const bool hit = distance_from_centre(picture, x, y) < 100 * 30 / 200.0 - 2;
             const int alpha = picture.alpha(x, y);
-            return !hit || alpha >= 250 ? "" : fmt::format("of a {}×{} image, the sphere is here but alpha is {}", width,
-                                                           height, alpha);
+            return !hit || alpha >= 250
+                       ? ""
+                       : fmt::format("of a {}×{} image, the sphere is here but alpha is {}", width, height, alpha);
         });
     }
 }
@@ -61,9 +62,10 @@ void region(Context &context) {
         expect_pixels(picture, [&](auto x, auto y) {
             const bool inside = x >= info.region_x && x < right && y >= info.region_y && y < bottom;
             const int alpha = picture.alpha(x, y);
-            return inside || alpha <= 2 ? "" : fmt::format("outside of the told region, {}×{} at ({}, {}), alpha is {}",
-                                                           info.region_width, info.region_height, info.region_x,
-                                                           info.region_y, alpha);
+            return inside || alpha <= 2
+                       ? ""
+                       : fmt::format("outside of the told region, {}×{} at ({}, {}), alpha is {}", info.region_width,
+                                     info.region_height, info.region_x, info.region_y, alpha);
         });
     }
     if (!told)
@@ -104,9 +106,10 @@ void threads(Context &context) {
 
 void reference(Context &context) {
     if (!std::filesystem::is_regular_file(context.reference))
-        throw std::runtime_error("the reference '" + context.reference.string() + "' is not there; give --reference FILE");
+        throw std::runtime_error("the reference '" + context.reference.string() +
+                                 "' is not there; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
-    Context of_reference{library, context.reference, context.random, {}};
+    Context of_reference{library, context.reference, context.random, ring::Json::object()};
     const Picture should = Tracer(of_reference, still_life()).render(of_still_life());
     const Picture is = Tracer(context, still_life()).render(of_still_life());
     // Silhouettes and shadows' edges may lie a pixel elsewhere.
@@ -138,10 +141,11 @@ void reference(Context &context) {
     constexpr double least_psnr = 40;
     if (psnr >= least_psnr && alphas == 0)
         return;
-    throw Failure(fmt::format("beside {}, inside of objects the PSNR is {:.1f} dB and must be {} or more, and {} pixels "
-                              "away from edges have another alpha; most at ({}, {}): {} and {}",
-                              context.reference.stem().string(), psnr, least_psnr, alphas, (*worst)[0], (*worst)[1],
-                              text_of(is.at((*worst)[0], (*worst)[1])), text_of(should.at((*worst)[0], (*worst)[1]))))
+    throw Failure(
+        fmt::format("beside {}, inside of objects the PSNR is {:.1f} dB and must be {} or more, and {} pixels "
+                    "away from edges have another alpha; most at ({}, {}): {} and {}",
+                    context.reference.stem().string(), psnr, least_psnr, alphas, (*worst)[0], (*worst)[1],
+                    text_of(is.at((*worst)[0], (*worst)[1])), text_of(should.at((*worst)[0], (*worst)[1]))))
         .with("rendered", is)
         .with("reference", should)
         .with("difference × 5", difference(is, should))
@@ -151,18 +155,19 @@ void reference(Context &context) {
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.writes-every-pixel", "Every pixel is written, whatever was there.", kind, gate, 20s, writes_every_pixel},
+    {"raytracer.writes-every-pixel", "Every pixel is written, whatever was there.", kind, gate, 20s,
+     writes_every_pixel},
     {"raytracer.writes-nothing-else", "No byte before, behind or between the rows is written.", kind, gate, 20s,
      writes_nothing_else},
-    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes show what they should.", kind, gate, 20s,
-     sizes},
+    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes show what they should.", kind, gate,
+     20s, sizes},
     {"raytracer.region", "Outside of the region that it tells every alpha is 0.", kind, gate, 20s, region},
-    {"raytracer.deterministic", "The same request gives the same bytes, again and in another instance.", kind, gate, 20s,
-     deterministic},
+    {"raytracer.deterministic", "The same request gives the same bytes, again and in another instance.", kind, gate,
+     20s, deterministic},
     {"raytracer.frames-before", "An image does not depend on the frames before it.", kind, gate, 20s, frames_before},
     {"raytracer.threads", "Any number of threads gives the same image.", kind, gate, 20s, threads},
-    {"raytracer.reference", "The image is the reference ray tracer's: 40 dB inside, the same alpha but at edges.", kind,
-     gate, 30s, reference},
+    {"raytracer.reference", "The image is the reference ray tracer's: 40 dB inside, the same alpha but at edges.",
+     kind, gate, 30s, reference},
 };
 
 } // namespace

@@ -25,8 +25,7 @@ void start_again(Context &context) {
     tracer.render(from_front());
     tracer.change_scene(still_life());
     const arhost_intrinsics smaller = pinhole(90, 70, 110);
-    expect_alike(tracer.render(of_still_life(smaller)),
-                 Tracer(context, still_life()).render(of_still_life(smaller)),
+    expect_alike(tracer.render(of_still_life(smaller)), Tracer(context, still_life()).render(of_still_life(smaller)),
                  "stopped, and started with another scene and size, it gives another image than a new instance", 1);
 }
 
@@ -56,13 +55,15 @@ void parallel_up(Context &context) {
     for (const glm::dvec3 &up : {glm::dvec3(0, 0, 1), {0, 0, -3}, {0, 0, 0}})
         if (const arhost_status status = tracer.try_render(camera({0, 0, 200}, {0, 0, 0}, up), picture, info);
             status != ARHOST_ERROR_INVALID_ARGUMENT)
-            throw Failure(fmt::format("looking along −z with up (0, 0, {}), render returned {}; it must be INVALID_ARGUMENT",
-                                      up.z, status_name(status)));
+            throw Failure(
+                fmt::format("looking along −z with up (0, 0, {}), render returned {}; it must be INVALID_ARGUMENT",
+                            up.z, status_name(status)));
     tracer.render(from_front()); // and goes on
 }
 
 void not_finite(Context &context) {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                     infinity = std::numeric_limits<double>::infinity();
     Tracer tracer(context, one_sphere({0, 0, 0, 30}));
     const Picture before = tracer.render(from_front());
     Picture picture(160, 120);
@@ -72,8 +73,10 @@ void not_finite(Context &context) {
           camera({0, 0, 200}, {0, 0, 0}, {0, nan, 0})})
         if (const arhost_status status = tracer.try_render(view, picture, info);
             status != ARHOST_ERROR_INVALID_ARGUMENT && status != ARHOST_OK)
-            throw Failure(fmt::format("with a camera that is not finite, render returned {}; it must be INVALID_ARGUMENT, "
-                                      "or OK", status_name(status)));
+            throw Failure(
+                fmt::format("with a camera that is not finite, render returned {}; it must be INVALID_ARGUMENT, "
+                            "or OK",
+                            status_name(status)));
     expect_alike(tracer.render(from_front()), before, "after a camera that is not finite, the image is another", 1);
 }
 
@@ -144,8 +147,8 @@ void speed(Context &context) {
     context.facts = {{"p50_ms", ms[ms.size() / 2]}, {"max_ms", ms.back()}};
     constexpr double bound_ms = 250;
     if (ms[ms.size() / 2] > bound_ms)
-        throw Warning(fmt::format("an image of 640×480 takes {:.0f} ms on the median, more than {:.0f}", ms[ms.size() / 2],
-                                  bound_ms));
+        throw Warning(fmt::format("an image of 640×480 takes {:.0f} ms on the median, more than {:.0f}",
+                                  ms[ms.size() / 2], bound_ms));
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
@@ -158,12 +161,13 @@ constexpr Test tests[] = {
      "raytracer.render", 60s, leaks},
     {"raytracer.parallel-up", "An up that is parallel to the view is refused as INVALID_ARGUMENT.", kind,
      "raytracer.render", 20s, parallel_up},
-    {"raytracer.not-finite", "A camera that is not finite is refused or drawn, and the next image is right.", kind, "raytracer.render",
-     20s, not_finite},
-    {"raytracer.cancelled", "Cancelled before, start and render return soon, OK or CANCELLED.", kind, "raytracer.render",
-     20s, cancelled},
+    {"raytracer.not-finite", "A camera that is not finite is refused or drawn, and the next image is right.", kind,
+     "raytracer.render", 20s, not_finite},
+    {"raytracer.cancelled", "Cancelled before, start and render return soon, OK or CANCELLED.", kind,
+     "raytracer.render", 20s, cancelled},
     {"raytracer.degenerate", "Triangles without area harm nothing.", kind, "raytracer.render", 20s, degenerate},
-    {"raytracer.far-away", "A scene of a kilometre looks like one of a foot.", kind, "raytracer.render", 20s, far_away},
+    {"raytracer.far-away", "A scene of a kilometre looks like one of a foot.", kind, "raytracer.render", 20s,
+     far_away},
     {"raytracer.speed", "A small image takes less than 250 ms on the median; a warning otherwise.", kind,
      "raytracer.render", 120s, speed},
 };

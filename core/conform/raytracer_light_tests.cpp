@@ -26,8 +26,8 @@ void colour_order(Context &context) {
         const Pixel p = centre_of(picture);
         for (int other = 0; other < 3; ++other)
             if (other == channel ? p[other] < 128 : p[other] > 20)
-                throw Failure(fmt::format("pixel (80, 60): a {} sphere is {}; the bytes are R, G, B, A", names[channel],
-                                          text_of(p)))
+                throw Failure(fmt::format("pixel (80, 60): a {} sphere is {}; the bytes are R, G, B, A",
+                                          names[channel], text_of(p)))
                     .with("rendered", picture)
                     .at(80, 60);
     }
@@ -39,23 +39,23 @@ void srgb(Context &context) {
             Tracer(context, one_sphere({0, 0, 0, 30}, glowing(glm::vec3(value)))).render(from_front());
         const int code = centre_of(picture)[1], expected = srgb8_exact(double{value});
         if (std::abs(code - expected) > 1)
-            throw Failure(fmt::format("pixel (80, 60): {} in linear light has code {} and must have {}, sRGB-encoded", value,
-                                      code, expected))
+            throw Failure(fmt::format("pixel (80, 60): {} in linear light has code {} and must have {}, sRGB-encoded",
+                                      value, code, expected))
                 .with("rendered", picture)
                 .at(80, 60);
     }
 }
 
 // A plane at z = 0 under a light; `irradiance` is of a point, by the formulas.
-template <class Irradiance>
-void expect_plane(Context &context, const arhost_light &light, Irradiance &&irradiance) {
+template <class Irradiance> void expect_plane(Context &context, const arhost_light &light, Irradiance &&irradiance) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.1f);
     // One triangle for each side: between two that share an edge, a fast ray tracer may have a gap.
-    const scene::TriangleMesh plane{{{-600, -300, 1}, {600, -300, 1}, {0, 900, 1}, {-600, -300, -1}, {600, -300, -1}, {0, 900, -1}},
-                                    {},
-                                    {},
-                                    {{0, 1, 2}, {5, 4, 3}}};
+    const scene::TriangleMesh plane{
+        {{-600, -300, 1}, {600, -300, 1}, {0, 900, 1}, {-600, -300, -1}, {600, -300, -1}, {0, 900, -1}},
+        {},
+        {},
+        {{0, 1, 2}, {5, 4, 3}}};
     builder.add_object("plane", builder.add_triangles(plane), builder.add_material(diffuse(glm::vec3(0.8f))));
     for (const float side : {1.0f, -1.0f}) { // the same above and below
         arhost_light one = light;
@@ -103,14 +103,17 @@ void directional(Context &context) {
 void shadow_on_object(Context &context) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
-    builder.add_object("plane", builder.add_triangles(square(150, 0)), builder.add_material(diffuse(glm::vec3(0.8f))));
-    builder.add_object("ball", builder.add_spheres({{30, 0, 40, 12}}), builder.add_material(diffuse(glm::vec3(0.8f))));
+    builder.add_object("plane", builder.add_triangles(square(150, 0)),
+                       builder.add_material(diffuse(glm::vec3(0.8f))));
+    builder.add_object("ball", builder.add_spheres({{30, 0, 40, 12}}),
+                       builder.add_material(diffuse(glm::vec3(0.8f))));
     builder.add_light(lamp({150, 0, 200}, 0.8f));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     const int shadowed = picture.at(79, 59)[1], lit = picture.at(79, 99)[1];
     if (2 * shadowed > lit + shadowed || shadowed > 120) // 89 or so by the ambient light alone, beside 195
-        throw Failure(fmt::format("pixel (79, 59): a ball is between lamp and plane, the code is {}; in the light it is {}",
-                                  shadowed, lit))
+        throw Failure(
+            fmt::format("pixel (79, 59): a ball is between lamp and plane, the code is {}; in the light it is {}",
+                        shadowed, lit))
             .with("rendered", picture)
             .at(79, 59);
 }

@@ -44,8 +44,8 @@ const Test &Report::test_of(const Result &result) const {
 
 std::string Report::command(const Result &result) const {
     const Subject &subject = settings.subject;
-    std::string text = fmt::format("arhost conform {} --only {} --seed {}", quoted(subject.plugin), result.test,
-                                   subject.seed);
+    std::string text =
+        fmt::format("arhost conform {} --only {} --seed {}", quoted(subject.plugin), result.test, subject.seed);
     for (const auto &[key, value] : subject.settings)
         text += " --set " + quoted(key + "=" + value);
     return text;

@@ -81,8 +81,9 @@ public:
         pipe_.reset(ends[0]);
         const UniqueFd write_end(ends[1]);
         const Subject &subject = settings.subject;
-        std::vector<std::string> arguments = {"arhost-conform", subject.plugin, "--run",       test.name, "--seed",
-                                              std::to_string(subject.seed),     "--reference", subject.reference};
+        std::vector<std::string> arguments = {"arhost-conform", subject.plugin,   "--run",
+                                              test.name,        "--seed",         std::to_string(subject.seed),
+                                              "--reference",    subject.reference};
         for (const auto &[key, value] : subject.settings)
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
         const pid_t parent = ::getpid();
@@ -100,43 +101,35 @@ public:
     Child(const Child &) = delete;
     Child &operator=(const Child &) = delete;
 
-    int fd() const { return pipe_.get(); }
+    int fd() const { return closed_ ? -1 : pipe_.get(); }
     Clock::time_point deadline() const { return deadline_; }
 
     // Takes what has come. True once the test is over: it ended, or its time is up.
     bool poll() {
-        char buffer[1 << 16];
-        pollfd ready{pipe_.get(), POLLIN, 0};
-        while (!closed_ && ::poll(&ready, 1, 0) > 0) {
-            const ssize_t count = ::read(pipe_.get(), buffer, sizeof buffer);
-            if (count > 0)
-                text_.append(buffer, static_cast<std::size_t>(count));
-            closed_ = count <= 0;
-        }
-        // The pipe closes before the process has ended, or, with children of the plugin's, never.
-        ended_ = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
+        const bool ended = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
+        take(); // afterwards: what it wrote at the end is there now
+        ended_ = ended;
         return ended_ || Clock::now() >= deadline_;
     }
 
     Result finish() {
-        const Call call = calls_.read();
-        const bool in_time = ended_;
+        const bool in_time = ended_, told = text_.ends_with('\n');
+        const std::string where = told ? " when the process ended" : place(calls_.read(), test_);
         end();
         Result result;
         try {
-            if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && text_.ends_with('\n')) {
+            if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && told) {
                 result = result_from_json(ring::Json::parse(text_));
             } else if (!in_time) {
                 result.verdict = Verdict::timeout;
-                result.message = fmt::format("no end after {:.3g} s{}",
-                                             std::chrono::duration<double>(deadline_ - begin_).count(),
-                                             place(call, test_));
+                result.message =
+                    fmt::format("no end after {:.3g} s{}", std::chrono::duration<double>(deadline_ - begin_).count(),
+                                where);
             } else {
                 result.verdict = Verdict::crashed;
                 result.message = WIFSIGNALED(status_)
-                                     ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), place(call, test_))
-                                     : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_),
-                                                   place(call, test_));
+                                     ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
+                                     : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
             }
         } catch (const std::exception &error) {
             result.message = std::string("the result can't be read: ") + error.what();
@@ -147,6 +140,16 @@ public:
     }
 
 private:
+    void take() {
+        char buffer[1 << 16];
+        pollfd ready{pipe_.get(), POLLIN, 0};
+        while (!closed_ && ::poll(&ready, 1, 0) > 0) { // children of the plugin's may keep it open
+            const ssize_t count = ::read(pipe_.get(), buffer, sizeof buffer);
+            if (count > 0)
+                text_.append(buffer, static_cast<std::size_t>(count));
+            closed_ = count <= 0;
+        }
+    }
     void end() {
         ::kill(-pid_, SIGKILL); // and what the plugin has started
         if (!ended_)
@@ -173,8 +176,8 @@ const Result *find(const std::vector<Result> &results, const std::string &test) 
 void wait(const std::list<Child> &running) {
     std::vector<pollfd> fds;
     for (const Child &child : running)
-        fds.push_back({child.fd(), POLLIN, 0});
-    ::poll(fds.data(), fds.size(), 2); // an end of a process closes no pipe that its children hold
+        fds.push_back({child.fd(), POLLIN, 0}); // -1, which poll passes over, once it is closed
+    ::poll(fds.data(), fds.size(), 2);           // an end of a process closes no pipe that its children hold
 }
 
 } // namespace

@@ -103,9 +103,7 @@ scene::ArenaBuilder still_life(const glm::mat4 &moved) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
     builder.settings.background = {0.5f, 0.6f, 0.7f};
-    const auto at = [&](float x, float y, float z) {
-        return glm::mat4x3(glm::translate(moved, glm::vec3(x, y, z)));
-    };
+    const auto at = [&](float x, float y, float z) { return glm::mat4x3(glm::translate(moved, glm::vec3(x, y, z))); };
     const std::uint32_t grey = builder.add_material(diffuse(glm::vec3(0.7f)));
     const std::uint32_t red = builder.add_material(diffuse({0.8f, 0.2f, 0.1f}));
     arhost_material shiny = diffuse({0.2f, 0.4f, 0.6f});
@@ -124,7 +122,9 @@ scene::ArenaBuilder still_life(const glm::mat4 &moved) {
 }
 
 arhost_camera of_still_life(const arhost_intrinsics &intrinsics, const glm::dmat4 &moved) {
-    const auto apply = [&](double x, double y, double z, double w) { return glm::dvec3(moved * glm::dvec4(x, y, z, w)); };
+    const auto apply = [&](double x, double y, double z, double w) {
+        return glm::dvec3(moved * glm::dvec4(x, y, z, w));
+    };
     return camera(apply(10, -180, 130, 1), apply(0, 0, 10, 1), apply(0, 0, 1, 0), intrinsics);
 }
 

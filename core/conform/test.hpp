@@ -45,8 +45,8 @@ struct Warning : std::runtime_error {
 // What a test is given.
 struct Context {
     PluginLibrary &library;
-    std::filesystem::path reference; // the ray tracer to compare with
-    std::mt19937_64 random;          // of the seed, the same for every test
+    std::filesystem::path reference;         // the ray tracer to compare with
+    std::mt19937_64 random;                  // of the seed, the same for every test
     ring::Json facts = ring::Json::object(); // for the result
 
     double uniform(double low, double high) {

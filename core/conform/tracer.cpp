@@ -34,9 +34,10 @@ Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides
 
 arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
     stop();
-    const arhost_raytracer_setup setup{sizeof setup, intrinsics.width, intrinsics.height, 0, &scene_->get(), &intrinsics};
-    const arhost_status status = in_call(instance_.library().calls(), Call::start,
-                                         [&] { return functions_.start(instance_.get(), &setup); });
+    const arhost_raytracer_setup setup{sizeof setup,   intrinsics.width, intrinsics.height, 0,
+                                       &scene_->get(), &intrinsics};
+    const arhost_status status =
+        in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
     if (status == ARHOST_OK)
         started_ = intrinsics;
     return status;

@@ -46,7 +46,8 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
     if (!entry)
         refuse(file, "is no arhost plugin: it exports no symbol 'arhost_entry'");
     if (entry->struct_size < sizeof(arhost_entry_point) || !entry->negotiate)
-        refuse(file, "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
+        refuse(file,
+               "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
     return *entry;
 }
 
@@ -59,7 +60,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         refuse(file, "refused the ABI version; " + versions + ": build the plugin against its headers");
     if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
         refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
-               ": build the plugin against its headers");
+                         ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
     if (!plugin || plugin->struct_size < sizeof(arhost_plugin))
         refuse(file, "its negotiate gave no (whole) arhost_plugin");

@@ -54,7 +54,7 @@ struct Environment {
 
 struct Scene {
     RTCScene root;
-    RTCScene catchers; // nothing but the catchers, or the same as `root`
+    RTCScene catchers;         // nothing but the catchers, or the same as `root`
     std::int32_t packet_width; // Embree's
     // The instance that holds all objects that do not move, or −2: there is none. They have the numbers of
     // their geometries, others those of their instances.
