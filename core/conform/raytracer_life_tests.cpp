@@ -153,8 +153,8 @@ void speed(Context &context) {
 
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.start", "It starts on a scene in read-only memory, and stops.", kind, "abi.create", 60s, start},
-    {"raytracer.render", "It renders an image of a scene in read-only memory.", kind, "raytracer.start", 60s, render},
+    {"raytracer.start", "It starts on a scene in read-only memory, and stops.", kind, "abi.create", 30s, start},
+    {"raytracer.render", "It renders an image of a scene in read-only memory.", kind, "raytracer.start", 30s, render},
     {"raytracer.start-again", "After a stop it starts with another scene and another size.", kind, "raytracer.render",
      30s, start_again},
     {"raytracer.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind,

@@ -122,14 +122,14 @@ public:
                 result = result_from_json(ring::Json::parse(text_));
             } else if (!in_time) {
                 result.verdict = Verdict::timeout;
-                result.message =
-                    fmt::format("no end after {:.3g} s{}", std::chrono::duration<double>(deadline_ - begin_).count(),
-                                where);
+                result.message = fmt::format("no end after {:.3g} s{}",
+                                             std::chrono::duration<double>(deadline_ - begin_).count(), where);
             } else {
                 result.verdict = Verdict::crashed;
-                result.message = WIFSIGNALED(status_)
-                                     ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
-                                     : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
+                result.message =
+                    WIFSIGNALED(status_)
+                        ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
+                        : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
             }
         } catch (const std::exception &error) {
             result.message = std::string("the result can't be read: ") + error.what();
@@ -177,7 +177,7 @@ void wait(const std::list<Child> &running) {
     std::vector<pollfd> fds;
     for (const Child &child : running)
         fds.push_back({child.fd(), POLLIN, 0}); // -1, which poll passes over, once it is closed
-    ::poll(fds.data(), fds.size(), 2);           // an end of a process closes no pipe that its children hold
+    ::poll(fds.data(), fds.size(), 2);          // an end of a process closes no pipe that its children hold
 }
 
 } // namespace

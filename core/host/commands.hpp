@@ -38,5 +38,7 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 int check(const Arguments &arguments, supervise::Launcher &launcher);
 int list_plugins(bool with_options, bool verbose, supervise::Launcher &launcher);
 int print_schema(bool markdown);
+// Becomes arhost-conform, which lies beside this program: the host itself opens no plugin.
+int conform(std::vector<std::string> arguments);
 
 } // namespace arhost::host

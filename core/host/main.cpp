@@ -104,6 +104,11 @@ int main(int argc, char **argv) {
     CLI::App *schema_command = app.add_subcommand("schema", "Print the JSON Schema of configurations, for editors");
     schema_command->add_flag("--markdown", markdown, "As the table of docs/config.md");
 
+    CLI::App *conform_command =
+        app.add_subcommand("conform", "Try whether a plugin keeps the ABI's promises (docs/conformance.md)");
+    conform_command->set_help_flag(); // the program that it becomes has its own
+    conform_command->prefix_command();
+
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
@@ -112,6 +117,8 @@ int main(int argc, char **argv) {
     try {
         if (*schema_command)
             return print_schema(markdown);
+        if (*conform_command)
+            return conform(conform_command->remaining());
         arhost::supervise::Launcher launcher; // before any thread
         if (*replay_command)
             return replay(arguments, replay_arguments, launcher);

@@ -13,6 +13,8 @@
 #include <cstring>
 #include <dlfcn.h>
 #include <filesystem>
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -78,7 +80,10 @@ struct Wrong {
     const arhost_host *host = nullptr;
     bool was_started = false;
     unsigned users = 0;
-    std::vector<std::uint8_t> last; // image
+    std::int64_t threads = 0;              // the option
+    std::vector<std::uint8_t> last;        // image
+    arhost_instance *glass_only = nullptr; // shadows_add: another instance, and its scene
+    std::unique_ptr<std::byte, decltype(&std::free)> glass_scene{nullptr, &std::free};
 };
 Wrong &wrong(arhost_instance *instance) {
     return *reinterpret_cast<Wrong *>(instance);
@@ -119,6 +124,8 @@ arhost_camera spoil(arhost_camera camera) {
     if (has("look_at_is_a_direction"))
         for (int i = 0; i < 3; ++i)
             camera.look_at[i] += camera.eye[i];
+    if (has("small_world"))
+        camera.eye[2] = std::min(camera.eye[2], 1e5);
     if (has("own_up")) {
         const std::array<double, 3> y = {0, 1, 0};
         std::copy(y.begin(), y.end(), camera.up);
@@ -167,14 +174,16 @@ void spoil(const Pixels &pixels) {
     }
     if (has("no_shadows"))
         pixels.each([](std::uint8_t *p) { p[3] = p[3] == 255 ? 255 : 0; });
-    if (has("grey_shadows"))
-        pixels.each([](std::uint8_t *p) { p[0] = p[1] = p[2] = p[3] == 153 || p[3] == 77 ? 30 : p[1]; });
+    if (has("green_shadows"))
+        pixels.each([](std::uint8_t *p) { p[1] = p[3] == 153 || p[3] == 77 ? 30 : p[1]; });
     if (has("bgra"))
         pixels.each([](std::uint8_t *p) { std::swap(p[0], p[2]); });
     if (has("premultiplied"))
         pixels.each_colour([](double colour, double alpha) { return colour * alpha; });
     if (has("dark"))
         pixels.each_colour([](double colour, double) { return 0.8 * colour; });
+    if (has("pale"))
+        pixels.each_colour([](double colour, double) { return colour > 0 ? 0.5 + 0.5 * colour : 0; });
     if (has("linear_codes"))
         pixels.each_colour([](double colour, double) { return std::pow(colour, 2.2); });
     if (has("gamma_2_2"))
@@ -219,6 +228,8 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
     static Wrong *only = nullptr;
+    if (has("cancelled_create_is_internal") && host->cancelled(host))
+        return ARHOST_ERROR_INTERNAL;
     if (has("one_instance") && only && only->users > 0) {
         ++only->users;
         *instance = reinterpret_cast<arhost_instance *>(only);
@@ -226,8 +237,13 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     }
     auto *made = new Wrong;
     const arhost_status status = embree().create(host, options, count, &made->real);
+    if (has("shadows_add"))
+        embree().create(host, options, count, &made->glass_only);
     made->host = host;
     made->users = 1;
+    for (std::uint32_t i = 0; i < count; ++i)
+        if (options[i].key == std::string_view("threads"))
+            made->threads = options[i].integer;
     only = made;
     *instance = reinterpret_cast<arhost_instance *>(made);
     return status;
@@ -240,7 +256,35 @@ void destroy(arhost_instance *instance) {
     if (--self.users > 0)
         return;
     embree().destroy(self.real);
+    if (self.glass_only)
+        embree().destroy(self.glass_only);
     delete &self;
+}
+
+template <class T> std::span<const T> view(const arhost_scene &scene, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset), buffer.count};
+}
+bool has_degenerate_triangle(const arhost_scene &scene) {
+    using Triangle = std::array<std::uint32_t, 3>;
+    for (const auto &geometry : view<arhost_geometry>(scene, scene.geometries))
+        for (const Triangle &t : view<Triangle>(scene, geometry.indices))
+            if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
+                return true;
+    return false;
+}
+
+// Of the scene's virtual objects the others are far below.
+void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
+    const std::size_t size = setup.scene->byte_size;
+    self.glass_scene.reset(static_cast<std::byte *>(std::aligned_alloc(64, (size + 63) / 64 * 64)));
+    std::memcpy(self.glass_scene.get(), setup.scene, size);
+    auto *scene = reinterpret_cast<arhost_scene *>(self.glass_scene.get());
+    const auto materials = view<arhost_material>(*scene, scene->materials);
+    for (const arhost_object &object : view<arhost_object>(*scene, scene->objects))
+        if (object.role == ARHOST_VIRTUAL && materials[object.material].model != ARHOST_GLASS)
+            const_cast<arhost_object &>(object).world_from_object[11] -= 1e6f;
+    setup.scene = scene;
+    embree_functions().start(self.glass_only, &setup);
 }
 
 arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *setup) {
@@ -250,11 +294,15 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
         hang();
     if (has("writes_into_scene"))
         const_cast<arhost_scene *>(setup->scene)->max_depth = 1;
+    if (has("crash_on_degenerate") && has_degenerate_triangle(*setup->scene))
+        crash();
     if (has("starts_once") && std::exchange(wrong(instance).was_started, true))
         return ARHOST_ERROR_INTERNAL;
     const arhost_intrinsics intrinsics = spoil(*setup->intrinsics);
     arhost_raytracer_setup spoilt = *setup;
     spoilt.intrinsics = &intrinsics;
+    if (wrong(instance).glass_only)
+        start_glass_only(wrong(instance), spoilt);
     return embree_functions().start(wrong(instance).real, &spoilt);
 }
 
@@ -311,6 +359,8 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         const unsigned noise = images++ & 1;
         pixels.each([&](std::uint8_t *p) { p[1] = static_cast<std::uint8_t>(p[3] == 255 ? p[1] ^ noise : p[1]); });
     }
+    if (has("depends_on_threads") && self.threads == 2)
+        pixels.each_colour([](double colour, double) { return std::min(1.0, colour + 0.02); });
     if (has("stale_image")) {
         const std::size_t size = std::size_t{image->stride} * (image->height - 1) + std::size_t{4} * image->width;
         std::vector<std::uint8_t> now(image->rgba, image->rgba + size);
@@ -319,6 +369,17 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
                 std::copy_n(self.last.begin() + static_cast<std::ptrdiff_t>(image->stride) * y, 4 * image->width,
                             pixels.at(0, y));
         self.last = std::move(now);
+    }
+    if (self.glass_only) {
+        std::vector<std::uint8_t> bytes(std::size_t{image->stride} * image->height);
+        arhost_image other = *image;
+        other.rgba = bytes.data();
+        embree_functions().render(self.glass_only, &spoilt, &other, info);
+        for (std::uint32_t y = 0; y < image->height; ++y)
+            for (std::uint32_t x = 0; x < image->width; ++x)
+                if (std::uint8_t *ours = pixels.at(x, y); ours[3] == 153 && Pixels{other}.at(x, y)[3] == 77)
+                    ours[3] = 153 + 77;
+        info->has_region = 0;
     }
     if (has("small_region") && info->region_width > 4)
         info->region_width -= 4;
@@ -331,6 +392,8 @@ void stop(arhost_instance *instance) {
     if (has("crash_in_stop"))
         crash();
     embree_functions().stop(wrong(instance).real);
+    if (wrong(instance).glass_only)
+        embree_functions().stop(wrong(instance).glass_only);
 }
 
 const void *get_extension(const char *) {
