@@ -25,6 +25,7 @@ Result run(const Test &test, Context &context) {
     try {
         test.run(context);
         result.verdict = Verdict::pass;
+        result.message = context.note;
     } catch (const Failure &failure) {
         result.verdict = Verdict::fail;
         result.message = failure.what();
@@ -51,7 +52,7 @@ int run_child(const std::string &name, const Subject &subject) {
         if (name != test.name)
             continue;
         PluginLibrary library(subject.plugin, subject.settings, calls);
-        Context context{library, subject.reference, std::mt19937_64(subject.seed), ring::Json::object()};
+        Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         Result result = run(test, context);
         result.facts = context.facts;
         const std::string line = to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";

@@ -109,7 +109,7 @@ void reference(Context &context) {
         throw std::runtime_error("the reference '" + context.reference.string() +
                                  "' is not there; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
-    Context of_reference{library, context.reference, context.random, ring::Json::object()};
+    Context of_reference{library, context.reference, context.random};
     const Picture should = Tracer(of_reference, still_life()).render(of_still_life());
     const Picture is = Tracer(context, still_life()).render(of_still_life());
     // Silhouettes and shadows' edges may lie a pixel elsewhere.

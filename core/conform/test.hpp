@@ -47,7 +47,8 @@ struct Context {
     PluginLibrary &library;
     std::filesystem::path reference;         // the ray tracer to compare with
     std::mt19937_64 random;                  // of the seed, the same for every test
-    ring::Json facts = ring::Json::object(); // for the result
+    ring::Json facts = ring::Json::object(); // of abi.load: what the plugin tells of itself
+    std::string note{};                      // beside a pass: what was measured
 
     double uniform(double low, double high) {
         // std::uniform_real_distribution differs between libraries.

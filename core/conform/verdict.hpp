@@ -43,7 +43,7 @@ struct Result {
     double seconds = 0;
     std::vector<Exhibit> exhibits{};
     std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the exhibits
-    ring::Json facts = ring::Json::object();              // what abi.load tells of the plugin
+    ring::Json facts = ring::Json::object();              // of abi.load: the descriptor
 };
 
 } // namespace arhost::conform
