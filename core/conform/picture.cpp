@@ -67,10 +67,10 @@ std::string Picture::damage() const {
     return {};
 }
 
-bool Picture::is_flat(std::uint32_t x, std::uint32_t y) const {
+bool Picture::is_smooth(std::uint32_t x, std::uint32_t y) const {
     for (std::uint32_t j = y - (y > 0); j <= std::min(y + 1, height_ - 1); ++j)
         for (std::uint32_t i = x - (x > 0); i <= std::min(x + 1, width_ - 1); ++i)
-            if (alpha(i, j) != alpha(x, y))
+            if (alpha(i, j) != alpha(x, y) || differs(at(i, j), at(x, y), 24))
                 return false;
     return true;
 }

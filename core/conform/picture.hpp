@@ -30,8 +30,8 @@ public:
     // What was written beside the pixels, as the end of a sentence; empty: nothing.
     std::string damage() const;
 
-    // Alpha 1 pixel around is the same as here: no silhouette or shadow's edge is near.
-    bool is_flat(std::uint32_t x, std::uint32_t y) const;
+    // The pixels around have the same alpha and nearly the same colour: no edge is near, nor an edge's reflection.
+    bool is_smooth(std::uint32_t x, std::uint32_t y) const;
 
     std::string png_base64() const;
 
