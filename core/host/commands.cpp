@@ -355,4 +355,15 @@ int print_schema(bool markdown) {
     return success;
 }
 
+int conform(std::vector<std::string> arguments) {
+    const std::string program = own_folder() / "arhost-conform";
+    arguments.insert(arguments.begin(), program);
+    std::vector<char *> argv;
+    for (std::string &argument : arguments)
+        argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    ::execv(program.c_str(), argv.data());
+    throw yaml::Error(program + " can't be executed: " + std::strerror(errno));
+}
+
 } // namespace arhost::host

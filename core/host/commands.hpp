@@ -40,6 +40,8 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 int check(const Arguments &arguments, supervise::Starter &launcher);
 int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher);
 int print_schema(bool markdown);
+// Becomes arhost-conform, which lies beside this program: the host itself opens no plugin.
+int conform(std::vector<std::string> arguments);
 
 // Where this arhost is installed: <prefix>/bin/arhost.
 std::filesystem::path own_prefix();

@@ -116,6 +116,10 @@ int main(int argc, char **argv) {
         ->required()
         ->check(CLI::IsMember(plugin_languages));
     new_plugin_command->add_option("--into", plugin.into, "The folder to make it in (here)")->type_name("DIR");
+    CLI::App *conform_command =
+        app.add_subcommand("conform", "Try whether a plugin keeps the ABI's promises (docs/conformance.md)");
+    conform_command->set_help_flag(); // the program that it becomes has its own
+    conform_command->prefix_command();
 
     try {
         app.parse(argc, argv);
@@ -127,6 +131,8 @@ int main(int argc, char **argv) {
             return print_schema(markdown);
         if (*new_plugin_command)
             return new_plugin(plugin, own_prefix());
+        if (*conform_command)
+            return conform(conform_command->remaining());
         arhost::supervise::Launcher launcher; // before any thread
         if (*replay_command)
             return replay(arguments, replay_arguments, launcher);

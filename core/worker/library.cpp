@@ -32,46 +32,53 @@ bool kind_is_complete(arhost_kind kind, const void *functions) {
     }
 }
 
+[[noreturn]] void refuse(const std::filesystem::path &file, const std::string &why) {
+    throw std::runtime_error(file.string() + ": " + why);
+}
+
 } // namespace
 
-const arhost_plugin &open_plugin(const std::filesystem::path &file) {
-    const auto refuse = [&](const std::string &why) { throw std::runtime_error(file.string() + ": " + why); };
+const arhost_entry_point &open_library(const std::filesystem::path &file) {
     void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library)
-        refuse(std::string("can't be loaded: ") + ::dlerror());
+        refuse(file, std::string("can't be loaded: ") + ::dlerror());
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
-        refuse("is no arhost plugin: it exports no symbol 'arhost_entry'");
+        refuse(file, "is no arhost plugin: it exports no symbol 'arhost_entry'");
     if (entry->struct_size < sizeof(arhost_entry_point) || !entry->negotiate)
-        refuse("its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
+        refuse(file,
+               "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
+    return *entry;
+}
 
+const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
     arhost_answer answer{sizeof answer, 0xffffffffu, nullptr};
-    const arhost_status status = entry->negotiate(&offer, &answer);
+    const arhost_status status = entry.negotiate(&offer, &answer);
     const std::string versions = "this arhost speaks ABI version " + std::to_string(ARHOST_ABI_VERSION);
     if (status != ARHOST_OK)
-        refuse("refused the ABI version; " + versions + ": build the plugin against its headers");
+        refuse(file, "refused the ABI version; " + versions + ": build the plugin against its headers");
     if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
-        refuse("chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
-               ": build the plugin against its headers");
+        refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
+                         ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
     if (!plugin || plugin->struct_size < sizeof(arhost_plugin))
-        refuse("its negotiate gave no (whole) arhost_plugin");
+        refuse(file, "its negotiate gave no (whole) arhost_plugin");
     if (!plugin->descriptor || plugin->descriptor->struct_size < sizeof(arhost_descriptor) || !plugin->descriptor->id)
-        refuse("has no (whole) descriptor");
+        refuse(file, "has no (whole) descriptor");
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
-        refuse("its id is '" + id + "'; the file must bear that name");
+        refuse(file, "its id is '" + id + "'; the file must bear that name");
     if (!plugin->create || !plugin->destroy || !plugin->get_extension)
-        refuse("lacks create, destroy or get_extension");
+        refuse(file, "lacks create, destroy or get_extension");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
-        refuse("its descriptor counts options but lists none");
+        refuse(file, "its descriptor counts options but lists none");
     if (plugin->descriptor->option_count > 0 &&
         (plugin->descriptor->options->struct_size < sizeof(arhost_option_descriptor) ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
-        refuse("its options' struct_size is not that of an arhost_option_descriptor");
+        refuse(file, "its options' struct_size is not that of an arhost_option_descriptor");
     if (!plugin->functions || !kind_is_complete(plugin->descriptor->kind, plugin->functions))
-        refuse("its kind is unknown or lacks a function that the kind must have");
+        refuse(file, "its kind is unknown or lacks a function that the kind must have");
     return *plugin;
 }
 

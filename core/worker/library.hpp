@@ -9,7 +9,8 @@
 
 namespace arhost::worker {
 
-// Stays open until the process ends. Throws std::runtime_error with a sentence for the user.
-const arhost_plugin &open_plugin(const std::filesystem::path &file);
+// Both throw std::runtime_error with a sentence for the user. The library stays open until the process ends.
+const arhost_entry_point &open_library(const std::filesystem::path &file);
+const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry);
 
 } // namespace arhost::worker

@@ -210,10 +210,15 @@ int serve(Link &link) {
     policy.readable.push_back(std::filesystem::weakly_canonical(file, ignored).parent_path());
     give_shader_cache(policy, file);
     const sandbox::Level level = enter_sandbox(link, policy);
-    const arhost_plugin *plugin = nullptr;
+    const arhost_entry_point *entry = nullptr;
     {
         Link::InCall call(link, Call::load);
-        plugin = &open_plugin(file);
+        entry = &open_library(file);
+    }
+    const arhost_plugin *plugin = nullptr;
+    {
+        Link::InCall call(link, Call::negotiate);
+        plugin = &negotiate(file, *entry);
     }
     ::prctl(PR_SET_NAME, plugin->descriptor->id);
     link.send(

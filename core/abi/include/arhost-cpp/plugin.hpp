@@ -215,6 +215,8 @@ template <class T> inline constexpr arhost_sink sink_functions = make_sink_funct
 
 // Answers a loader's offer for `plugin`; what ARHOST_SOURCE and its like define negotiate with.
 inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer, const arhost_plugin &plugin) {
+    if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
+        return ARHOST_ERROR_INVALID_ARGUMENT;
     const std::uint32_t spoken = ARHOST_ABI_VERSION;
     if (std::clamp(spoken, offer->oldest_abi_version, offer->newest_abi_version) != spoken)
         return ARHOST_ERROR_UNSUPPORTED;

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The process of one test: this program, executed anew by runner.cpp.
+#pragma once
+
+#include "conform/plugin_library.hpp"
+#include "conform/verdict.hpp"
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace arhost::conform {
+
+// What every test of a run is told.
+struct Subject {
+    std::filesystem::path plugin, reference;
+    Settings settings;
+    std::uint64_t seed = 1;
+};
+
+// The descriptors that a child finds.
+inline constexpr int result_fd = 3, call_page_fd = 4;
+
+// Runs one test and writes its result to `result_fd` as a line of JSON. Returns the exit status.
+int run_child(const std::string &test, const Subject &subject);
+
+ring::Json to_json(const Result &result);
+Result result_from_json(const ring::Json &json);
+
+} // namespace arhost::conform

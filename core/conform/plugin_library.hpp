@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plugin in the process of a test: opened as arhost-worker opens it, instances made of it, and the host
+// that they speak with.
+#pragma once
+
+#include "ring/memory.hpp"
+#include "ring/protocol.hpp"
+
+#include <arhost/arhost.h>
+
+#include <atomic>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace arhost::conform {
+
+// The call that the plugin is in, in memory that the parent reads once this process is dead.
+class CallPage {
+public:
+    explicit CallPage(ring::Mapping mapping) : mapping_(std::move(mapping)) {}
+    // Relaxed: the parent reads it after this process has ended.
+    void mark(ring::Call call) const { word().store(static_cast<std::uint32_t>(call), std::memory_order_relaxed); }
+    ring::Call read() const { return static_cast<ring::Call>(word().load(std::memory_order_relaxed)); }
+
+private:
+    std::atomic<std::uint32_t> &word() const { return mapping_.as<std::atomic<std::uint32_t>>(); }
+    ring::Mapping mapping_;
+};
+
+// Calls a function of the plugin under its name.
+template <class Function> auto in_call(const CallPage &calls, ring::Call call, Function &&function) {
+    struct Mark {
+        const CallPage &calls;
+        ~Mark() { calls.mark(ring::Call::none); }
+    };
+    calls.mark(call);
+    const Mark end{calls};
+    return function();
+}
+
+using Settings = std::map<std::string, std::string>; // option values as they would stand in the YAML
+
+class PluginLibrary {
+public:
+    // `settings`: the user's, in place of defaults. Opens nothing yet.
+    PluginLibrary(std::filesystem::path file, Settings settings, const CallPage &calls)
+        : file_(std::move(file)), settings_(std::move(settings)), calls_(calls) {}
+
+    // Opened at the first call; throws std::runtime_error where arhost-worker would refuse it.
+    const arhost_entry_point &entry();
+    const arhost_plugin &plugin();
+    const arhost_descriptor &descriptor() { return *plugin().descriptor; }
+    const arhost_option_descriptor *option(const std::string &key); // nullptr: not declared
+
+    const std::filesystem::path &file() const { return file_; }
+    const Settings &settings() const { return settings_; }
+    const CallPage &calls() const { return calls_; }
+
+private:
+    std::filesystem::path file_;
+    Settings settings_;
+    const CallPage &calls_;
+    const arhost_entry_point *entry_ = nullptr;
+    const arhost_plugin *plugin_ = nullptr;
+};
+
+// The options in a descriptor, stepped through as the ABI says.
+std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
+
+// The value that a text is for an option, or why it is none.
+arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text);
+
+class Host {
+public:
+    Host();
+    Host(const Host &) = delete;
+    Host &operator=(const Host &) = delete;
+
+    const arhost_host *get() const { return &host_; }
+    void cancel() { cancelled_ = true; }
+    std::vector<std::string> log() const;
+    std::string last_error() const; // "": there was none
+
+private:
+    static Host &self(const arhost_host *host) { return *static_cast<Host *>(host->context); }
+    arhost_host host_;
+    mutable std::mutex mutex_; // plugins log on threads of their own
+    std::vector<std::string> log_;
+    std::string last_error_;
+    std::atomic<bool> cancelled_{false};
+};
+
+// From create to destroy.
+class Instance {
+public:
+    // `overrides` stand above the user's settings.
+    explicit Instance(PluginLibrary &library, Settings overrides = {});
+    ~Instance() { destroy(); }
+    Instance(const Instance &) = delete;
+    Instance &operator=(const Instance &) = delete;
+
+    void create_or_fail();  // throws Failure
+    arhost_status create(); // as it comes
+    void destroy();
+
+    arhost_instance *get() const { return instance_; }
+    Host &host() { return host_; }
+    PluginLibrary &library() const { return library_; }
+
+    // Throws Failure unless `status` is ARHOST_OK, with what the plugin said.
+    void expect_ok(const char *call, arhost_status status) const;
+
+private:
+    PluginLibrary &library_;
+    Settings settings_;
+    Host host_;
+    arhost_instance *instance_ = nullptr;
+};
+
+// "OK", "INVALID_ARGUMENT", …; "0, which is no status".
+std::string status_name(arhost_status status);
+
+} // namespace arhost::conform

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conform/runner.hpp"
+
+#include "ring/memory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <list>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+namespace arhost::conform {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using ring::Call;
+using ring::UniqueFd;
+
+std::string place(Call call, const Test &test) {
+    constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
+    switch (call) {
+    case Call::none:
+        return " between calls";
+    case Call::load:
+        return " while its library was loaded";
+    case Call::negotiate:
+        return " in negotiate";
+    case Call::create:
+        return " in create";
+    case Call::start:
+        return " in start";
+    case Call::per_frame:
+        return fmt::format(" in {}", per_frame[test.kind]);
+    case Call::idle:
+        return " in idle";
+    case Call::stop:
+        return " in stop";
+    case Call::destroy:
+        return " in destroy";
+    }
+    return " in an unknown call";
+}
+
+// In the child, after fork.
+[[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, pid_t parent) {
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) // it died before the line above
+        ::_exit(127);
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
+    const int high_pipe = ::fcntl(pipe, F_DUPFD_CLOEXEC, 10), high_page = ::fcntl(page, F_DUPFD_CLOEXEC, 10);
+    ::dup2(high_pipe, result_fd);
+    ::dup2(high_page, call_page_fd);
+    ::dup2(STDERR_FILENO, STDOUT_FILENO); // what a plugin prints is no part of the report
+    std::vector<char *> argv;
+    for (const std::string &argument : arguments)
+        argv.push_back(const_cast<char *>(argument.c_str()));
+    argv.push_back(nullptr);
+    ::execv("/proc/self/exe", argv.data());
+    ::_exit(127);
+}
+
+class Child {
+public:
+    Child(const Test &test, const RunSettings &settings)
+        : test_(test), begin_(Clock::now()),
+          deadline_(begin_ + std::chrono::duration_cast<Clock::duration>(test.deadline * settings.patience)),
+          memory_(ring::SharedMemory::create("arhost-conform-call", sizeof(Call))),
+          calls_(memory_.map(ring::Access::read_only)) {
+        int ends[2];
+        if (::pipe2(ends, O_CLOEXEC) != 0)
+            ring::throw_errno("pipe2");
+        pipe_.reset(ends[0]);
+        const UniqueFd write_end(ends[1]);
+        const Subject &subject = settings.subject;
+        std::vector<std::string> arguments = {"arhost-conform", subject.plugin,   "--run",
+                                              test.name,        "--seed",         std::to_string(subject.seed),
+                                              "--reference",    subject.reference};
+        for (const auto &[key, value] : subject.settings)
+            arguments.insert(arguments.end(), {"--set", key + "=" + value});
+        const pid_t parent = ::getpid();
+        pid_ = ::fork();
+        if (pid_ == 0)
+            become(arguments, write_end.get(), memory_.fd(), parent);
+        if (pid_ < 0)
+            ring::throw_errno("fork");
+        ::setpgid(pid_, pid_); // here too: who comes first is open
+    }
+    ~Child() {
+        if (pid_ > 0)
+            end();
+    }
+    Child(const Child &) = delete;
+    Child &operator=(const Child &) = delete;
+
+    int fd() const { return closed_ ? -1 : pipe_.get(); }
+    Clock::time_point deadline() const { return deadline_; }
+
+    // Takes what has come. True once the test is over: it ended, or its time is up.
+    bool poll() {
+        const bool ended = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
+        take(); // afterwards: what it wrote at the end is there now
+        ended_ = ended;
+        return ended_ || Clock::now() >= deadline_;
+    }
+
+    Result finish() {
+        const bool in_time = ended_, told = text_.ends_with('\n');
+        const std::string where = told ? " when the process ended" : place(calls_.read(), test_);
+        end();
+        Result result;
+        try {
+            if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && told) {
+                result = result_from_json(ring::Json::parse(text_));
+            } else if (!in_time) {
+                result.verdict = Verdict::timeout;
+                result.message = fmt::format("no end after {:.3g} s{}",
+                                             std::chrono::duration<double>(deadline_ - begin_).count(), where);
+            } else {
+                result.verdict = Verdict::crashed;
+                result.message =
+                    WIFSIGNALED(status_)
+                        ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
+                        : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
+            }
+        } catch (const std::exception &error) {
+            result.message = std::string("the result can't be read: ") + error.what();
+        }
+        result.test = test_.name;
+        result.seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+        return result;
+    }
+
+private:
+    void take() {
+        char buffer[1 << 16];
+        pollfd ready{pipe_.get(), POLLIN, 0};
+        while (!closed_ && ::poll(&ready, 1, 0) > 0) { // children of the plugin's may keep it open
+            const ssize_t count = ::read(pipe_.get(), buffer, sizeof buffer);
+            if (count > 0)
+                text_.append(buffer, static_cast<std::size_t>(count));
+            closed_ = count <= 0;
+        }
+    }
+    void end() {
+        ::kill(-pid_, SIGKILL); // and what the plugin has started
+        if (!ended_)
+            ::waitpid(pid_, &status_, 0);
+        pid_ = 0;
+    }
+
+    const Test &test_;
+    Clock::time_point begin_, deadline_;
+    ring::SharedMemory memory_;
+    CallPage calls_;
+    UniqueFd pipe_;
+    pid_t pid_ = 0;
+    std::string text_;
+    bool closed_ = false, ended_ = false;
+    int status_ = 0;
+};
+
+const Result *find(const std::vector<Result> &results, const std::string &test) {
+    const auto found = std::find_if(results.begin(), results.end(), [&](const Result &r) { return r.test == test; });
+    return found == results.end() ? nullptr : &*found;
+}
+
+void wait(const std::list<Child> &running) {
+    std::vector<pollfd> fds;
+    for (const Child &child : running)
+        fds.push_back({child.fd(), POLLIN, 0}); // -1, which poll passes over, once it is closed
+    ::poll(fds.data(), fds.size(), 2);          // an end of a process closes no pipe that its children hold
+}
+
+} // namespace
+
+Result run_alone(const Test &test, const RunSettings &settings) {
+    std::list<Child> running;
+    Child &child = running.emplace_back(test, settings);
+    while (!child.poll())
+        wait(running);
+    return child.finish();
+}
+
+void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
+             const std::function<void(const Result &)> &on_result) {
+    const auto is_waited_for = [&](const std::string &name) {
+        return !find(results, name) &&
+               std::any_of(tests.begin(), tests.end(), [&](const Test &test) { return name == test.name; });
+    };
+    const auto take = [&](Result result) {
+        on_result(result);
+        results.push_back(std::move(result));
+    };
+    std::list<const Test *> waiting;
+    for (const Test &test : tests)
+        if (!find(results, test.name))
+            waiting.push_back(&test);
+    std::list<Child> running;
+    while (!waiting.empty() || !running.empty()) {
+        for (auto it = waiting.begin(); it != waiting.end() && running.size() < settings.jobs;) {
+            const Test &test = **it;
+            if (is_waited_for(test.needs)) {
+                ++it;
+                continue;
+            }
+            it = waiting.erase(it);
+            const Result *need = find(results, test.needs);
+            if (need && need->verdict != Verdict::pass)
+                take({test.name, Verdict::skip, fmt::format("needs {}, which has not passed", test.needs)});
+            else
+                running.emplace_back(test, settings);
+        }
+        wait(running);
+        for (auto it = running.begin(); it != running.end();) {
+            if (it->poll()) {
+                take(it->finish());
+                it = running.erase(it);
+            } else {
+                ++it;
+            }
+        }
+    }
+}
+
+} // namespace arhost::conform

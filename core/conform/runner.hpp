@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Runs tests, each in a process of its own with a deadline. Nothing of the plugin is opened in this one.
+#pragma once
+
+#include "conform/child.hpp"
+#include "conform/test.hpp"
+
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace arhost::conform {
+
+struct RunSettings {
+    Subject subject;
+    unsigned jobs = 1;
+    double patience = 1; // times each deadline
+};
+
+Result run_alone(const Test &test, const RunSettings &settings);
+
+// `results` may begin with those of tests that were run before. A test whose need has not passed is skipped;
+// a need that is not among the tests counts as passed.
+void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
+             const std::function<void(const Result &)> &on_result);
+
+} // namespace arhost::conform

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A test: one sentence that a plugin must keep, and a function that tries it. It runs in a process of its
+// own and says what is wrong by throwing.
+#pragma once
+
+#include "conform/picture.hpp"
+#include "conform/plugin_library.hpp"
+#include "conform/verdict.hpp"
+
+#include <arhost/plugin.h>
+
+#include <chrono>
+#include <filesystem>
+#include <random>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+namespace arhost::conform {
+
+// The plugin is wrong: a sentence with numbers, and the images that show it. Any other std::exception is an
+// error of the suite.
+class Failure : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+    Failure with(std::string label, const Picture &picture) && {
+        pictures.emplace_back(std::move(label), picture);
+        return std::move(*this);
+    }
+    Failure at(unsigned x, unsigned y) && {
+        wrong_pixel = {x, y};
+        return std::move(*this);
+    }
+    std::vector<std::pair<std::string, Picture>> pictures;
+    std::optional<std::array<unsigned, 2>> wrong_pixel;
+};
+struct Skip : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+struct Warning : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// What a test is given.
+struct Context {
+    PluginLibrary &library;
+    std::filesystem::path reference;         // the ray tracer to compare with
+    std::mt19937_64 random;                  // of the seed, the same for every test
+    ring::Json facts = ring::Json::object(); // of abi.load: what the plugin tells of itself
+    std::string note{};                      // beside a pass: what was measured
+
+    double uniform(double low, double high) {
+        // std::uniform_real_distribution differs between libraries.
+        return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    }
+};
+
+struct Test {
+    const char *name;    // "raytracer.miss-alpha"
+    const char *promise; // what a plugin that passes does
+    arhost_kind kind;    // 0: any
+    const char *needs;   // the test without whose passing this one would say nothing; "": none
+    std::chrono::milliseconds deadline;
+    void (*run)(Context &);
+};
+
+using namespace std::chrono_literals;
+
+// In the order that they run in: what a test needs stands before it.
+std::span<const Test> abi_tests();
+std::span<const Test> raytracer_alpha_tests();
+std::span<const Test> raytracer_camera_tests();
+std::span<const Test> raytracer_image_tests();
+std::span<const Test> raytracer_life_tests();
+std::span<const Test> raytracer_light_tests();
+
+inline std::vector<Test> all_tests() {
+    std::vector<Test> all;
+    for (const auto part : {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
+                            raytracer_light_tests(), raytracer_image_tests()})
+        all.insert(all.end(), part.begin(), part.end());
+    return all;
+}
+
+} // namespace arhost::conform

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Starts `arhost conform` of this build in a scratch folder.
+#pragma once
+
+#include "arhost_run.hpp"
+
+#include <set>
+
+namespace arhost::test {
+
+class ConformRun {
+public:
+    int run(std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), "conform");
+        run_.start(std::move(arguments));
+        return run_.wait(std::chrono::minutes(3));
+    }
+    std::string output() const { return run_.output(); }
+    std::string read(const std::string &name) const { return run_.read(name); }
+    nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }
+    std::filesystem::path path(const std::string &name) const { return run_.path(name); }
+
+    // The wrong ray tracer with this defect.
+    std::filesystem::path link_wrong(const std::string &defect) const {
+        const std::filesystem::path link = path("rt_" + defect + ".so");
+        std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") +
+                                            (defect == "exports_more" ? "wrong_exports_more.so" : "wrong.so"),
+                                        link);
+        return link;
+    }
+
+    static std::set<std::string> test_names() {
+        ConformRun run;
+        run.run({"--list"});
+        std::istringstream lines(run.output());
+        std::set<std::string> names;
+        for (std::string name, promise; lines >> name && std::getline(lines, promise);)
+            names.insert(name);
+        return names;
+    }
+
+private:
+    ArhostRun run_;
+};
+
+} // namespace arhost::test
