@@ -7,39 +7,44 @@
 namespace arhost::conform {
 namespace {
 
+struct Size {
+    std::uint32_t width, height;
+};
+
 void writes_every_pixel(Context &context) {
-    for (const auto &[width, height] : {std::pair(160u, 120u), {1u, 1u}, {17u, 13u}, {1u, 40u}, {67u, 1u}}) {
-        const arhost_camera view = from_front(pinhole(width, height));
+    for (const Size &size : {Size{160, 120}, {1u, 1u}, {17u, 13u}, {1u, 40u}, {67u, 1u}}) {
+        const arhost_camera view = from_front(pinhole(size.width, size.height));
         Tracer tracer(context, one_sphere({0, 0, 0, 30}));
         const Picture on_zeros = tracer.render(view, nullptr, 0x00), on_ones = tracer.render(view, nullptr, 0xff);
         expect_pixels(on_zeros, [&](auto x, auto y) {
             const Pixel none{0, 0, 0, 0}, all{255, 255, 255, 255};
             return on_zeros.at(x, y) != none || on_ones.at(x, y) != all
                        ? ""
-                       : fmt::format("of a {}×{} image, it keeps what was there before, zeros or ones", width,
-                                     height);
+                       : fmt::format("of a {}×{} image, it keeps what was there before, zeros or ones", size.width,
+                                     size.height);
         });
     }
 }
 
 void writes_nothing_else(Context &context) {
-    for (const auto &[width, height] : {std::pair(160u, 120u), {1u, 1u}, {17u, 13u}, {33u, 65u}}) {
-        const Picture picture = Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(width, height)));
+    for (const Size &size : {Size{160, 120}, {1u, 1u}, {17u, 13u}, {33u, 65u}}) {
+        const Picture picture =
+            Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(size.width, size.height)));
         if (const std::string damage = picture.damage(); !damage.empty())
-            throw Failure(fmt::format("of a {}×{} image, it wrote {}", width, height, damage));
+            throw Failure(fmt::format("of a {}×{} image, it wrote {}", size.width, size.height, damage));
     }
 }
 
 void sizes(Context &context) {
-    for (const auto &[width, height] : {std::pair(1u, 1u), {17u, 13u}, {3u, 5u}, {31u, 1u}, {1u, 31u}}) {
+    for (const Size &size : {Size{1, 1}, {17u, 13u}, {3u, 5u}, {31u, 1u}, {1u, 31u}}) {
         const Picture picture =
-            Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(width, height, 100)));
+            Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(size.width, size.height, 100)));
         expect_pixels(picture, [&](auto x, auto y) {
             const bool hit = distance_from_centre(picture, x, y) < 100 * 30 / 200.0 - 2;
             const int alpha = picture.alpha(x, y);
-            return !hit || alpha >= 250
-                       ? ""
-                       : fmt::format("of a {}×{} image, the sphere is here but alpha is {}", width, height, alpha);
+            return !hit || alpha >= 250 ? ""
+                                        : fmt::format("of a {}×{} image, the sphere is here but alpha is {}",
+                                                      size.width, size.height, alpha);
         });
     }
 }

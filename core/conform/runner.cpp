@@ -61,6 +61,7 @@ std::string place(Call call, const Test &test) {
     ::dup2(high_page, call_page_fd);
     ::dup2(STDERR_FILENO, STDOUT_FILENO); // what a plugin prints is no part of the report
     std::vector<char *> argv;
+    argv.reserve(arguments.size() + 1);
     for (const std::string &argument : arguments)
         argv.push_back(const_cast<char *>(argument.c_str()));
     argv.push_back(nullptr);

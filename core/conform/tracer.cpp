@@ -3,12 +3,23 @@
 
 #include "ring/unique_fd.hpp"
 
-#include <cstring>
+#include <algorithm>
 #include <sys/mman.h>
+#include <tuple>
 
 namespace arhost::conform {
 
 using ring::Call;
+
+namespace {
+
+bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
+    return std::tie(a.width, a.height, a.distortion, a.fx, a.fy, a.cx, a.cy) ==
+               std::tie(b.width, b.height, b.distortion, b.fx, b.fy, b.cx, b.cy) &&
+           std::equal(std::begin(a.coefficients), std::end(a.coefficients), std::begin(b.coefficients));
+}
+
+} // namespace
 
 SealedScene::SealedScene(scene::ArenaBuilder builder) : memory_(nullptr), size_(builder.byte_size()) {
     memory_ = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -68,7 +79,7 @@ arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, 
 }
 
 Picture Tracer::render(const arhost_camera &camera, const arhost_motion *motion, std::uint8_t fill) {
-    if (!started_ || std::memcmp(&*started_, &camera.intrinsics, sizeof camera.intrinsics) != 0)
+    if (!started_ || !same(*started_, camera.intrinsics))
         start(camera.intrinsics);
     Picture picture(camera.intrinsics.width, camera.intrinsics.height, fill);
     instance_.expect_ok("render", try_render(camera, picture, info_, motion));

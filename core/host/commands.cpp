@@ -359,6 +359,7 @@ int conform(std::vector<std::string> arguments) {
     const std::string program = own_folder() / "arhost-conform";
     arguments.insert(arguments.begin(), program);
     std::vector<char *> argv;
+    argv.reserve(arguments.size() + 1);
     for (std::string &argument : arguments)
         argv.push_back(argument.data());
     argv.push_back(nullptr);

@@ -38,6 +38,7 @@ bool has(std::string_view defect) {
 }
 
 void crash() {
+    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may have its own
     std::raise(SIGSEGV);
 }
 void hang() {
