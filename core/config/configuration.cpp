@@ -191,9 +191,6 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
             scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
     }
-    if (!configuration.source && !configuration.raytracer)
-        trajectory_node->fail("a trajectory needs a 'source', which it gives cameras to, or a 'raytracer', which "
-                              "traces it alone");
     if (const auto node = root.find("coordinates")) {
         node->allow_keys(keys_of("coordinates"));
         configuration.coordinates = camera::parse_coordinates(*node);
@@ -228,6 +225,9 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             if (type != character) // /dev/null takes both
                 files.write(*node);
         }
+    if (!configuration.source && !configuration.raytracer)
+        trajectory_node->fail("a trajectory needs a 'source', which it gives cameras to, or a 'raytracer', which "
+                              "traces it alone");
     return configuration;
 }
 

@@ -58,8 +58,8 @@ constexpr arhost_descriptor descriptor = {
     "@NAME@", // the file's name
     "@NAME@",
     "0.1.0",
-    "", // FILL IN: you
-    "", // FILL IN: the licence (SPDX), "Apache-2.0"
+    "unknown", // FILL IN: you
+    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
     "Writes each frame as a picture (PPM).",
     0,
     std::size(options),

@@ -80,8 +80,8 @@ constexpr arhost_descriptor descriptor = {
     "@NAME@", // the file's name
     "@NAME@",
     "0.1.0",
-    "", // FILL IN: you
-    "", // FILL IN: the licence (SPDX), "Apache-2.0"
+    "unknown", // FILL IN: you
+    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
     "Takes the brightest patch for the marker.",
     0,
     std::size(options),
