@@ -163,6 +163,12 @@ macro_rules! plugin {
                 offer: *const $crate::arhost_offer,
                 answer: *mut $crate::arhost_answer,
             ) -> $crate::arhost_status {
+                // Before there is a reference to a struct of which a part may not be there.
+                if (*offer).struct_size < std::mem::size_of::<$crate::arhost_offer>() as u32
+                    || (*answer).struct_size < std::mem::size_of::<$crate::arhost_answer>() as u32
+                {
+                    return $crate::ARHOST_ERROR_UNSUPPORTED;
+                }
                 $crate::negotiate(&*offer, &mut *answer, &PLUGIN)
             }
             #[no_mangle]

@@ -149,8 +149,8 @@ static const arhost_descriptor descriptor = {
     .id = "@NAME@", /* the file's name */
     .name = "@NAME@",
     .version = "0.1.0",
-    .vendor = "",  /* FILL IN */
-    .licence = "", /* FILL IN: SPDX, "Apache-2.0" */
+    .vendor = "unknown", /* FILL IN: you */
+    .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
     .description = "Draws a sphere.",
     .option_count = sizeof options / sizeof *options,
     .options = options,
@@ -159,6 +159,8 @@ static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, cre
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
+    if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
+        return ARHOST_ERROR_UNSUPPORTED; /* of a version before this one */
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
         return ARHOST_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
