@@ -10,6 +10,7 @@
 #define CAPABILITIES 0
 #endif
 
+#include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -31,7 +32,13 @@ public:
             for (std::string line; std::getline(old, line) && !old.eof() && std::stoull(line) < setup.first_sequence;)
                 kept += line + "\n";
         }
-        std::ofstream(path_, std::ios::trunc) << kept << std::flush;
+        if (setup.first_sequence == 0) {
+            std::ofstream(path_, std::ios::trunc) << std::flush;
+            return;
+        }
+        // A kill in between must lose nothing.
+        std::ofstream(path_ + ".new", std::ios::trunc) << kept << std::flush;
+        std::rename((path_ + ".new").c_str(), path_.c_str());
     }
 
     arhost_status write(const arhost_output &output) {
