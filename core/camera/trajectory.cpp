@@ -82,14 +82,11 @@ public:
     }
     bool is_null() const { return value_->is_null(); }
     std::int64_t integer() const {
+        if (value_->is_structured()) // its text could nest without end
+            fail("must be a whole number");
         if (!value_->is_number_integer() ||
             (value_->is_number_unsigned() && value_->get<std::uint64_t>() > std::uint64_t(INT64_MAX)))
-            fail("must be a whole number" +
-                 (value_->is_structured()
-                      ? ""
-                      : ", is " +
-                            value_->dump(-1, ' ', false,
-                                         Json::error_handler_t::replace))); // what is nested can be so without end
+            fail("must be a whole number, is " + value_->dump(-1, ' ', false, Json::error_handler_t::replace));
         return value_->get<std::int64_t>();
     }
     void read(double (&to)[3]) const {
