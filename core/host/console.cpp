@@ -45,6 +45,7 @@ Console::~Console() {
     clear_line();
     if (const std::size_t lost = thread_->overrun_counter())
         log_->warn("{} lines were lost, since nobody took them from stderr", lost);
+    thread_.reset(); // writes what waits and joins: nothing of the loggers is in use when they go
 }
 
 void Console::clear_line() {
