@@ -7,6 +7,8 @@ import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/release"
+if not (BUILD / "bin/arhost").exists():
+    raise SystemExit(f"{BUILD}/bin/arhost is not there: build it with tools/test")
 WIDTH, HEIGHT = 800, 600
 
 

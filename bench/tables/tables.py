@@ -211,6 +211,8 @@ def print_overhead(frames, rounds):
 def main():
     quick = "--quick" in sys.argv[1:]
     parts = [word for word in sys.argv[1:] if word != "--quick"] or ["overhead", "tables", "figures"]
+    if unknown := set(parts) - {"overhead", "tables", "figures"}:
+        raise SystemExit(f"{', '.join(sorted(unknown))}: there are the parts overhead, tables and figures")
     OUT.mkdir(parents=True, exist_ok=True)
     make_frame()
     file = OUT / ("quick.json" if quick else "tables.json")  # parts that are not measured now keep their figures
