@@ -62,7 +62,7 @@ void SceneLoading::on_died(const supervise::Death &death) {
         SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
         const Mapping mapping = arena.map(Access::read_only);
         if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
-            return hooks.failed("the loaded scene is not valid: " + fault);
+            return hooks.failed(scene_ + ": the loaded scene is not valid, which is a fault of arhost: " + fault);
         hooks.loaded(std::move(arena));
     } catch (const std::exception &error) {
         hooks.failed(std::string("the scene loader's memory can't be used: ") + error.what());

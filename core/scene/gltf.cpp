@@ -89,12 +89,19 @@ void check_structure(const MeshText &text) {
         const auto found = root.find(key);
         return found != root.end() && found->is_array() ? *found : Json::array();
     };
-    const auto number = [](const Json &object, const char *key) -> std::uint64_t {
-        const auto found = object.is_object() ? object.find(key) : object.end();
-        return object.is_object() && found != object.end() && found->is_number_unsigned()
-                   ? found->get<std::uint64_t>()
-                   : 0;
+    const auto number = [&](const Json &object, const char *key) -> std::uint64_t {
+        if (!object.is_object() || !object.contains(key))
+            return 0;
+        if (!object[key].is_number_unsigned())
+            text.fail("has a " + std::string(key) + " that is not a number from 0 on");
+        return object[key].get<std::uint64_t>();
     };
+    const Json asset = root.value("asset", Json());
+    const Json version = asset.is_object() ? asset.value("version", Json()) : Json();
+    if (!version.is_string() || !version.get<std::string>().starts_with("2."))
+        text.fail("is not glTF 2: its asset.version must be \"2.0\"");
+    for (const Json &accessor : list("accessors"))
+        number(accessor, "byteOffset");
     const Json buffers = list("buffers"), views = list("bufferViews");
     for (std::size_t i = 0; i < views.size(); ++i) {
         const std::uint64_t buffer = number(views[i], "buffer"), offset = number(views[i], "byteOffset"),
@@ -166,6 +173,10 @@ public:
         const auto width =
             static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
         const std::size_t size = size_of(accessor.componentType, name);
+        if (std::is_integral_v<T> && accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE &&
+            accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+            accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+            fail(name + " must have whole numbers without a sign");
         if (accessor.count > ARHOST_NONE || (accessor.bufferView < 0 && accessor.count > empty_accessor_limit))
             fail(name + " has too many elements");
         std::vector<T> values;
@@ -466,6 +477,17 @@ private:
         }
     }
 
+    arhost_interpolation interpolation_of(const std::string &name) const {
+        if (name == "STEP")
+            return ARHOST_INTERPOLATION_STEP;
+        if (name == "CUBICSPLINE")
+            return ARHOST_INTERPOLATION_CUBIC;
+        if (name != "LINEAR") // which is also tinygltf's where none is named
+            accessors_.fail("an animation has the interpolation '" + printable(name) +
+                            "'; glTF knows LINEAR, STEP and CUBICSPLINE");
+        return ARHOST_INTERPOLATION_LINEAR;
+    }
+
     std::optional<std::uint32_t> place_of(int node) const {
         if (node < 0 || static_cast<std::size_t>(node) >= place_of_.size() ||
             place_of_[static_cast<std::size_t>(node)] == ARHOST_NONE)
@@ -477,9 +499,7 @@ private:
         const tinygltf::AnimationSampler &sampler = accessors_.at(animation_->samplers, from.sampler, "sampler");
         Channel channel;
         channel.node = first_node_ + place;
-        channel.interpolation = sampler.interpolation == "STEP"          ? ARHOST_INTERPOLATION_STEP
-                                : sampler.interpolation == "CUBICSPLINE" ? ARHOST_INTERPOLATION_CUBIC
-                                                                         : ARHOST_INTERPOLATION_LINEAR;
+        channel.interpolation = interpolation_of(sampler.interpolation);
         channel.times = accessors_.read<float>(sampler.input, TINYGLTF_TYPE_SCALAR, "an animation's times");
         const auto &times = channel.times;
         if (times.empty() || !(times.front() >= 0 && times.back() <= duration_limit_s))

@@ -149,24 +149,27 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
     return image;
 }
 
-Image linearised(Image image) {
+Image linearised(Image image, const Watch &watch) {
     if (image.is_float)
         return image;
     Image linear{image.width, image.height, true, Texels::of_size(image.texels.size * sizeof(float))};
     const std::span<float> to = floats_of(linear.texels);
     for (std::size_t i = 0; i < to.size(); ++i) {
+        if (i % (std::size_t(4) * image.width) == 0)
+            watch.report(static_cast<double>(i) / static_cast<double>(to.size()));
         const auto value = std::to_integer<unsigned char>(image.texels.bytes[i]);
         to[i] = i % 4 == 3 ? static_cast<float>(value) / 255 : linear_from_byte()[value];
     }
     return linear;
 }
 
-void add_cumulative_sums(Environment &environment, const Texture &texture) {
+void add_cumulative_sums(Environment &environment, const Texture &texture, const Watch &watch) {
     const std::span<const float> texels = floats_of(texture.texels);
     environment.rows.resize(texture.height);
     environment.columns.resize(std::size_t(texture.width) * texture.height);
     std::vector<double> luminance(texture.width), of_rows(texture.height);
     for (std::size_t row = 0; row < texture.height; ++row) {
+        watch.report(static_cast<double>(row) / texture.height);
         double sum = 0;
         for (std::size_t column = 0; column < texture.width; ++column) {
             const float *t = &texels[4 * (row * texture.width + column)];

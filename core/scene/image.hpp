@@ -30,9 +30,9 @@ struct Image {
 Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Watch &watch);
 
 // Four floats a texel, linear light: sRGB-encoded bytes are decoded.
-Image linearised(Image image);
+Image linearised(Image image, const Watch &watch);
 
 // Cumulative sums of luminance · sin(πv) for choosing directions. `texture` is RGBA32F.
-void add_cumulative_sums(Environment &environment, const Texture &texture);
+void add_cumulative_sums(Environment &environment, const Texture &texture, const Watch &watch);
 
 } // namespace arhost::scene

@@ -53,6 +53,8 @@ std::string read(const ImageRequest &request) {
                            texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
                            const_cast<ImageRequest *>(&request)))
         return "can't be loaded: " + input->geterror();
+    if (input->has_error()) // a cut JPEG: the decoder has filled in what is missing
+        return "is damaged: " + input->geterror();
     const std::size_t count = std::size_t(spec.width) * spec.height;
     if (is_float)
         expand(reinterpret_cast<float *>(texels), count, grey, alpha, 1.f);

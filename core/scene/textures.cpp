@@ -14,13 +14,13 @@ std::string shown(std::string text) {
 
 } // namespace
 
-Image Textures::read(const std::filesystem::path &file, std::span<const unsigned char> content) const {
+LoadCallbacks Textures::of_an_image() const {
     LoadCallbacks callbacks = callbacks_;
-    if (callbacks_.progress) // of the scene's whole work, decoding counts as nothing
-        callbacks.progress = [&](double fraction, const std::string &what) {
+    if (callbacks_.progress) // of the scene's whole work, an image counts as nothing
+        callbacks.progress = [this](double fraction, const std::string &what) {
             callbacks_.progress(0, what + ": " + std::to_string(static_cast<int>(fraction * 100)) + " %");
         };
-    return read_image(file, content, Watch(callbacks, file.filename().string()));
+    return callbacks;
 }
 
 std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse &use,
@@ -30,7 +30,8 @@ std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse 
         known_.try_emplace(name + '\n' + char('0' + use.is_colour) + char('0' + use.wrap_u) + char('0' + use.wrap_v));
     if (!is_new)
         return known->second;
-    Image image = read(file, content);
+    const LoadCallbacks callbacks = of_an_image();
+    Image image = read_image(file, content, Watch(callbacks, file.filename().string()));
     Texture texture{image.is_float  ? ARHOST_TEXEL_RGBA32F
                     : use.is_colour ? ARHOST_TEXEL_SRGB8
                                     : ARHOST_TEXEL_RGBA8,
@@ -43,11 +44,13 @@ std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse 
 }
 
 Environment Textures::add_environment(const std::filesystem::path &file) {
-    Image image = linearised(read(file, {}));
+    const LoadCallbacks callbacks = of_an_image();
+    const Watch watch(callbacks, file.filename().string());
+    Image image = linearised(read_image(file, {}, watch), watch);
     Texture texture{ARHOST_TEXEL_RGBA32F, image.width,       image.height,
                     ARHOST_WRAP_REPEAT,   ARHOST_WRAP_CLAMP, std::move(image.texels)};
     Environment environment;
-    add_cumulative_sums(environment, texture);
+    add_cumulative_sums(environment, texture, watch);
     environment.texture = builder_.add_texture(shown(file.string()), std::move(texture));
     return environment;
 }

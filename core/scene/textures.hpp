@@ -27,7 +27,7 @@ public:
     Environment add_environment(const std::filesystem::path &file);
 
 private:
-    Image read(const std::filesystem::path &file, std::span<const unsigned char> content) const;
+    LoadCallbacks of_an_image() const;
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;

@@ -364,12 +364,22 @@ TEST(Gltf, TellsWhatIsWrong) {
                 HasSubstr("twice"));
     EXPECT_THAT(spoilt([&](Gltf &g) { g.bytes[60] = 5; }), HasSubstr("names joint 5, but the skin has 2"));
     EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.more, "\"input\": 5", "\"input\": 6"); }), HasSubstr("wrong type"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.accessors, "5121", "5126"); }),
+                HasSubstr("JOINTS_0 (accessor 2) must have whole numbers without a sign"));
+    EXPECT_THAT(
+        spoilt([&](Gltf &g) { replace(g.more, "\"output\": 6", "\"output\": 6, \"interpolation\": \"BEZIER\""); }),
+        HasSubstr("the interpolation 'BEZIER'; glTF knows LINEAR, STEP and CUBICSPLINE"));
+    std::string old = triangle().text();
+    replace(old, "\"2.0\"", "\"1.0\"");
+    EXPECT_THAT(error_of(old), HasSubstr("is not glTF 2: its asset.version must be"));
     EXPECT_THAT(spoilt([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
                 HasSubstr("needs the extension 'KHR_draco_mesh_compression'"));
     // Before tinygltf reads memory that is not the file's, or calls itself without end.
     EXPECT_THAT(
         spoilt([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 18446744073709551615"); }),
         HasSubstr("buffer view 0 reaches past the end of its buffer"));
+    EXPECT_THAT(spoilt([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": -4"); }),
+                HasSubstr("has a byteOffset that is not a number from 0 on"));
     std::string deep;
     for (int i = 0; i < 20000; ++i)
         deep += "{\"a\":";
