@@ -6,6 +6,7 @@
 //
 // After a change that is meant: ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
 #include "scene/loader.hpp"
+#include "scene/motion.hpp"
 #include "tracer.hpp"
 
 #include <gtest/gtest.h>
@@ -22,6 +23,8 @@ struct View {
     const char *name, *scene;
     std::array<double, 3> eye, look_at, up;
     std::vector<int> classes; // of alpha, each probed in a hundred pixels or more
+    const char *samples = "1";
+    double time_s = 0;
 };
 
 void PrintTo(const View &view, std::ostream *stream) {
@@ -32,7 +35,13 @@ class Golden : public testing::TestWithParam<View> {};
 
 cv::Mat render(const View &view) {
     const std::filesystem::path scene = std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
-    const Picture picture = Tracer(scene::load_scene(scene)).render(camera(view.eye, view.look_at, view.up));
+    Tracer tracer(scene::load_scene(scene), {{"samples", view.samples}});
+    const arhost_camera from = camera(view.eye, view.look_at, view.up);
+    EXPECT_EQ(tracer.start(from.intrinsics), ARHOST_OK);
+    scene::MotionEvaluator motion(tracer.scene());
+    const arhost_motion then = motion.at(view.time_s);
+    Picture picture(from.intrinsics);
+    EXPECT_EQ(tracer.try_render(from, picture, &then), ARHOST_OK);
     cv::Mat image(static_cast<int>(picture.height), static_cast<int>(picture.width), CV_8UC4);
     for (int y = 0; y < image.rows; ++y)
         for (int x = 0; x < image.cols; ++x) {
@@ -95,15 +104,24 @@ TEST_P(Golden, PictureIsAsItWas) {
 
 INSTANTIATE_TEST_SUITE_P(
     Views, Golden,
-    testing::Values(View{"classes",
-                         "tests/plugins/rt_embree/golden/classes.yaml",
-                         {10, -150, 120},
-                         {0, -2, 8},
-                         {0, 0, 1},
-                         {0, 77, 153, 255}},
-                    View{"demo", "config/scenes/demo.yaml", {20, -150, 110}, {0, 0, 15}, {0, 0, 1}, {0, 153, 255}},
-                    View{"optix-cs", "config/scenes/optix-cs.yaml", {0, -330, 150}, {0, 0, 60}, {0, 0, 1}, {0, 255}},
-                    View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}}),
+    testing::Values(
+        View{"classes",
+             "tests/plugins/rt_embree/golden/classes.yaml",
+             {10, -150, 120},
+             {0, -2, 8},
+             {0, 0, 1},
+             {0, 77, 153, 255}},
+        View{"demo", "config/scenes/demo.yaml", {20, -150, 110}, {0, 0, 15}, {0, 0, 1}, {0, 153, 255}},
+        View{"optix-cs", "config/scenes/optix-cs.yaml", {0, -330, 150}, {0, 0, 60}, {0, 0, 1}, {0, 255}},
+        View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}},
+        View{"room",
+             "tests/plugins/rt_embree/golden/room.yaml",
+             {20, -190, 120}, // behind the front wall, which faces away
+             {5, 0, 22},
+             {0, 0, 1},
+             {0, 255},
+             "4"},
+        View{"moving", "config/scenes/moving.yaml", {0, -250, 135}, {6, 0, 40}, {0, 0, 1}, {0, 153, 255}, "4", 1.3}),
     [](const auto &info) {
         std::string name = info.param.name;
         std::replace(name.begin(), name.end(), '-', '_');
