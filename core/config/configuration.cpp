@@ -58,7 +58,8 @@ struct Shared {
 ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
-        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {}};
+        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {},
+        false};
     if (const auto fallback = node.find("fallback"))
         component.plugins.push_back(shared.plugin_path.resolve(*fallback));
     // "options:" with nothing behind it is an empty map.
@@ -75,6 +76,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     component.policy.mode = shared.sandbox;
     component.policy.memory_bytes =
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
+    if (const auto conform = node.find("conform"))
+        component.conform = conform->boolean();
     return component;
 }
 

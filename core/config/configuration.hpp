@@ -29,6 +29,7 @@ struct ComponentConfiguration {
     std::optional<yaml::Node> path, options;
     supervise::Limits limits;
     sandbox::Policy policy; // what its worker may touch (docs/security.md)
+    bool conform = false;   // its promises are looked at on real frames (docs/conformance.md)
 };
 
 struct SourceConfiguration : ComponentConfiguration {

@@ -196,6 +196,20 @@ bool write_whole(const fs::path &file, const char *key, Console &console, const 
     return false;
 }
 
+void tell_of_promises(const Promises &promises, Console &console) {
+    std::size_t kept = 0;
+    for (const auto &[name, promise] : promises.all()) {
+        kept += promise.broken == 0;
+        if (promise.broken > 0)
+            console.log(ARHOST_SEVERITY_WARNING, "conform",
+                        name + ": broken in " + std::to_string(promise.broken) + " of " +
+                            std::to_string(promise.looked) + " frames");
+    }
+    if (!promises.all().empty())
+        console.log(ARHOST_SEVERITY_INFO, "conform",
+                    std::to_string(kept) + " of " + std::to_string(promises.all().size()) + " promises kept");
+}
+
 int run(const config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
@@ -235,6 +249,7 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
     if (!whole)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
+    tell_of_promises(statistics.promises, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
         written = write_whole(*configuration.stats, "stats", console,

@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <set>
 
 namespace arhost::host {
@@ -36,6 +37,7 @@ struct Frame {
     arhost_render_info render{};
     std::shared_ptr<LensWarp> warp; // what the overlay is yet to be bent by; NULL: nothing
     arhost_record record{};
+    std::optional<std::size_t> pixels_sample, overlay_sample; // where promises are looked at
     Clock::time_point received;
     FrameTimes times; // but for `shown` and `latency`
 

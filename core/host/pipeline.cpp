@@ -29,7 +29,12 @@ std::shared_ptr<SlotPool> pool_of(const Component &component) {
 Pipeline::Pipeline(const config::Configuration &configuration, supervise::Context context,
                    std::function<void(const Progress &)> on_progress)
     : configuration_(configuration), context_(std::move(context)), on_progress_(std::move(on_progress)),
-      live_(configuration.mode == config::Mode::live) {}
+      live_(configuration.mode == config::Mode::live) {
+    statistics_.promises = Promises([this](const std::string &name, const std::string &sentence) {
+        context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
+                     "breaks the promise " + name + ": " + sentence);
+    });
+}
 
 bool Pipeline::run() {
     if (configuration_.source) {
@@ -391,6 +396,11 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     }
     last_capture_ns_ = result.frame.capture_ns;
     frame->pixels = std::move(pixels);
+    if (configuration_.source->conform) {
+        look_at_capture_time(statistics_.promises, frame->record,
+                             std::chrono::nanoseconds(Clock::now().time_since_epoch()).count());
+        frame->pixels_sample = sample_of(frame->pixels.bytes(), frame->record.sequence);
+    }
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
     statistics_.dropped["source"] += result.frame.skipped;
     statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
@@ -473,6 +483,8 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         pass(frame, "tracker");
         return tracker_->end_process(std::string("broke the contract: ") + problem);
     }
+    if (configuration_.tracker->conform)
+        look_at_markers(statistics_.promises, frame.record, intrinsics_, configuration_.tracker->markers);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
     take_camera_of_markers(frame);
     on_camera_known(frame);
@@ -557,6 +569,32 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.raytracer = std::chrono::nanoseconds(result.busy_ns);
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
+    if (configuration_.raytracer->conform) {
+        if (!overlay_promises_)
+            overlay_promises_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
+        overlay_promises_->look(statistics_.promises, command.sequence, command.camera,
+                                region_of(frame.render, format_->width, format_->height), overlay_of(frame));
+        frame.overlay_sample = sample_of(frame.overlay.bytes(), command.sequence);
+    }
+}
+
+ImageView Pipeline::overlay_of(const Frame &frame) const {
+    return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
+}
+
+// Bytes that a component has given are its no more.
+void Pipeline::look_at_what_was_given(const Frame &frame) {
+    const std::uint64_t sequence = frame.record.sequence;
+    if (frame.pixels_sample)
+        statistics_.promises.look("source.frame-stays", sequence,
+                                  sample_of(frame.pixels.bytes(), sequence) == frame.pixels_sample
+                                      ? ""
+                                      : "it was written to after it had been given");
+    if (frame.overlay_sample && frame.overlay)
+        statistics_.promises.look("raytracer.image-stays", sequence,
+                                  sample_of(frame.overlay.bytes(), sequence) == frame.overlay_sample
+                                      ? ""
+                                      : "its image was written to after it had been given");
 }
 
 void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stage waiting, const char *stage) {
@@ -664,6 +702,7 @@ bool Pipeline::compose() {
 }
 
 void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
+    look_at_what_was_given(frame);
     const Clock::time_point begin = Clock::now();
     const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
@@ -672,8 +711,7 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
     ImageView overlay;
     Region region;
     if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
-        overlay = {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
-                   overlay_stride(format_->width)};
+        overlay = overlay_of(frame);
         region = region_of(frame.render, format_->width, format_->height);
         if (frame.warp) {
             overlay = frame.warp->bend(overlay, region);

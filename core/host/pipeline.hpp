@@ -65,6 +65,8 @@ private:
     bool render();
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
+    ImageView overlay_of(const Frame &frame) const;
+    void look_at_what_was_given(const Frame &frame);
     void stop_components();
 
     void on_read(const ring::Command &command, const ring::Result &result);
@@ -119,6 +121,7 @@ private:
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // and the frame it belongs to
 
     Statistics statistics_;
+    std::optional<OverlayPromises> overlay_promises_;
     std::string failure_;
     bool failed_by_configuration_ = false;
 };

@@ -71,6 +71,11 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                  {"fps", statistics.fps()}};
     for (const auto &[name, timing] : statistics.stages)
         json["stages"][name] = timing.to_json();
+    for (const auto &[name, promise] : statistics.promises.all()) {
+        Json &entry = json["conformance"][name] = {{"looked", promise.looked}, {"broken", promise.broken}};
+        if (promise.broken > 0)
+            entry["first"] = promise.first;
+    }
     double total = host_cpu_seconds;
     json["cpu_seconds"]["host"] = host_cpu_seconds;
     for (const supervise::Component *component : components) {

@@ -3,6 +3,7 @@
 // What a run counted and measured, and the JSON file that tells it.
 #pragma once
 
+#include "host/promises.hpp"
 #include "supervise/component.hpp"
 
 #include <nlohmann/json.hpp>
@@ -46,6 +47,7 @@ struct Statistics {
     std::map<std::string, std::uint64_t> passed;  // went on unaugmented since this stage failed
     std::map<std::string, Timing> stages;         // by name: source, tracker, raytracer, composite, latency, …
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
+    Promises promises;                // of the components with `conform: true`
     std::vector<FrameTimes> timeline; // kept only where the configuration asks for it
 
     double fps() const;

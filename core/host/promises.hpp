@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What `conform: true` looks at while a component works (docs/conformance.md): promises of the ABI that show on real
+// frames, a few lines of each. It reports, and changes nothing; what could harm the host is refused in any case
+// (frames.hpp).
+#pragma once
+
+#include "compositor/compositor.hpp"
+
+#include <arhost/frame.h>
+#include <arhost/scene.h>
+#include <arhost/sink.h>
+#include <arhost/tracker.h>
+
+#include <glm/vec3.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace arhost::host {
+
+struct Promise {
+    std::uint64_t looked = 0, broken = 0; // frames
+    std::string first;                    // one sentence about the first that broke it
+};
+
+class Promises {
+public:
+    // `on_first` is called when a promise is first broken, as in ("tracker.order", "frame 3: …").
+    explicit Promises(std::function<void(const std::string &name, const std::string &sentence)> on_first = {})
+        : on_first_(std::move(on_first)) {}
+
+    // `problem` is empty where the promise was kept.
+    void look(const std::string &name, std::uint64_t frame, const std::string &problem);
+
+    const std::map<std::string, Promise> &all() const { return all_; }
+
+private:
+    std::function<void(const std::string &, const std::string &)> on_first_;
+    std::map<std::string, Promise> all_;
+};
+
+// source.capture-time: on the monotonic clock, a frame was captured before now, and not long before.
+void look_at_capture_time(Promises &promises, const arhost_record &record, std::int64_t now_ns);
+
+// tracker.order, tracker.numbers, and tracker.pose: each corner is where the pose has it, and as far off as is told.
+void look_at_markers(Promises &promises, const arhost_record &record, const arhost_intrinsics &intrinsics,
+                     std::span<const arhost_marker_config> markers);
+
+// A number of some of the bytes, others with each frame: who changes them after the hand-over is found out.
+std::size_t sample_of(std::span<const std::byte> bytes, std::uint64_t frame);
+
+// raytracer.region: alpha is 0 outside of the region that is told.
+// raytracer.place: where alpha is 255 the camera looks towards a virtual object, while none moves.
+class OverlayPromises {
+public:
+    explicit OverlayPromises(const arhost_scene &scene);
+    // `overlay` has the camera's size.
+    void look(Promises &promises, std::uint64_t frame, const arhost_camera &camera, const Region &region,
+              const ImageView &overlay) const;
+
+private:
+    struct Box {
+        glm::dvec3 min, max;
+    };
+    bool knows_place_;               // else opaque pixels may be anywhere
+    std::optional<Box> virtual_box_; // world, mm; none: no virtual object
+};
+
+} // namespace arhost::host
