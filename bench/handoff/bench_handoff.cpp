@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One-way latency of a command from the host to a worker and of its result back, with a sleeping and with
-// a polling receiver, beside a bare pair of eventfds in the same run. Two processes.
+// a polling receiver, beside a bare pair of futexes and of eventfds in the same run. Two processes.
 #include "ring/memory.hpp"
 #include "ring/protocol.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <linux/futex.h>
 #include <memory>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
+#include <unistd.h>
 #include <vector>
 
 using namespace arhost::ring;
@@ -32,8 +36,10 @@ struct Latencies {
                        samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1))]) *
                    1e-3;
         };
-        std::printf("%-28s %8.1f %8.1f   %8.1f %8.1f\n", name, percentile(there, 0.5), percentile(there, 0.99),
-                    percentile(back, 0.5), percentile(back, 0.99));
+        std::printf("%-28s  %8.1f %8.1f %8.1f  %8.1f %8.1f %8.1f\n", name, percentile(there, 0.5),
+                    percentile(there, 0.99), percentile(there, 0.999), percentile(back, 0.5), percentile(back, 0.99),
+                    percentile(back, 0.999));
+        std::fflush(stdout);
     }
 };
 
@@ -90,7 +96,47 @@ Latencies link(int rounds, bool polling) {
     return latencies;
 }
 
-// The bound: two eventfds and a page for the time stamps.
+// The least that wakes a process that sleeps: a futex each way, in a page with the time stamps.
+Latencies futexes(int rounds) {
+    struct Page {
+        std::atomic<std::uint32_t> questions, answers;
+        std::int64_t asked_ns, way_there_ns, answered_ns;
+    };
+    const SharedMemory memory = SharedMemory::create("futexes", 4096);
+    const Mapping mapping = memory.map(Access::read_write);
+    Page &page = mapping.as<Page>();
+    const auto count_and_wake = [](std::atomic<std::uint32_t> &word) {
+        word.fetch_add(1);
+        ::syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
+    };
+    const auto wait_until = [](std::atomic<std::uint32_t> &word, std::uint32_t value) {
+        for (std::uint32_t seen; (seen = word.load()) != value;)
+            ::syscall(SYS_futex, &word, FUTEX_WAIT, seen, nullptr, nullptr, 0);
+    };
+    const pid_t worker = ::fork();
+    if (worker == 0) {
+        for (int i = 1; i <= rounds; ++i) {
+            wait_until(page.questions, static_cast<std::uint32_t>(i));
+            page.way_there_ns = now_ns() - page.asked_ns;
+            page.answered_ns = now_ns();
+            count_and_wake(page.answers);
+        }
+        ::_exit(0);
+    }
+    Latencies latencies;
+    for (int i = 1; i <= rounds; ++i) {
+        ::usleep(200);
+        page.asked_ns = now_ns();
+        count_and_wake(page.questions);
+        wait_until(page.answers, static_cast<std::uint32_t>(i));
+        latencies.back.push_back(now_ns() - page.answered_ns);
+        latencies.there.push_back(page.way_there_ns);
+    }
+    ::waitpid(worker, nullptr, 0);
+    return latencies;
+}
+
+// The same by two eventfds, which can be waited for among others.
 Latencies eventfds(int rounds) {
     const SharedMemory memory = SharedMemory::create("times", 4096);
     const Mapping page = memory.map(Access::read_write);
@@ -131,8 +177,9 @@ int main(int argc, char **argv) {
         std::fprintf(stderr, "usage: bench-handoff [ROUNDS]\n");
         return 2;
     }
-    std::printf("one-way latency, µs            host → worker        worker → host\n");
-    std::printf("%-28s %8s %8s   %8s %8s\n", "", "p50", "p99", "p50", "p99");
+    std::printf("%-28s  %26s  %26s\n", "one-way latency, us", "host to worker", "worker to host");
+    std::printf("%-28s  %8s %8s %8s  %8s %8s %8s\n", "", "p50", "p99", "p99.9", "p50", "p99", "p99.9");
+    futexes(rounds).print("bare futexes, sleeping");
     eventfds(rounds).print("bare eventfds, sleeping");
     link(rounds, false).print("arhost's link, sleeping");
     link(rounds, true).print("arhost's link, polling");

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+//! One-way latency of a message of 128 bytes from one process to another and of the answer back, over iceoryx2: its
+//! samples, with a sleeping (events) and a polling receiver. The same rounds and figures as bench_handoff.cpp's.
+use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
+use iceoryx2::prelude::*;
+use std::error::Error;
+use std::process::Command;
+use std::time::Duration;
+
+/// As many bytes as arhost's own results have, about.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, ZeroCopySend)]
+struct Message {
+    sent_ns: i64,
+    way_there_ns: i64,
+    more: [u64; 14],
+}
+
+fn now_ns() -> i64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writing.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    time.tv_sec * 1_000_000_000 + time.tv_nsec
+}
+
+/// One direction: messages, and the event that wakes their receiver.
+struct Way {
+    publisher: Publisher<ipc::Service, Message, ()>,
+    subscriber: Subscriber<ipc::Service, Message, ()>,
+    notifier: Notifier<ipc::Service>,
+    listener: Listener<ipc::Service>,
+}
+
+impl Way {
+    fn open(node: &Node<ipc::Service>, name: &str, run: &str) -> Result<Way, Box<dyn Error>> {
+        let service: ServiceName = format!("arhost/handoff/{run}/{name}").as_str().try_into()?;
+        let messages = node.service_builder(&service).publish_subscribe::<Message>().open_or_create()?;
+        let events = node.service_builder(&service).event().open_or_create()?;
+        Ok(Way {
+            publisher: messages.publisher_builder().create()?,
+            subscriber: messages.subscriber_builder().create()?,
+            notifier: events.notifier_builder().create()?,
+            listener: events.listener_builder().create()?,
+        })
+    }
+
+    fn send(&self, message: Message, polling: bool) -> Result<(), Box<dyn Error>> {
+        self.publisher.loan_uninit()?.write_payload(message).send()?;
+        if !polling {
+            self.notifier.notify()?;
+        }
+        Ok(())
+    }
+
+    fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
+        loop {
+            if let Some(sample) = self.subscriber.receive()? {
+                return Ok(*sample);
+            }
+            if polling {
+                std::hint::spin_loop();
+            } else {
+                self.listener.timed_wait_one(Duration::from_secs(1))?;
+            }
+        }
+    }
+}
+
+fn answer(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
+    let node = NodeBuilder::new().create::<ipc::Service>()?;
+    let (there, back) = (Way::open(&node, "there", run)?, Way::open(&node, "back", run)?);
+    for _ in 0..=rounds {
+        let question = there.receive(polling)?;
+        let way_there_ns = now_ns() - question.sent_ns;
+        back.send(Message { sent_ns: now_ns(), way_there_ns, more: [0; 14] }, polling)?;
+    }
+    std::thread::sleep(Duration::from_millis(100)); // the last answer must outlive its being read
+    Ok(())
+}
+
+fn percentile_us(samples: &mut [i64], share: f64) -> f64 {
+    samples.sort_unstable();
+    samples[(share * (samples.len() - 1) as f64) as usize] as f64 * 1e-3
+}
+
+fn ask(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
+    let run = format!("{}-{polling}", std::process::id());
+    let node = NodeBuilder::new().create::<ipc::Service>()?;
+    let (way_there, way_back) = (Way::open(&node, "there", &run)?, Way::open(&node, "back", &run)?);
+    let mut other = Command::new(std::env::current_exe()?)
+        .args([rounds.to_string(), run, polling.to_string()])
+        .spawn()?;
+    std::thread::sleep(Duration::from_millis(500)); // the other side opens its services
+    let (mut there, mut back) = (Vec::new(), Vec::new());
+    for round in 0..=rounds {
+        std::thread::sleep(Duration::from_micros(200)); // let the other side fall asleep
+        way_there.send(Message { sent_ns: now_ns(), way_there_ns: 0, more: [0; 14] }, polling)?;
+        let reply = way_back.receive(polling)?;
+        if round > 0 {
+            back.push(now_ns() - reply.sent_ns);
+            there.push(reply.way_there_ns);
+        }
+    }
+    other.wait()?;
+    let name = if polling { "iceoryx2, polling" } else { "iceoryx2, sleeping" };
+    print!("{name:<28}");
+    for samples in [&mut there, &mut back] {
+        print!("  {:8.1} {:8.1} {:8.1}", percentile_us(samples, 0.5), percentile_us(samples, 0.99), percentile_us(samples, 0.999));
+    }
+    println!();
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    set_log_level(LogLevel::Error);
+    let arguments: Vec<String> = std::env::args().collect();
+    let rounds = arguments.get(1).map_or(Ok(5000), |text| text.parse())?;
+    match &arguments[..] {
+        [_, _, run, polling] => answer(run, rounds, polling.parse()?),
+        _ => ask(rounds, false).and_then(|()| ask(rounds, true)),
+    }
+}
