@@ -51,7 +51,7 @@ int run_child(const std::string &name, const Subject &subject) {
     for (const Test &test : all_tests()) {
         if (name != test.name)
             continue;
-        PluginLibrary library(subject.plugin, subject.settings, calls);
+        PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         Result result = run(test, context);
         result.facts = context.facts;

@@ -17,6 +17,7 @@ struct Subject {
     std::filesystem::path plugin, reference;
     Settings settings;
     std::uint64_t seed = 1;
+    std::filesystem::path scratch{}; // of one test; gone after it
 };
 
 // The descriptors that a child finds.

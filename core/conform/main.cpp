@@ -104,6 +104,7 @@ int main(int argc, char **argv) {
     app.add_option("--junit", junit, "Write them as JUnit XML")->type_name("FILE");
     app.add_option("--html", html, "Write them as one page, with images")->type_name("FILE");
     app.add_option("--run", child_test, "")->group(""); // for this program itself: be the process of that test
+    app.add_option("--scratch", settings.subject.scratch, "")->group("");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {

@@ -116,7 +116,8 @@ std::string Host::last_error() const {
     return last_error_;
 }
 
-Instance::Instance(PluginLibrary &library, Settings overrides) : library_(library), settings_(std::move(overrides)) {
+Instance::Instance(PluginLibrary &library, Settings overrides, std::filesystem::path folder)
+    : library_(library), settings_(std::move(overrides)), folder_(std::move(folder)) {
     settings_.insert(library.settings().begin(), library.settings().end());
 }
 
@@ -131,6 +132,12 @@ arhost_status Instance::create() {
         if (set == settings_.end() && !option->default_value)
             throw std::runtime_error(fmt::format("the option '{0}' has no default; give --set {0}=…", option->key));
         texts.push_back(set != settings_.end() ? set->second : option->default_value);
+        if (const std::filesystem::path path = texts.back(); !path.empty()) {
+            if (option->type == ARHOST_OPTION_INPUT_PATH)
+                texts.back() = std::filesystem::absolute(path);
+            if (option->type == ARHOST_OPTION_OUTPUT_PATH)
+                texts.back() = library_.scratch() / folder_ / path.filename();
+        }
         try {
             values.push_back(parse_option(*option, texts.back()));
         } catch (const std::runtime_error &error) {
@@ -162,8 +169,12 @@ void Instance::destroy() {
 void Instance::expect_ok(const char *call, arhost_status status) const {
     if (status == ARHOST_OK)
         return;
-    const std::string reason = host_.last_error();
-    throw Failure(fmt::format("{} returned {}{}", call, status_name(status), reason.empty() ? "" : ": " + reason));
+    throw Failure(told(call, status, host_));
+}
+
+std::string told(const char *call, arhost_status status, const Host &host) {
+    const std::string reason = host.last_error();
+    return fmt::format("{} returned {}{}", call, status_name(status), reason.empty() ? "" : ": " + reason);
 }
 
 std::string status_name(arhost_status status) {

@@ -46,9 +46,10 @@ using Settings = std::map<std::string, std::string>; // option values as they wo
 
 class PluginLibrary {
 public:
-    // `settings`: the user's, in place of defaults. Opens nothing yet.
-    PluginLibrary(std::filesystem::path file, Settings settings, const CallPage &calls)
-        : file_(std::move(file)), settings_(std::move(settings)), calls_(calls) {}
+    // `settings`: the user's, in place of defaults. `scratch`: the folder that outputs go to. Opens nothing yet.
+    PluginLibrary(std::filesystem::path file, Settings settings, const CallPage &calls,
+                  std::filesystem::path scratch = {})
+        : file_(std::move(file)), settings_(std::move(settings)), calls_(calls), scratch_(std::move(scratch)) {}
 
     // Opened at the first call; throws std::runtime_error where arhost-worker would refuse it.
     const arhost_entry_point &entry();
@@ -59,11 +60,13 @@ public:
     const std::filesystem::path &file() const { return file_; }
     const Settings &settings() const { return settings_; }
     const CallPage &calls() const { return calls_; }
+    const std::filesystem::path &scratch() const { return scratch_; }
 
 private:
     std::filesystem::path file_;
     Settings settings_;
     const CallPage &calls_;
+    std::filesystem::path scratch_;
     const arhost_entry_point *entry_ = nullptr;
     const arhost_plugin *plugin_ = nullptr;
 };
@@ -97,8 +100,9 @@ private:
 // From create to destroy.
 class Instance {
 public:
-    // `overrides` stand above the user's settings.
-    explicit Instance(PluginLibrary &library, Settings overrides = {});
+    // `overrides` stand above the user's settings. An output path keeps its name and lies in `folder` of the
+    // scratch folder.
+    explicit Instance(PluginLibrary &library, Settings overrides = {}, std::filesystem::path folder = {});
     ~Instance() { destroy(); }
     Instance(const Instance &) = delete;
     Instance &operator=(const Instance &) = delete;
@@ -117,11 +121,15 @@ public:
 private:
     PluginLibrary &library_;
     Settings settings_;
+    std::filesystem::path folder_;
     Host host_;
     arhost_instance *instance_ = nullptr;
 };
 
 // "OK", "INVALID_ARGUMENT", …; "0, which is no status".
 std::string status_name(arhost_status status);
+
+// What a plugin's function returned: "read returned IO: the camera is gone".
+std::string told(const char *call, arhost_status status, const Host &host);
 
 } // namespace arhost::conform

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <list>
@@ -47,6 +48,27 @@ std::string place(Call call, const Test &test) {
     return " in an unknown call";
 }
 
+// A folder of a test's own.
+class ScratchFolder {
+public:
+    ScratchFolder() {
+        std::string pattern = std::filesystem::temp_directory_path() / "arhost-conform-XXXXXX";
+        if (!::mkdtemp(pattern.data()))
+            ring::throw_errno("mkdtemp " + pattern);
+        path_ = pattern;
+    }
+    ~ScratchFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    ScratchFolder(const ScratchFolder &) = delete;
+    ScratchFolder &operator=(const ScratchFolder &) = delete;
+    const std::filesystem::path &path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
 // In the child, after fork.
 [[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, pid_t parent) {
     ::setpgid(0, 0);
@@ -82,9 +104,9 @@ public:
         pipe_.reset(ends[0]);
         const UniqueFd write_end(ends[1]);
         const Subject &subject = settings.subject;
-        std::vector<std::string> arguments = {"arhost-conform", subject.plugin,   "--run",
-                                              test.name,        "--seed",         std::to_string(subject.seed),
-                                              "--reference",    subject.reference};
+        std::vector<std::string> arguments = {
+            "arhost-conform", subject.plugin,    "--run",     test.name,      "--seed", std::to_string(subject.seed),
+            "--reference",    subject.reference, "--scratch", scratch_.path()};
         for (const auto &[key, value] : subject.settings)
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
         const pid_t parent = ::getpid();
@@ -160,6 +182,7 @@ private:
 
     const Test &test_;
     Clock::time_point begin_, deadline_;
+    ScratchFolder scratch_; // goes once the process is gone
     ring::SharedMemory memory_;
     CallPage calls_;
     UniqueFd pipe_;

@@ -81,6 +81,24 @@ TEST(Conform, TestsPluginsOfOtherKindsByTheAbisTests) {
         EXPECT_THAT(result.at("test").get<std::string>(), testing::StartsWith("abi."));
 }
 
+TEST(Conform, SkipsWhatNeedsADeviceThatIsNotThere) {
+    ConformRun run;
+    EXPECT_EQ(run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--set", "device=/dev/arhost-none"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("skip     source.start\n         it needs 'video', and start returned "));
+    EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
+}
+
+TEST(Conform, LeavesNothingOfASinksFilesBehind) {
+    ConformRun run;
+    std::filesystem::create_directory(run.path("tmp"));
+    ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
+    run.link_wrong("sink_crash_in_stop");
+    EXPECT_EQ(run.run({"sink_crash_in_stop.so", "--only", "sink.w*", "--set", "path=out/frame"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("SIGSEGV in stop"));
+    EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+    EXPECT_FALSE(std::filesystem::exists(run.path("out")));
+}
+
 TEST(Conform, WritesAPageThatShowsTheWrongPixel) {
     ConformRun run;
     run.run({run.link_wrong("bgra").string(), "--only", "raytracer.reference", "--html", "page.html"});

@@ -2,7 +2,8 @@
 //
 // The suite proves itself: a right ray tracer passes, each wrong one fails the tests named for it and no other.
 #include "conform_run.hpp"
-#include "matrix.hpp"
+#include "matrix_sinks.hpp"
+#include "matrix_sources.hpp"
 
 #include <gmock/gmock.h>
 
@@ -39,34 +40,52 @@ TEST_P(Matrix, FindsItByTheseTestsAndNoOther) {
 
 INSTANTIATE_TEST_SUITE_P(Wrong, Matrix, testing::ValuesIn(wrong_plugins),
                          [](const auto &info) { return info.param.defect; });
+INSTANTIATE_TEST_SUITE_P(Source, Matrix, testing::ValuesIn(wrong_sources),
+                         [](const auto &info) { return info.param.defect; });
+INSTANTIATE_TEST_SUITE_P(Sink, Matrix, testing::ValuesIn(wrong_sinks),
+                         [](const auto &info) { return info.param.defect; });
+
+// The wrong plugins of a kind, and the file whose defects they are, under names that begin so.
+struct Part {
+    const std::vector<WrongPlugin> &plugins;
+    std::string source, prefix;
+};
+const std::vector<Part> parts = {{wrong_plugins, "wrong.cpp", ""},
+                                 {wrong_sources, "wrong_source.cpp", "source_"},
+                                 {wrong_sinks, "wrong_sink.cpp", "sink_"}};
 
 TEST(MatrixTable, HasAtLeastOneWrongPluginForEveryTest) {
     std::set<std::string> proven;
-    for (const WrongPlugin &wrong : wrong_plugins)
-        proven.insert(wrong.found_by.begin(), wrong.found_by.end());
+    for (const Part &part : parts)
+        for (const WrongPlugin &wrong : part.plugins)
+            proven.insert(wrong.found_by.begin(), wrong.found_by.end());
     EXPECT_EQ(proven, ConformRun::test_names());
 }
 
-TEST(MatrixTable, HasEveryDefectThatTheWrongPluginKnows) {
-    const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conform/wrong/wrong.cpp");
-    for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
-        at += 5;
-        const std::string defect = source.substr(at, source.find('"', at) - at);
-        EXPECT_THAT(wrong_plugins, testing::Contains(testing::Field(&WrongPlugin::defect, defect)));
+TEST(MatrixTable, HasEveryDefectThatTheWrongPluginsKnow) {
+    for (const Part &part : parts) {
+        const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conform/wrong/" + part.source);
+        for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
+            at += 5;
+            const std::string defect = part.prefix + source.substr(at, source.find('"', at) - at);
+            EXPECT_THAT(part.plugins, testing::Contains(testing::Field(&WrongPlugin::defect, defect)));
+        }
     }
 }
 
 // ---- docs/conformance.md ---------------------------------------------------------------------------
 
 TEST(ConformanceDocument, HasTheMatrix) {
-    std::string table = "| what is wrong | verdict | found by |\n| --- | --- | --- |\n";
-    for (const WrongPlugin &wrong : wrong_plugins) {
-        std::string tests;
-        for (const std::string &test : wrong.found_by)
-            tests += (tests.empty() ? "`" : ", `") + test + "`";
-        table += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+    for (const Part &part : parts) {
+        std::string table = "| what is wrong | verdict | found by |\n| --- | --- | --- |\n";
+        for (const WrongPlugin &wrong : part.plugins) {
+            std::string tests;
+            for (const std::string &test : wrong.found_by)
+                tests += (tests.empty() ? "`" : ", `") + test + "`";
+            table += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+        }
+        EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(table));
     }
-    EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(table));
 }
 
 TEST(ConformanceDocument, HasEveryTestAndItsPromise) {

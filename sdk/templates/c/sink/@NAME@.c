@@ -24,22 +24,31 @@ static arhost_status complain(const arhost_instance *self, const char *file) {
 }
 
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
-    /* Nothing is written before the first frame: another component may yet refuse the run. */
+    char part[PATH_SIZE + 8];
+    FILE *file;
+    char *slash = strrchr(self->path, '/');
+    *slash = 0;
+    mkdir(self->path, 0777); /* there already, most times */
+    *slash = '/';
+    /* Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
+     * another component may yet refuse the run. */
+    snprintf(part, sizeof part, "%s.part", self->path);
+    file = fopen(part, "wb");
+    if (!file)
+        return complain(self, part);
+    fclose(file);
+    remove(part);
     self->row = malloc(3 * (size_t)setup->width);
     return self->row ? ARHOST_OK : ARHOST_ERROR_OUT_OF_MEMORY;
 }
 
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
-    char name[PATH_SIZE + 32], part[PATH_SIZE + 40];
+    char name[PATH_SIZE + 32], part[PATH_SIZE + 8];
     uint32_t column, row;
     FILE *file;
     int whole;
-    char *slash = strrchr(self->path, '/');
-    *slash = 0;
-    mkdir(self->path, 0777); /* there already, most times */
-    *slash = '/';
     snprintf(name, sizeof name, "%s%06llu.ppm", self->path, (unsigned long long)output->record->sequence);
-    snprintf(part, sizeof part, "%s.part", name);
+    snprintf(part, sizeof part, "%s.part", self->path);
 
     /* FILL IN: what becomes of a frame. output->record tells its pose, its time and how its overlay arose. */
     file = fopen(part, "wb");

@@ -12,18 +12,25 @@ namespace fs = std::filesystem;
 
 class @CLASS@ {
 public:
-    @CLASS@(const arhost::Host &, const arhost::Options &options) : path_(options.text("path")) {}
+    @CLASS@(const arhost::Host &, const arhost::Options &options)
+        : path_(options.text("path")), part_(path_ + ".part") {}
 
-    // Nothing is written before the first frame: another component may yet refuse the run.
-    void start(const arhost_sink_setup &setup) { row_.resize(std::size_t(3) * setup.width); }
+    // Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
+    // another component may yet refuse the run.
+    void start(const arhost_sink_setup &setup) {
+        std::error_code ignored; // what is wrong shows in the next lines
+        fs::create_directories(fs::path(path_).parent_path(), ignored);
+        if (!std::ofstream(part_))
+            throw arhost::Failure(ARHOST_ERROR_IO, "can't write " + part_);
+        fs::remove(part_);
+        row_.resize(std::size_t(3) * setup.width);
+    }
 
     // FILL IN: what becomes of a frame. output.record tells its pose, its time and how its overlay arose.
     arhost_status write(const arhost_output &output) {
         char number[32];
         std::snprintf(number, sizeof number, "%06llu.ppm", static_cast<unsigned long long>(output.record->sequence));
-        const fs::path name = path_ + number, part = name.string() + ".part";
-        fs::create_directories(name.parent_path());
-        std::ofstream file(part, std::ios::binary);
+        std::ofstream file(part_, std::ios::binary);
         file << "P6\n" << output.width << ' ' << output.height << "\n255\n";
         for (std::uint32_t row = 0; row < output.height; ++row) {
             const std::uint8_t *bgr = output.bgr + std::size_t(row) * output.stride;
@@ -36,13 +43,13 @@ public:
         }
         file.close();
         if (!file)
-            throw arhost::Failure(ARHOST_ERROR_IO, "can't write " + part.string());
-        fs::rename(part, name); // under its own name only when it is whole
-        return ARHOST_OK;       // the frame must now survive the death of this process
+            throw arhost::Failure(ARHOST_ERROR_IO, "can't write " + part_);
+        fs::rename(part_, path_ + number); // under its own name only when it is whole
+        return ARHOST_OK;                  // the frame must now survive the death of this process
     }
 
 private:
-    std::string path_; // absolute
+    std::string path_, part_; // absolute
     std::vector<char> row_;
 };
 

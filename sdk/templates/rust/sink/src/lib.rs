@@ -7,11 +7,14 @@ use std::path::{Path, PathBuf};
 
 struct @CLASS@ {
     path: String, // absolute
+    part: PathBuf,
 }
 
 impl Plugin for @CLASS@ {
     fn new(_host: Host, options: &Options) -> Result<Self, Failure> {
-        Ok(@CLASS@ { path: options.text("path") })
+        let path = options.text("path");
+        let part = PathBuf::from(format!("{}.part", path));
+        Ok(@CLASS@ { path, part })
     }
 }
 
@@ -27,20 +30,21 @@ fn write_picture(file: &Path, output: &Output) -> std::io::Result<()> {
 }
 
 impl Sink for @CLASS@ {
-    /// Nothing is written before the first frame: another component may yet refuse the run.
+    /// Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
+    /// another component may yet refuse the run.
     fn start(&mut self, _setup: &arhost_sink_setup) -> Result<(), Failure> {
-        Ok(())
+        if let Some(folder) = self.part.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        fs::File::create(&self.part)?;
+        Ok(fs::remove_file(&self.part)?)
     }
 
     /// FILL IN: what becomes of a frame. output.record() tells its pose, its time and how its overlay arose.
     fn write(&mut self, output: &Output) -> Result<bool, Failure> {
         let name = PathBuf::from(format!("{}{:06}.ppm", self.path, output.record().sequence));
-        let part = name.with_extension("part");
-        if let Some(folder) = name.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        write_picture(&part, output)
-            .and_then(|()| fs::rename(&part, &name)) // under its own name only when it is whole
+        write_picture(&self.part, output)
+            .and_then(|()| fs::rename(&self.part, &name)) // under its own name only when it is whole
             .map_err(|error| Failure::new(ARHOST_ERROR_IO, format!("can't write {}: {}", name.display(), error)))?;
         Ok(true) // the frame must now survive the death of this process
     }

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which defect this library has: the one that its file's name tells, so source_late.so, a link to it, is late.
+#pragma once
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <csignal>
+#include <dlfcn.h>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+namespace arhost::test {
+
+inline const std::string &own_name() {
+    static const std::string name = [] {
+        Dl_info info{};
+        ::dladdr(&arhost_entry, &info);
+        return std::filesystem::path(info.dli_fname).stem().string();
+    }();
+    return name;
+}
+
+inline bool has(std::string_view defect) {
+    return own_name().substr(own_name().find('_') + 1) == defect;
+}
+
+inline void crash() {
+    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may have its own
+    std::raise(SIGSEGV);
+}
+inline void hang() {
+    for (;;)
+        ::pause();
+}
+inline void leak_memory() {
+    static std::vector<std::vector<char>> kept;
+    kept.emplace_back(1 << 18, 'x');
+}
+
+// Negotiates for the class T under the file's name, which is another for each defect.
+template <class T>
+arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, const arhost_descriptor &descriptor,
+                           const void *functions) {
+    static arhost_descriptor named;
+    named = descriptor;
+    named.id = own_name().c_str();
+    static const arhost_plugin plugin = {
+        sizeof plugin, &named, functions, detail::create<T>, detail::destroy<T>, detail::no_extension};
+    return negotiate(offer, answer, plugin);
+}
+
+} // namespace arhost::test
