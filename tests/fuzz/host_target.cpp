@@ -12,6 +12,7 @@
 
 #include <csignal>
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -127,8 +128,11 @@ private:
 
     // What a good worker would do next. What it says and answers may be spoilt.
     void go_on(Input &input) {
+        if (finished_)
+            return die(0);
+        pollfd ready{channel_.fd(), POLLIN, 0};
         Message message;
-        if (channel_.fd() >= 0 && channel_.receive(message, 0) == ReceiveState::message)
+        if (::poll(&ready, 1, 0) > 0 && channel_.receive(message, 0) == ReceiveState::message)
             return reply(message, input);
         Command command{};
         if (commands_ && commands_->pop(command) == RingResult::done && command.kind != CommandKind::control)
@@ -140,13 +144,18 @@ private:
         if (type == "open")
             say_hello(message, input);
         else if (type == "load")
-            send(R"({"type": "loaded"})", scene_memory(), input);
+            finish(R"({"type": "loaded"})", scene_memory(), input);
         else if (type == "create")
             send(ready().dump(), {}, input);
         else if (type == "attach")
             attach(message, input);
         else if (type == "stop")
-            send(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
+            finish(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
+    }
+
+    void finish(const char *last_words, UniqueFd fd, Input &input) {
+        send(last_words, std::move(fd), input);
+        finished_ = true;
     }
 
     void say_hello(Message &open, Input &input) {
@@ -262,6 +271,7 @@ private:
     std::optional<CommandConsumer> commands_;
     std::optional<ResultProducer> results_;
     arhost_kind kind_ = 0;
+    bool finished_ = false;
 };
 
 class Troupe final : public supervise::Starter {
