@@ -80,6 +80,9 @@ void run_gltf(Bytes bytes) {
 }
 
 void run_scene(Bytes bytes) {
+    constexpr std::string_view triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    [[maybe_unused]] static const auto mesh =
+        write_scratch("triangle.obj", {reinterpret_cast<const std::uint8_t *>(triangle.data()), triangle.size()});
     try {
         check(load_scene(yaml::Node::parse({bytes.begin(), bytes.end()}, (scratch() / "scene.yaml").string())));
     } catch (const yaml::Error &) {

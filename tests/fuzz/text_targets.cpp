@@ -41,8 +41,8 @@ void make_folder() {
     write_scratch("scene.yaml", bytes_of("version: 1\naxes: z-up\nobjects: []\n"));
     write_scratch("camera.yaml",
                   bytes_of("image_width: 64\nimage_height: 48\ncamera_matrix: {rows: 3, cols: 3, data: "
-                           "[60, 0, 31.5, 0, 60, 23.5, 0, 0, 1]}\n"));
-    write_scratch("cameras.txt", bytes_of("0 0 10\n0 0 0\n0 1 0\n"));
+                           "[60, 0, 31.5, 0, 60, 23.5, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0]\n"));
+    write_scratch("cameras.txt", bytes_of("0 0 10 0 0 0 0 1 0\n"));
 }
 
 } // namespace
