@@ -121,10 +121,11 @@ void Pipeline::make_source() {
         source_slots_.reset();
         for (const Command &command : unanswered)
             next_read_ = std::min(next_read_, command.sequence);
-        const std::uint32_t capabilities = source_->description().capabilities;
-        if (next_read_ > 0 && !(capabilities & (ARHOST_CAN_SEEK | ARHOST_IS_LIVE)) && !ended_) {
+        const PluginDescription &plugin = source_->description(); // nothing where it died before it was opened
+        if (next_read_ > 0 && !plugin.id.empty() && !(plugin.capabilities & (ARHOST_CAN_SEEK | ARHOST_IS_LIVE)) &&
+            !ended_) {
             ended_ = true;
-            fail("source: " + source_->description().id + " died, and can't go on in the middle", false);
+            fail("source: " + plugin.id + " died, and can't go on in the middle", false);
         }
     };
     source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, source.policy,

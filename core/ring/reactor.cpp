@@ -69,8 +69,9 @@ void Reactor::take_events(std::optional<std::chrono::milliseconds> patience) {
         throw_errno("epoll_wait");
     postpone_by_halt(patience);
     for (int i = 0; i < count; ++i) {
+        const std::uint64_t id = events[static_cast<std::size_t>(i)].data.u64; // a copy: epoll_event is packed
         // A callback may have removed this one; its id is never given out again.
-        const auto found = watches_.find(events[static_cast<std::size_t>(i)].data.u64);
+        const auto found = watches_.find(id);
         if (found == watches_.end())
             continue;
         const std::shared_ptr<Callback> callback = found->second.callback;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml/yaml.hpp"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -51,6 +53,37 @@ std::vector<std::string> split_path(const std::string &path) {
     return parts;
 }
 
+std::string place_in(const std::string &name, const YAML::Mark &mark) {
+    return name + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
+}
+
+// Where documents begin, and nothing else of them.
+class DocumentStarts : public YAML::EventHandler {
+public:
+    std::vector<YAML::Mark> marks;
+
+    void OnDocumentStart(const YAML::Mark &mark) override { marks.push_back(mark); }
+    void OnDocumentEnd() override {}
+    void OnNull(const YAML::Mark &, YAML::anchor_t) override {}
+    void OnAlias(const YAML::Mark &, YAML::anchor_t) override {}
+    void OnScalar(const YAML::Mark &, const std::string &, YAML::anchor_t, const std::string &) override {}
+    void OnSequenceStart(const YAML::Mark &, const std::string &, YAML::anchor_t,
+                         YAML::EmitterStyle::value) override {}
+    void OnSequenceEnd() override {}
+    void OnMapStart(const YAML::Mark &, const std::string &, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+    void OnMapEnd() override {}
+};
+
+// Not by YAML::LoadAll: of "[1], 2" it makes documents without end, as the comma begins one, and stays.
+std::optional<YAML::Mark> second_document(const std::string &text) {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    DocumentStarts starts;
+    while (starts.marks.size() < 2 && parser.HandleNextDocument(starts)) {
+    }
+    return starts.marks.size() < 2 ? std::nullopt : std::optional(starts.marks[1]);
+}
+
 } // namespace
 
 std::string nearest(std::string_view word, std::span<const std::string_view> candidates) {
@@ -81,14 +114,12 @@ Node Node::load(const std::filesystem::path &file) {
 Node Node::parse(const std::string &text, const std::string &name) {
     auto document = std::make_shared<Document>(Document{name, {}});
     try {
-        const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-        if (documents.size() > 1)
-            throw Error(name + ": has " + std::to_string(documents.size()) +
-                        " YAML documents; keep one (remove the '---')");
-        return Node(documents.empty() ? YAML::Node() : documents[0], "", document);
+        if (const std::optional<YAML::Mark> second = second_document(text))
+            throw Error(place_in(name, *second) +
+                        "another YAML document begins here; keep one (remove the '---', or what stands here)");
+        return Node(YAML::Load(text), "", document);
     } catch (const YAML::Exception &error) {
-        throw Error(name + ":" + std::to_string(error.mark.line + 1) + ":" + std::to_string(error.mark.column + 1) +
-                    ": YAML syntax: " + error.msg);
+        throw Error(place_in(name, error.mark) + "YAML syntax: " + error.msg);
     }
 }
 

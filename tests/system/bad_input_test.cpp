@@ -127,7 +127,7 @@ const std::vector<Case> cases = {
      replaced(good, "scene.yaml", "none.yaml"),
      small_scene,
      {"run.yaml:5:", "there is no scene file"}},
-    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"run.yaml: has 2 YAML documents"}},
+    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"another YAML document begins here; keep one"}},
     {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
     {"SceneWithMissingMesh",
      good,

@@ -97,6 +97,26 @@ TEST(Supervision, AWorkerThatClosesItsControlChannelIsStartedAgain) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
 }
 
+TEST(Supervision, ASourceThatIsKilledWhileItStartsAgainGoesOn) {
+    ArhostRun run(counting("lockstep", "frames: 400, delay_ms: 5", "", "", "restart: {first_delay_ms: 1}\n"));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    wait_for_frames(run, 20);
+    for (int hits = 0; hits < 3 && run.running();) {
+        if (const pid_t source = run.worker("source_counter"))
+            ::kill(source, SIGKILL);
+        for (int tries = 0; tries < 10'000 && !run.worker("source_counter"); ++tries)
+            if (const pid_t starting = run.worker("arhost-worker")) {
+                ::kill(starting, SIGKILL); // it has not even said whether it can go on in the middle
+                ++hits;
+                break;
+            }
+        wait_for_frames(run, counted(run).size() + 5);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_all_frames_in_order(run, 400);
+}
+
 TEST(Supervision, APluginThatCallsExitIsStartedAgain) {
     ArhostRun run(counting("lockstep", "frames: 30", "exit_at: 15", ""));
     run.write("scene.yaml", small_scene);

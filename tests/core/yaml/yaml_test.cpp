@@ -53,6 +53,14 @@ TEST(Yaml, SaysWhereTheSyntaxIsWrong) {
                 testing::MatchesRegex("a.yaml:[0-9]+:[0-9]+: YAML syntax: .*"));
 }
 
+TEST(Yaml, SaysWhereASecondDocumentBegins) {
+    EXPECT_THAT(error_of([] { Node::parse("a: 1\n---\nb: 2\n", "a.yaml"); }),
+                HasSubstr("a.yaml:2:1: another YAML document begins here; keep one"));
+    // What is no document, though it does not end the one before it.
+    EXPECT_THAT(error_of([] { Node::parse("[1, 2], 3\n", "a.yaml"); }), HasSubstr("a.yaml:1:7: another"));
+    EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: another"));
+}
+
 TEST(Yaml, SaysWhyAFileCantBeRead) {
     EXPECT_EQ(error_of([] { Node::load("/no/such.yaml"); }),
               "/no/such.yaml: can't be read: No such file or directory");

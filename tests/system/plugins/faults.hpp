@@ -3,6 +3,8 @@
 // Options by which a test plugin fails, and the number that its frames bear.
 #pragma once
 
+#include "misbehave.h"
+
 #include <arhost-cpp/plugin.hpp>
 
 #include <chrono>
@@ -33,6 +35,7 @@ public:
           delay_ms_(options.real("delay_ms")) {
         if (options.boolean("ignore_abort"))
             std::signal(SIGABRT, SIG_IGN);
+        misbehave_install();
     }
     void at(std::uint64_t sequence) const {
         const auto frame = static_cast<std::int64_t>(sequence);
@@ -49,7 +52,7 @@ public:
             ::close(3);
         if (frame == fork_at_)
             leave_children();
-        if (frame == error_at_)
+        if (misbehave_if_asked() || frame == error_at_)
             throw Failure(ARHOST_ERROR_INTERNAL, "an error, as asked for");
         if (delay_ms_ > 0)
             std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(delay_ms_));

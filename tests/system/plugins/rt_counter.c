@@ -3,6 +3,8 @@
  * A ray tracer in plain C, against the C headers alone: a square of 16 px in the top left corner whose
  * colour is the number of the frame, taken from the camera's distance: R and G the low and high byte.
  */
+#include "misbehave.h"
+
 #include <arhost/arhost.h>
 
 #include <signal.h>
@@ -24,6 +26,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
+    misbehave_install();
     for (i = 0; i < option_count; ++i) {
         if (!strcmp(options[i].key, "crash_at"))
             self->crash_at = options[i].integer;
@@ -70,7 +73,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     }
     while (number == self->hang_at)
         pause();
-    if (number == self->error_at)
+    if (misbehave_if_asked() || number == self->error_at)
         return ARHOST_ERROR_INTERNAL;
     if (self->delay_ms > 0) {
         struct timespec time = {0, 0};

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The whole host beside workers that are played by the fuzzer's bytes: they do what a worker would do next, spoilt in
+// some places or not, send what they like, scribble over their memory, and die when they like. No process is started,
+// and no time counts: all deadlines are an hour.
+#include "../core/scene/scene_samples.hpp"
+#include "input.hpp"
+#include "targets.hpp"
+
+#include "host/pipeline.hpp"
+#include "ring/fd_passing.hpp"
+
+#include <csignal>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <list>
+#include <stdexcept>
+
+namespace arhost::fuzz {
+namespace {
+
+using namespace ring;
+
+constexpr const char *configuration_text = R"(version: 1
+plugin_path: [plugins]
+source: {plugin: source, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+tracker: {plugin: tracker, fallback: tracker2, markers: [{id: 0, side_mm: 80}, {id: 1, side_mm: 80}], hold_frames: 1,
+          deadline_ms: 3600000,
+          start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+raytracer: {plugin: rt, scene: scene.yaml, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+outputs:
+- {plugin: sink, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+- {plugin: sink2, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+restart: {first_delay_ms: 0, longest_delay_ms: 0, quarantine_after: 4}
+)";
+
+config::Configuration make_configuration(const char *mode) {
+    for (const char *plugin : {"source.so", "tracker.so", "tracker2.so", "rt.so", "sink.so", "sink2.so"})
+        write_scratch(std::filesystem::path("plugins") / plugin, {});
+    write_scratch("scene.yaml", {});
+    const std::string text = std::string(configuration_text) + "mode: " + mode + "\n";
+    return config::parse(yaml::Node::parse(text, (scratch() / "run.yaml").string()), scratch() / "plugins");
+}
+
+UniqueFd scene_memory() {
+    static const scene::Arena arena = scene::test::full_scene().build();
+    UniqueFd fd = checked(::memfd_create("arena", MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
+    if (::write(fd.get(), arena.bytes().data(), arena.bytes().size()) < 0)
+        throw_errno("write to a memfd");
+    return fd;
+}
+
+UniqueFd some_descriptor(unsigned kind) {
+    switch (kind % 4) {
+    case 0:
+        return scene_memory();
+    case 1:
+        return checked(::open("/dev/null", O_RDWR | O_CLOEXEC), "/dev/null");
+    case 2: // no memory behind it, and its seals shut
+        return checked(::memfd_create("empty", MFD_CLOEXEC), "memfd_create");
+    default:
+        return checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
+    }
+}
+
+// One worker, seen from its own end.
+class Worker {
+public:
+    Worker(pid_t process, Channel channel, UniqueFd doorbell, UniqueFd output, UniqueFd death)
+        : pid(process), channel_(std::move(channel)), doorbell_(std::move(doorbell)), output_(std::move(output)),
+          death_(std::move(death)) {}
+
+    const pid_t pid;
+    int wait_status = 0;
+    bool dead = false;
+
+    void act(Input &input) {
+        switch (input.number() % 8) {
+        case 3:
+            return send(input.text(input.number()), {}, input);
+        case 4:
+            if (worker_page_)
+                input.spoil(worker_page_.bytes());
+            return ring_doorbell(doorbell_.get());
+        case 5:
+            if (output_memory_)
+                input.spoil(output_memory_.bytes());
+            return;
+        case 6: {
+            const std::string text = input.text(input.number());
+            (void)!::write(output_.get(), text.data(), text.size());
+            return;
+        }
+        case 7:
+            return misbehave(input.number());
+        default:
+            return go_on(input);
+        }
+    }
+
+    void die(int status) {
+        ::eventfd_write(death_.get(), 1);
+        channel_.close();
+        doorbell_.reset();
+        output_.reset();
+        commands_.reset();
+        results_.reset();
+        for (Mapping *mapping : {&host_page_, &worker_page_, &output_memory_})
+            *mapping = Mapping();
+        wait_status = status;
+        dead = true;
+    }
+
+private:
+    void misbehave(unsigned how) {
+        if (how % 3 == 0)
+            return die(static_cast<int>(how / 3)); // as of wait(2): signals, too
+        if (how % 3 == 1)
+            return channel_.close();
+        for (unsigned i = 0; i < how * 40; ++i)
+            ring_doorbell(doorbell_.get());
+    }
+
+    // What a good worker would do next. What it says and answers may be spoilt.
+    void go_on(Input &input) {
+        if (finished_)
+            return die(0);
+        pollfd ready{channel_.fd(), POLLIN, 0};
+        Message message;
+        if (::poll(&ready, 1, 0) > 0 && channel_.receive(message, 0) == ReceiveState::message)
+            return reply(message, input);
+        Command command{};
+        if (commands_ && commands_->pop(command) == RingResult::done && command.kind != CommandKind::control)
+            answer(command, input);
+    }
+
+    void reply(Message &message, Input &input) {
+        const std::string type = message.body["type"];
+        if (type == "open")
+            say_hello(message, input);
+        else if (type == "load")
+            finish(R"({"type": "loaded"})", scene_memory(), input);
+        else if (type == "create")
+            send(ready().dump(), {}, input);
+        else if (type == "attach")
+            attach(message, input);
+        else if (type == "stop")
+            finish(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
+    }
+
+    void finish(const char *last_words, UniqueFd fd, Input &input) {
+        send(last_words, std::move(fd), input);
+        finished_ = true;
+    }
+
+    void say_hello(Message &open, Input &input) {
+        map_pages(open);
+        const std::string name = std::filesystem::path(open.body["plugin"].get<std::string>()).stem();
+        kind_ = name == "source"              ? ARHOST_KIND_SOURCE
+                : name.starts_with("tracker") ? ARHOST_KIND_TRACKER
+                : name == "rt"                ? ARHOST_KIND_RAYTRACER
+                                              : ARHOST_KIND_SINK;
+        const arhost_descriptor descriptor = {sizeof descriptor,
+                                              kind_,
+                                              name.c_str(),
+                                              "",
+                                              "",
+                                              "",
+                                              "",
+                                              "",
+                                              kind_ == ARHOST_KIND_SOURCE ? std::uint32_t(ARHOST_CAN_SEEK) : 0u,
+                                              0,
+                                              nullptr,
+                                              nullptr};
+        send(Json{{"type", "hello"}, {"descriptor", to_json(descriptor)}, {"sandbox", ""}}.dump(), {}, input);
+    }
+
+    void map_pages(Message &open) {
+        if (open.fds.size() < 2)
+            return;
+        host_page_ = SharedMemory::adopt(std::move(open.fds[0])).map(Access::read_only);
+        worker_page_ = SharedMemory::adopt(std::move(open.fds[1])).map(Access::read_write);
+        commands_.emplace(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands);
+        results_.emplace(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results);
+    }
+
+    Json ready() const {
+        if (kind_ != ARHOST_KIND_SOURCE)
+            return {{"type", "ready"}};
+        arhost_frame_format format{};
+        format.pixel_format = ARHOST_NV12;
+        format.width = 18;
+        format.height = 10;
+        format.yuv_matrix = ARHOST_BT601;
+        format.yuv_range = ARHOST_FULL_RANGE;
+        format.fps = 30;
+        arhost_intrinsics camera{};
+        camera.width = format.width;
+        camera.height = format.height;
+        camera.fx = camera.fy = 20;
+        camera.cx = 8.5;
+        camera.cy = 4.5;
+        camera.distortion = ARHOST_DISTORTION_BROWN;
+        camera.coefficient_count = 4;
+        camera.coefficients[0] = 0.1;
+        return {{"type", "ready"}, {"format", to_json(format)}, {"frame_count", 0}, {"intrinsics", to_json(camera)}};
+    }
+
+    void attach(Message &message, Input &input) {
+        if (message.body["role"] == "output") {
+            layout_ = layout_from_json(message.body["layout"]);
+            output_memory_ = SharedMemory::adopt(std::move(message.fds.at(0))).map(Access::read_write);
+        }
+        message.body["type"] = "attached";
+        message.body.erase("layout");
+        send(message.body.dump(), {}, input);
+    }
+
+    void answer(const Command &command, Input &input) {
+        Result result{};
+        result.ticket = command.ticket;
+        result.status = ARHOST_OK;
+        result.frame.clock = ARHOST_CLOCK_MEDIA;
+        result.frame.capture_ns = static_cast<std::int64_t>(command.sequence) * 1000;
+        if (kind_ == ARHOST_KIND_TRACKER && output_memory_) {
+            const auto slot = layout_.slot(output_memory_, command.slot);
+            auto &found = *reinterpret_cast<arhost_tracker_result *>(slot.data());
+            found.marker_count = 1;
+            found.markers[0].state = ARHOST_MARKER_DETECTED;
+            for (const int diagonal : {0, 5, 10, 15})
+                found.markers[0].mt[diagonal] = 1;
+            found.markers[0].mt[14] = -500;
+            input.spoil(slot.first(sizeof(arhost_marker) + offsetof(arhost_tracker_result, markers)));
+        }
+        input.spoil(std::as_writable_bytes(std::span(&result, 1)));
+        results_->push(result);
+        ring_doorbell(doorbell_.get());
+    }
+
+    // With `fd` and up to four others, which are a message's most.
+    void send(std::string text, UniqueFd fd, Input &input) const {
+        input.spoil(std::as_writable_bytes(std::span(text)));
+        const unsigned more = input.number() < 200 ? 0 : input.number();
+        std::vector<UniqueFd> fds;
+        if (fd)
+            fds.push_back(std::move(fd));
+        for (unsigned i = 0; i < more % 4; ++i)
+            fds.push_back(some_descriptor(more >> 2 >> i));
+        const auto bytes = std::as_bytes(std::span(text));
+        switch (fds.size()) {
+        case 0:
+            send_with_fds(channel_.fd(), bytes, {}, MSG_DONTWAIT);
+            break;
+        case 1:
+            send_with_fds(channel_.fd(), bytes, {fds[0].get()}, MSG_DONTWAIT);
+            break;
+        default:
+            send_with_fds(channel_.fd(), bytes, {fds[0].get(), fds[1].get()}, MSG_DONTWAIT);
+        }
+    }
+
+    Channel channel_;
+    UniqueFd doorbell_, output_, death_;
+    Mapping host_page_, worker_page_, output_memory_;
+    SlotLayout layout_;
+    std::optional<CommandConsumer> commands_;
+    std::optional<ResultProducer> results_;
+    arhost_kind kind_ = 0;
+    bool finished_ = false;
+};
+
+class Troupe final : public supervise::Starter {
+public:
+    supervise::Spawned spawn(const std::filesystem::path &) override {
+        supervise::Spawned spawned;
+        Channel theirs;
+        std::tie(spawned.channel, theirs) = Channel::make_pair();
+        DoorbellPair doorbell = make_doorbell();
+        spawned.doorbell = std::move(doorbell.host);
+        int pipe_ends[2];
+        if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
+            throw_errno("pipe2");
+        spawned.output.reset(pipe_ends[0]);
+        spawned.pidfd = checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // signals can't be sent to it
+        spawned.pid = next_pid_++;
+        workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker), UniqueFd(pipe_ends[1]),
+                              checked(::dup(spawned.pidfd.get()), "dup"));
+        return spawned;
+    }
+
+    supervise::Exit wait_exit(pid_t pid) override {
+        const auto found = std::ranges::find(workers_, pid, &Worker::pid);
+        if (found == workers_.end() || !found->dead)
+            throw std::logic_error("the host waits for a worker that lives");
+        const supervise::Exit exit{pid, found->wait_status, 0};
+        workers_.erase(found);
+        return exit;
+    }
+
+    void act(Input &input) {
+        std::vector<Worker *> living;
+        for (Worker &worker : workers_)
+            if (!worker.dead)
+                living.push_back(&worker);
+        const unsigned who = input.number(); // 0: the next in turn
+        if (!living.empty())
+            living[(who ? who : turn_++) % living.size()]->act(input);
+    }
+
+private:
+    unsigned turn_ = 0;
+    pid_t next_pid_ = 1 << 22; // above the highest that Linux gives to a process
+    std::list<Worker> workers_;
+};
+
+} // namespace
+
+void run_host(Bytes bytes) {
+    [[maybe_unused]] static const auto ignored = ::signal(SIGPIPE, SIG_IGN); // as arhost does
+    static const config::Configuration lockstep = make_configuration("lockstep"), live = make_configuration("live");
+    Input input(bytes);
+    const config::Configuration &configuration = input.number() % 2 ? live : lockstep;
+    Troupe troupe;
+    Reactor reactor;
+    host::Pipeline pipeline(configuration, {reactor, troupe, "", [](arhost_severity, auto &, auto &) {}},
+                            [](const host::Progress &) {});
+    // Readable for ever: one act after every look of the host.
+    const UniqueFd always = checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
+    const auto acting = reactor.watch(always.get(), [&] {
+        if (input.empty())
+            pipeline.interrupt(); // the second ends it at once
+        else
+            troupe.act(input);
+    });
+    pipeline.run();
+    (void)host::report(pipeline.statistics(), pipeline.components(), 0)
+        .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+} // namespace arhost::fuzz

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pages and slots that a worker writes, read as the host reads them. Each lies alone in its memory, so that the
+// address sanitizer sees every byte that is read beside it.
+#include "input.hpp"
+#include "targets.hpp"
+
+#include "compositor/compositor.hpp"
+#include "host/frames.hpp"
+#include "ring/protocol.hpp"
+
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+namespace arhost::fuzz {
+namespace {
+
+using namespace ring;
+
+void require(bool condition, const char *otherwise) {
+    if (!condition)
+        throw std::logic_error(otherwise);
+}
+
+arhost_tracker_result valid_result() {
+    arhost_tracker_result result{};
+    result.marker_count = 2;
+    for (int i = 0; i < 2; ++i) {
+        arhost_marker &marker = result.markers[i];
+        marker.struct_size = sizeof marker;
+        marker.id = i;
+        marker.state = ARHOST_MARKER_DETECTED;
+        for (const int diagonal : {0, 5, 10, 15})
+            marker.mt[diagonal] = 1;
+        marker.mt[14] = -500;
+    }
+    return result;
+}
+
+void take_result(Input &input) {
+    const auto slot = std::make_unique<arhost_tracker_result>(valid_result());
+    const auto bytes = std::as_writable_bytes(std::span(slot.get(), 1));
+    input.spoil(bytes);
+    const auto record = std::make_unique<arhost_record>();
+    if (host::take_tracker_result(bytes, {0, 1}, *record))
+        return;
+    require(record->marker_count <= 2, "more markers than there are");
+    for (std::uint32_t i = 0; i < record->marker_count; ++i)
+        for (const double number : record->markers[i].mt)
+            require(std::isfinite(number), "a pose is not finite");
+}
+
+void lay_over(const arhost_render_info &info) {
+    arhost_frame_format format{};
+    format.pixel_format = ARHOST_BGR8;
+    format.width = 21;
+    format.height = 5;
+    arhost_frame_layout(&format);
+    const std::vector<std::uint8_t> video(format.byte_size), image(std::size_t(84) * 5);
+    std::vector<std::uint8_t> out(std::size_t(63) * 5);
+    const std::uint8_t *const planes[ARHOST_MAX_PLANES] = {video.data(), nullptr, nullptr};
+    composite(format, planes, {image.data(), 84}, region_of(info, 21, 5), {out.data(), 63});
+}
+
+} // namespace
+
+void run_ring(Bytes bytes) {
+    Input input(bytes);
+    const auto host = std::make_unique<HostPage>();
+    const auto worker = std::make_unique<WorkerPage>();
+    CommandProducer commands(host->commands, worker->commands);
+    ResultConsumer results(worker->results, host->results);
+    CommandConsumer taken(host->commands, worker->commands);
+    ResultProducer answers(worker->results, host->results);
+    arhost_record record{};
+    while (!input.empty()) {
+        Command command{};
+        Result result{};
+        switch (input.number() % 6) {
+        case 0:
+            input.spoil(std::as_writable_bytes(std::span(worker.get(), 1)));
+            break;
+        case 1:
+            commands.push(command);
+            break;
+        case 2:
+            taken.pop(command);
+            break;
+        case 3:
+            result = input.number<Result>();
+            answers.push(result);
+            break;
+        case 4:
+            // The peer does not write while this test pops: at most what the ring holds comes.
+            for (std::uint32_t popped = 0; results.pop(result) == RingResult::done; ++popped) {
+                require(popped < ring_capacity, "more entries than the ring holds");
+                host::take_frame_info(result.frame, record.capture_ns, record);
+                lay_over(result.render);
+            }
+            break;
+        case 5:
+            take_result(input);
+            break;
+        }
+    }
+}
+
+} // namespace arhost::fuzz

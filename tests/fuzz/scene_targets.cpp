@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the loader reads, and what the host takes from it.
+#include "../core/scene/scene_samples.hpp"
+#include "input.hpp"
+#include "targets.hpp"
+
+#include "scene/gltf.hpp"
+#include "scene/loader.hpp"
+#include "scene/motion.hpp"
+
+#include <stdexcept>
+
+namespace arhost::fuzz {
+namespace {
+
+using namespace scene;
+
+constexpr std::size_t enough = std::size_t(64) << 20; // of an arena that is written out
+
+// What the host finds good is used without further checks.
+void use(std::span<const std::byte> arena) {
+    const auto &header = *reinterpret_cast<const arhost_scene *>(arena.data());
+    MotionEvaluator evaluator(header);
+    for (const double time_s : {0.0, 0.7, 1e9, -3.0})
+        evaluator.at(time_s);
+}
+
+void check(ArenaBuilder builder) {
+    if (builder.byte_size() > enough)
+        return;
+    const Arena arena = std::move(builder).build();
+    if (validate(arena.bytes()).empty())
+        use(arena.bytes());
+}
+
+void load(Bytes bytes, const char *name) {
+    try {
+        MeshOptions options;
+        options.byte_limit = std::uint64_t(16) << 20;
+        ArenaBuilder builder;
+        const std::uint32_t mesh = builder.add_triangles(load_mesh(write_scratch(name, bytes), options));
+        builder.add_object("mesh", mesh, builder.add_material(make_material(ARHOST_DIFFUSE)));
+        check(std::move(builder));
+    } catch (const MeshError &) {
+    }
+}
+
+} // namespace
+
+void run_obj(Bytes bytes) {
+    load(bytes, "mesh.obj");
+}
+
+void run_ply(Bytes bytes) {
+    load(bytes, "mesh.ply");
+}
+
+void run_gltf(Bytes bytes) {
+    const bool binary = bytes.size() > 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
+    try {
+        ArenaBuilder builder;
+        const LoadCallbacks callbacks;
+        Textures textures(builder, callbacks);
+        GltfPlacement placement;
+        placement.name = "gltf";
+        placement.animation = "0";
+        const auto file = write_scratch(binary ? "model.glb" : "model.gltf", bytes);
+        try {
+            builder.settings.duration_s = add_gltf(builder, textures, file, placement, callbacks);
+        } catch (const AnimationError &) {
+            placement.animation.reset();
+            builder = ArenaBuilder();
+            add_gltf(builder, textures, file, placement, callbacks);
+        }
+        check(std::move(builder));
+    } catch (const MeshError &) {
+    } catch (const ImageError &) {
+    }
+}
+
+void run_scene(Bytes bytes) {
+    constexpr std::string_view triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    [[maybe_unused]] static const auto mesh =
+        write_scratch("triangle.obj", {reinterpret_cast<const std::uint8_t *>(triangle.data()), triangle.size()});
+    try {
+        check(load_scene(yaml::Node::parse({bytes.begin(), bytes.end()}, (scratch() / "scene.yaml").string())));
+    } catch (const yaml::Error &) {
+    }
+}
+
+// The first byte decides: the bytes themselves, or a valid arena with some places overwritten.
+void run_arena(Bytes bytes) {
+    Input input(bytes);
+    if (input.number() == 0) {
+        const auto raw = input.take(bytes.size());
+        const std::unique_ptr<std::byte, decltype(&std::free)> exact(
+            static_cast<std::byte *>(std::aligned_alloc(64, (raw.size() + 63) / 64 * 64)), &std::free);
+        std::copy(raw.begin(), raw.end(), reinterpret_cast<std::uint8_t *>(exact.get()));
+        if (const std::span<const std::byte> arena(exact.get(), raw.size()); validate(arena).empty())
+            use(arena);
+        return;
+    }
+    Arena arena = scene::test::full_scene().build();
+    input.spoil(arena.bytes());
+    if (validate(arena.bytes()).empty())
+        use(arena.bytes());
+}
+
+} // namespace arhost::fuzz

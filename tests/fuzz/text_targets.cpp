@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Files that a user or another program writes: a fault in one is an Error, and nothing else.
+#include "input.hpp"
+#include "targets.hpp"
+
+#include "camera/calibration.hpp"
+#include "camera/trajectory.hpp"
+#include "config/configuration.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+#include <common_files/pattern.hpp>
+
+namespace arhost::fuzz {
+namespace {
+
+std::string text_of(Bytes bytes) {
+    return {bytes.begin(), bytes.end()};
+}
+Bytes bytes_of(std::string_view text) {
+    return {reinterpret_cast<const std::uint8_t *>(text.data()), text.size()};
+}
+
+// An option of every type.
+ring::PluginDescription plugin_of(arhost_kind kind) {
+    ring::PluginDescription plugin;
+    plugin.kind = kind;
+    plugin.id = "plugin";
+    plugin.options = {{"on", ARHOST_OPTION_BOOL, "false", 0, 0, {}, ""},
+                      {"count", ARHOST_OPTION_INTEGER, "3", 1, 10, {}, ""},
+                      {"factor", ARHOST_OPTION_REAL, "0.5", 0, 1, {}, ""},
+                      {"name", ARHOST_OPTION_TEXT, "a", 0, 0, {"a", "b"}, ""},
+                      {"path", ARHOST_OPTION_OUTPUT_PATH, "", 0, 0, {}, ""}};
+    return plugin;
+}
+
+// What configurations name is there.
+void make_folder() {
+    for (const char *plugin : {"source.so", "tracker.so", "rt.so", "sink.so"})
+        write_scratch(std::filesystem::path("plugins") / plugin, {});
+    write_scratch("scene.yaml", bytes_of("version: 1\naxes: z-up\nobjects: []\n"));
+    write_scratch("camera.yaml",
+                  bytes_of("image_width: 64\nimage_height: 48\ncamera_matrix: {rows: 3, cols: 3, data: "
+                           "[60, 0, 31.5, 0, 60, 23.5, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0]\n"));
+    write_scratch("cameras.txt", bytes_of("0 0 10 0 0 0 0 1 0\n"));
+}
+
+} // namespace
+
+void run_configuration(Bytes bytes) {
+    [[maybe_unused]] static const bool made = (make_folder(), true);
+    try {
+        const auto root = yaml::Node::parse(text_of(bytes), (scratch() / "run.yaml").string());
+        const config::Configuration configuration = config::parse(root, scratch() / "plugins");
+        if (configuration.source)
+            config::options_for(plugin_of(ARHOST_KIND_SOURCE), ARHOST_KIND_SOURCE, *configuration.source, 0);
+        for (const auto &output : configuration.outputs)
+            config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0);
+    } catch (const yaml::Error &) {
+    }
+}
+
+void run_calibration(Bytes bytes) {
+    try {
+        camera::read_calibration(write_scratch("calibration.yaml", bytes));
+    } catch (const yaml::Error &) {
+    }
+}
+
+void run_trajectory(Bytes bytes) {
+    try {
+        const camera::Trajectory trajectory = camera::read_trajectory(write_scratch("trajectory", bytes));
+        trajectory.at_or_after(trajectory.end() / 2);
+    } catch (const yaml::Error &) {
+    }
+}
+
+void run_pattern(Bytes bytes) {
+    const std::string text = text_of(bytes), pattern = text.substr(0, text.find('\0'));
+    try {
+        const auto parsed = files::FramePattern::parse(pattern);
+        if (!parsed)
+            return;
+        parsed->matches(text.substr(std::min(pattern.size() + 1, text.size())));
+        for (const std::uint64_t number : {std::uint64_t(0), std::uint64_t(12345), ~std::uint64_t(0)})
+            if (const auto file = parsed->file(number); !parsed->matches(file.filename().string()))
+                throw std::logic_error("a pattern does not match its own file " + file.string());
+    } catch (const Failure &) {
+    }
+}
+
+} // namespace arhost::fuzz

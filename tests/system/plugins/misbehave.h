@@ -1,0 +1,222 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a test plugin does in its next frame after SIGUSR1 has come with a number: the low byte says what
+ * (enum misbehaviour), the others are a seed. tools/faults sends it.
+ */
+#ifndef ARHOST_TEST_MISBEHAVE_H
+#define ARHOST_TEST_MISBEHAVE_H
+
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE
+#endif
+#include <fcntl.h>
+#include <signal.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+/* tools/faults has the same order. */
+enum misbehaviour {
+    MISBEHAVE_CRASH = 1,
+    MISBEHAVE_EXIT,
+    MISBEHAVE_HANG,        /* for ever; with an odd seed it ignores SIGABRT */
+    MISBEHAVE_SLOW,        /* a reply that is late, but not yet a hang */
+    MISBEHAVE_ERROR,       /* the frame's status */
+    MISBEHAVE_MESSAGE,     /* garbage to the host */
+    MISBEHAVE_PASS,        /* descriptors to the host, in messages of all kinds */
+    MISBEHAVE_RING,        /* garbage in the memory that it shares with the host */
+    MISBEHAVE_DOORBELL,    /* a flood */
+    MISBEHAVE_CLOSE,       /* the channel to the host */
+    MISBEHAVE_DESCRIPTORS, /* holds as many as it can get, until its end */
+    MISBEHAVE_MEMORY       /* takes as much as it can get, and gives it back */
+};
+
+static volatile sig_atomic_t misbehave_asked;
+
+static void misbehave_on_signal(int number, siginfo_t *info, void *context) {
+    (void)number, (void)context;
+    misbehave_asked = info->si_value.sival_int;
+}
+
+static inline void misbehave_install(void) {
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_sigaction = misbehave_on_signal;
+    action.sa_flags = SA_SIGINFO | SA_RESTART;
+    sigaction(SIGUSR1, &action, NULL);
+}
+
+static inline uint32_t misbehave_random(uint32_t *seed) {
+    *seed = *seed * 1664525u + 1013904223u;
+    return *seed >> 8;
+}
+
+/* With four descriptors or without. */
+static inline void misbehave_send(const char *text, size_t size, int with_descriptors) {
+    enum { control = 3, count = 4 };
+    char ancillary[CMSG_SPACE(sizeof(int) * count)] __attribute__((aligned(8)));
+    struct iovec part;
+    struct msghdr message;
+    int fds[count], i;
+    memset(&message, 0, sizeof message);
+    memset(ancillary, 0, sizeof ancillary);
+    part.iov_base = (void *)(uintptr_t)text;
+    part.iov_len = size;
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    if (with_descriptors) {
+        for (i = 0; i < count; ++i)
+            fds[i] = open("/dev/null", O_RDWR | O_CLOEXEC);
+        message.msg_control = ancillary;
+        message.msg_controllen = sizeof ancillary;
+        CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
+        CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
+        CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof fds);
+        memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), fds, sizeof fds);
+    }
+    (void)!sendmsg(control, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+    for (i = 0; with_descriptors && i < count; ++i)
+        close(fds[i]);
+}
+
+static inline void misbehave_message(uint32_t seed, int with_descriptors) {
+    static const char *const texts[] = {"{\"type\": \"log\", \"severity\": 1, \"text\": \"a word\"}",
+                                        "{\"type\": \"detached\"}",
+                                        "{\"type\": ",
+                                        "{\"type\": \"log\", \"severity\": [], \"text\": {}}",
+                                        "{\"type\": \"hello\", \"descriptor\": 7}",
+                                        "{\"type\": \"ready\"}",
+                                        "{\"type\": \"attached\", \"role\": \"output\", \"generation\": 99}",
+                                        "{\"type\": \"stopped\", \"status\": 1, \"text\": \"\"}",
+                                        "[[[[[[[[[[[[[[[["};
+    const size_t count = sizeof texts / sizeof *texts;
+    const size_t choice = misbehave_random(&seed) % (count + 1);
+    char garbage[4096];
+    size_t i;
+    if (choice < count) {
+        misbehave_send(texts[choice], strlen(texts[choice]), with_descriptors);
+        return;
+    }
+    for (i = 0; i < sizeof garbage; ++i)
+        garbage[i] = (char)misbehave_random(&seed);
+    misbehave_send(garbage, sizeof garbage, with_descriptors);
+}
+
+/* In the page with its rings alone: what it writes into its images is its own affair. */
+static inline void misbehave_scribble(uint32_t seed) {
+    FILE *maps = fopen("/proc/self/maps", "r");
+    char line[512], mode[8];
+    unsigned long begin, end;
+    while (maps && fgets(line, sizeof line, maps)) {
+        if (!strstr(line, "memfd:arhost-worker-page") || sscanf(line, "%lx-%lx %7s", &begin, &end, mode) != 3 ||
+            mode[1] != 'w')
+            continue;
+        {
+            uint64_t *words = (uint64_t *)begin;
+            const size_t count = (end - begin) / sizeof *words;
+            size_t i;
+            switch (misbehave_random(&seed) % 4) {
+            case 0:
+                for (i = 0; i < count; ++i)
+                    words[i] = misbehave_random(&seed) * UINT64_C(0x9e3779b97f4a7c15);
+                break;
+            case 1:
+                words[misbehave_random(&seed) % count] = misbehave_random(&seed);
+                break;
+            case 2:
+                words[8] += 1 + misbehave_random(&seed) % 20; /* how many results there are: WorkerPage */
+                break;
+            default:
+                madvise(words, end - begin, MADV_REMOVE);
+            }
+        }
+    }
+    if (maps)
+        fclose(maps);
+}
+
+static inline void misbehave_sleep_ms(long ms) {
+    struct timespec time;
+    time.tv_sec = ms / 1000;
+    time.tv_nsec = ms % 1000 * 1000000;
+    nanosleep(&time, NULL);
+}
+
+static inline void misbehave_fill_memory(void) {
+    enum { step = 1 << 20, most = 4096 };
+    void *first = NULL;
+    int i;
+    for (i = 0; i < most; ++i) {
+        void **bytes = (void **)malloc(step);
+        if (!bytes)
+            break;
+        memset(bytes, 1, step);
+        *bytes = first;
+        first = bytes;
+    }
+    while (first) {
+        void *next = *(void **)first;
+        free(first);
+        first = next;
+    }
+}
+
+/* To be called in each frame. Non-zero: the frame is to fail. */
+static inline int misbehave_if_asked(void) {
+    const uint32_t asked = (uint32_t)misbehave_asked;
+    const uint32_t seed = asked >> 8;
+    int i;
+    misbehave_asked = 0;
+    switch (asked & 0xff) {
+    case MISBEHAVE_CRASH:
+        signal(SIGSEGV, SIG_DFL);
+        raise(SIGSEGV);
+        break;
+    case MISBEHAVE_EXIT:
+        _exit((int)(seed & 1));
+    case MISBEHAVE_HANG:
+        if (seed & 1)
+            signal(SIGABRT, SIG_IGN);
+        for (;;)
+            pause();
+    case MISBEHAVE_SLOW:
+        misbehave_sleep_ms(20 + (long)(seed % 200));
+        break;
+    case MISBEHAVE_ERROR:
+        return 1;
+    case MISBEHAVE_MESSAGE:
+        misbehave_message(seed, 0);
+        break;
+    case MISBEHAVE_PASS:
+        for (i = 0; i < 8; ++i)
+            misbehave_message(seed + (uint32_t)i, 1);
+        break;
+    case MISBEHAVE_RING:
+        misbehave_scribble(seed);
+        break;
+    case MISBEHAVE_DOORBELL:
+        for (i = 0; i < 20000; ++i)
+            (void)!send(4, "!", 1, MSG_NOSIGNAL);
+        break;
+    case MISBEHAVE_CLOSE:
+        close(3);
+        break;
+    case MISBEHAVE_DESCRIPTORS:
+        while (open("/dev/null", O_RDONLY | O_CLOEXEC) >= 0) {
+        }
+        break;
+    case MISBEHAVE_MEMORY:
+        misbehave_fill_memory();
+        break;
+    default:
+        break;
+    }
+    return 0;
+}
+
+#endif
