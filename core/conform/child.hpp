@@ -4,6 +4,7 @@
 #pragma once
 
 #include "conform/plugin_library.hpp"
+#include "conform/prints.hpp"
 #include "conform/verdict.hpp"
 
 #include <cstdint>
@@ -17,6 +18,7 @@ struct Subject {
     std::filesystem::path plugin, reference;
     Settings settings;
     std::uint64_t seed = 1;
+    PrintFiles prints;
 };
 
 // The descriptors that a child finds.

@@ -21,11 +21,13 @@ public:
     nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }
     std::filesystem::path path(const std::string &name) const { return run_.path(name); }
 
-    // The wrong ray tracer with this defect.
-    std::filesystem::path link_wrong(const std::string &defect) const {
-        const std::filesystem::path link = path("rt_" + defect + ".so");
+    // The wrong ray tracer with this defect, or that of another kind.
+    std::filesystem::path link_wrong(const std::string &defect, const std::string &kind = "rt") const {
+        const std::filesystem::path link = path(kind + "_" + defect + ".so");
         std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") +
-                                            (defect == "exports_more" ? "wrong_exports_more.so" : "wrong.so"),
+                                            (defect == "exports_more" ? "wrong_exports_more.so"
+                                             : kind == "rt"           ? "wrong.so"
+                                                                      : "wrong_" + kind + ".so"),
                                         link);
         return link;
     }

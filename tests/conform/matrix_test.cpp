@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The suite proves itself: a right ray tracer passes, each wrong one fails the tests named for it and no other.
+// The suite proves itself: a right plugin passes, each wrong one fails the tests named for it and no other.
 #include "conform_run.hpp"
 #include "matrix.hpp"
+#include "matrix_trackers.hpp"
 
 #include <gmock/gmock.h>
 
@@ -19,11 +20,11 @@ class Matrix : public testing::TestWithParam<WrongPlugin> {};
 TEST_P(Matrix, FindsItByTheseTestsAndNoOther) {
     const WrongPlugin &wrong = GetParam();
     ConformRun run;
-    const std::filesystem::path plugin = run.link_wrong(wrong.defect);
+    const std::filesystem::path plugin = run.link_wrong(wrong.defect, wrong.kind);
     // What hangs is waited for, but not for half a minute.
     const bool hangs = wrong.verdict == "timeout";
-    const int status =
-        run.run({plugin.string(), "--jobs", "1", "--patience", hangs ? "0.1" : "3", "--json", "results.json"});
+    const int status = run.run({plugin.string(), "--only", wrong.kind == "rt" ? "*" : wrong.kind + ".*", "--jobs",
+                                "1", "--patience", hangs ? "0.1" : "3", "--json", "results.json"});
     std::vector<std::string> found_by;
     const nlohmann::json report = run.json("results.json");
     for (const nlohmann::json &result : report.at("results"))
@@ -39,34 +40,47 @@ TEST_P(Matrix, FindsItByTheseTestsAndNoOther) {
 
 INSTANTIATE_TEST_SUITE_P(Wrong, Matrix, testing::ValuesIn(wrong_plugins),
                          [](const auto &info) { return info.param.defect; });
+INSTANTIATE_TEST_SUITE_P(WrongTracker, Matrix, testing::ValuesIn(wrong_trackers),
+                         [](const auto &info) { return info.param.defect; });
+
+struct Table {
+    std::string source; // in wrong/
+    const std::vector<WrongPlugin> &plugins;
+};
+const std::vector<Table> tables = {{"wrong.cpp", wrong_plugins}, {"wrong_tracker.cpp", wrong_trackers}};
 
 TEST(MatrixTable, HasAtLeastOneWrongPluginForEveryTest) {
     std::set<std::string> proven;
-    for (const WrongPlugin &wrong : wrong_plugins)
-        proven.insert(wrong.found_by.begin(), wrong.found_by.end());
+    for (const Table &table : tables)
+        for (const WrongPlugin &wrong : table.plugins)
+            proven.insert(wrong.found_by.begin(), wrong.found_by.end());
     EXPECT_EQ(proven, ConformRun::test_names());
 }
 
-TEST(MatrixTable, HasEveryDefectThatTheWrongPluginKnows) {
-    const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conform/wrong/wrong.cpp");
-    for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
-        at += 5;
-        const std::string defect = source.substr(at, source.find('"', at) - at);
-        EXPECT_THAT(wrong_plugins, testing::Contains(testing::Field(&WrongPlugin::defect, defect)));
+TEST(MatrixTable, HasEveryDefectThatTheWrongPluginsKnow) {
+    for (const Table &table : tables) {
+        const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conform/wrong/" + table.source);
+        for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
+            at += 5;
+            const std::string defect = source.substr(at, source.find('"', at) - at);
+            EXPECT_THAT(table.plugins, testing::Contains(testing::Field(&WrongPlugin::defect, defect)));
+        }
     }
 }
 
 // ---- docs/conformance.md ---------------------------------------------------------------------------
 
 TEST(ConformanceDocument, HasTheMatrix) {
-    std::string table = "| what is wrong | verdict | found by |\n| --- | --- | --- |\n";
-    for (const WrongPlugin &wrong : wrong_plugins) {
-        std::string tests;
-        for (const std::string &test : wrong.found_by)
-            tests += (tests.empty() ? "`" : ", `") + test + "`";
-        table += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+    for (const Table &table : tables) {
+        std::string text = "| what is wrong | verdict | found by |\n| --- | --- | --- |\n";
+        for (const WrongPlugin &wrong : table.plugins) {
+            std::string tests;
+            for (const std::string &test : wrong.found_by)
+                tests += (tests.empty() ? "`" : ", `") + test + "`";
+            text += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+        }
+        EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(text));
     }
-    EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(table));
 }
 
 TEST(ConformanceDocument, HasEveryTestAndItsPromise) {
