@@ -131,12 +131,11 @@ struct View {
                 static_cast<int>(std::floor(at.y * marker.print.side))};
     }
 
-    // The mean over a pixel, before what is there.
-    std::uint8_t mean(const shading::Lens &lens, const Offsets &offsets, std::uint32_t x, std::uint32_t y,
-                      std::uint8_t behind) const {
+    // The mean over a pixel, before what is there. The rays: at its top left corner, and from there to the next ones.
+    std::uint8_t mean(const glm::dvec3 &corner, const glm::dvec3 &right_of, const glm::dvec3 &below,
+                      const Offsets &offsets, std::uint8_t behind) const {
         // Within a pixel any lens is linear enough.
-        const glm::dvec3 corner = ray_at(lens, x - 0.5, y - 0.5), right = ray_at(lens, x + 0.5, y - 0.5) - corner,
-                         down = ray_at(lens, x - 0.5, y + 0.5) - corner;
+        const glm::dvec3 right = right_of - corner, down = below - corner;
         const auto met = [&](double u, double v) { return met_by(corner + right * u + down * v); };
         const auto same = [&](const std::optional<glm::dvec2> &a, const std::optional<glm::dvec2> &b) {
             return a && b && cell(*a) == cell(*b) && code(*a) == code(*b);
@@ -184,14 +183,6 @@ Picture Grey::picture() const {
     return picture;
 }
 
-Grey filled(std::uint32_t width, std::uint32_t height, const std::function<int(std::uint32_t, std::uint32_t)> &code) {
-    Grey image{width, height, std::vector<std::uint8_t>(std::size_t{width} * height)};
-    for (std::uint32_t y = 0; y < height; ++y)
-        for (std::uint32_t x = 0; x < width; ++x)
-            image.at(x, y) = static_cast<std::uint8_t>(std::clamp(code(x, y), 0, 255));
-    return image;
-}
-
 Pose pose(const glm::dvec3 &centre, double about_x, double about_y, double about_z) {
     Pose result = glm::translate(Pose(1), centre);
     result = glm::rotate(result, glm::radians(about_z), glm::dvec3(0, 0, 1));
@@ -213,10 +204,23 @@ Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers) {
     std::vector<View> views;
     for (const Placed &marker : markers)
         views.emplace_back(camera, marker);
-    for (const View &view : views)
-        for (std::uint32_t y = view.top; y < view.bottom; ++y)
-            for (std::uint32_t x = view.left; x < view.right; ++x)
-                image.at(x, y) = view.mean(lens, offsets, x, y, image.at(x, y));
+    for (const View &view : views) {
+        const auto rays_at = [&](std::uint32_t row) { // at the pixels' top corners
+            std::vector<glm::dvec3> found;
+            for (std::uint32_t x = view.left; x <= view.right; ++x)
+                found.push_back(ray_at(lens, x - 0.5, row - 0.5));
+            return found;
+        };
+        std::vector<glm::dvec3> above = rays_at(view.top);
+        for (std::uint32_t y = view.top; y < view.bottom; ++y) {
+            std::vector<glm::dvec3> below = rays_at(y + 1);
+            for (std::uint32_t x = view.left; x < view.right; ++x) {
+                const std::size_t i = x - view.left;
+                image.at(x, y) = view.mean(above[i], above[i + 1], below[i], offsets, image.at(x, y));
+            }
+            above = std::move(below);
+        }
+    }
     return image;
 }
 

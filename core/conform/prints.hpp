@@ -11,10 +11,10 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <span>
 #include <vector>
@@ -45,7 +45,14 @@ struct Grey {
     Grey part(std::uint32_t x0, std::uint32_t y0, std::uint32_t part_width, std::uint32_t part_height) const;
     Picture picture() const; // for the report
 };
-Grey filled(std::uint32_t width, std::uint32_t height, const std::function<int(std::uint32_t, std::uint32_t)> &code);
+// Of the codes that code(x, y) gives, clamped to 0 … 255.
+template <class Code> Grey filled(std::uint32_t width, std::uint32_t height, Code &&code) {
+    Grey image{width, height, std::vector<std::uint8_t>(std::size_t{width} * height)};
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            image.at(x, y) = static_cast<std::uint8_t>(std::clamp<int>(code(x, y), 0, 255));
+    return image;
+}
 
 // Marker to camera as arhost_marker.mt has it: GL eye space, mm.
 using Pose = glm::dmat4;

@@ -46,8 +46,6 @@ inline const std::vector<WrongPlugin> wrong_trackers = {
      "fail",
      {"tracker.record", "tracker.deterministic"},
      "tracker"},
-    {"ambiguity_in_percent", "the ambiguity in per cent", "fail", {"tracker.record"}, "tracker"},
-    {"no_error_is_minus_1", "−1 for the reprojection error", "fail", {"tracker.record"}, "tracker"},
     {"nan_alternative", "a NaN in the alternative pose", "fail", {"tracker.record"}, "tracker"},
     {"nan_pose",
      "a NaN in the pose",

@@ -223,10 +223,6 @@ void spoil(Wrong &self, arhost_marker &marker, const arhost_marker_config &confi
         std::memset(marker.family, 'x', sizeof marker.family);
     if (has("age_counts_frames"))
         marker.age_frames = self.tracks;
-    if (has("ambiguity_in_percent"))
-        marker.ambiguity *= 100, marker.ambiguity += 2;
-    if (has("no_error_is_minus_1"))
-        marker.reprojection_px = -1;
     if (has("corners_from_bottom_left"))
         std::rotate(&marker.corners_px[0][0], &marker.corners_px[3][0], &marker.corners_px[3][0] + 2);
     if (has("corners_at_half"))
