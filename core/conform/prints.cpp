@@ -202,11 +202,13 @@ Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers) {
     const shading::Lens lens(camera);
     Grey image = filled(camera.width, camera.height, [](auto, auto) { return background_code; });
     std::vector<View> views;
+    views.reserve(markers.size());
     for (const Placed &marker : markers)
         views.emplace_back(camera, marker);
     for (const View &view : views) {
         const auto rays_at = [&](std::uint32_t row) { // at the pixels' top corners
             std::vector<glm::dvec3> found;
+            found.reserve(view.right - view.left + 1);
             for (std::uint32_t x = view.left; x <= view.right; ++x)
                 found.push_back(ray_at(lens, x - 0.5, row - 0.5));
             return found;

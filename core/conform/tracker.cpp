@@ -99,6 +99,7 @@ Tracker::Tracker(Context &context, Settings overrides)
 arhost_status Tracker::try_start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
                                  arhost_pixel_format pixel_format) {
     std::vector<arhost_marker_config> markers;
+    markers.reserve(listed.size());
     for (const Listed &marker : listed)
         markers.push_back({sizeof(arhost_marker_config), marker.id, marker.side_mm});
     const arhost_frame_format format = format_of(camera.width, camera.height, pixel_format);

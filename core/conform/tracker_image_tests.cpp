@@ -17,6 +17,7 @@ constexpr double side_mm = 80;
 
 std::vector<Listed> listed(std::span<const Print> prints, double side = side_mm) {
     std::vector<Listed> all;
+    all.reserve(prints.size());
     for (const Print &print : prints)
         all.push_back({print.id, side});
     return all;
@@ -118,8 +119,7 @@ void recall(Context &context) {
     }
     context.note = fmt::format("{} of {} found", found, count);
     if (found < least)
-        throw Failure(fmt::format("of {} frames with a marker 50 to 140 px wide, it is found "
-                                  "in {}; {} are the least",
+        throw Failure(fmt::format("of {} frames with a marker 50 to 140 px wide, it is found in {}; {} are the least",
                                   count, found, least))
             .with("a frame where it is not found", missed->picture());
 }
@@ -152,6 +152,7 @@ void several(Context &context) {
         if (backwards)
             std::ranges::reverse(order);
         std::vector<Listed> list;
+        list.reserve(order.size());
         for (const Placed &marker : order)
             list.push_back({marker.print.id, marker.side_mm});
         tracker.start(wide_camera(), list);
