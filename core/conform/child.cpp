@@ -53,6 +53,7 @@ int run_child(const std::string &name, const Subject &subject) {
             continue;
         PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
+        context.prints = subject.prints;
         Result result = run(test, context);
         result.facts = context.facts;
         const std::string line = to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";

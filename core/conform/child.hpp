@@ -4,6 +4,7 @@
 #pragma once
 
 #include "conform/plugin_library.hpp"
+#include "conform/prints.hpp"
 #include "conform/verdict.hpp"
 
 #include <cstdint>
@@ -18,6 +19,7 @@ struct Subject {
     Settings settings;
     std::uint64_t seed = 1;
     std::filesystem::path scratch{}; // of one test; gone after it
+    PrintFiles prints{};
 };
 
 // The descriptors that a child finds.

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <fnmatch.h>
 #include <fstream>
@@ -28,6 +29,19 @@ Settings parse_settings(const std::vector<std::string> &texts) {
         settings[text.substr(0, equals)] = text.substr(equals + 1);
     }
     return settings;
+}
+
+PrintFiles parse_prints(const std::vector<std::string> &texts) {
+    PrintFiles prints;
+    for (const std::string &text : texts) {
+        const std::size_t equals = text.find('=');
+        int id = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + std::min(equals, text.size()), id);
+        if (equals == std::string::npos || error != std::errc() || end != text.data() + equals)
+            throw std::runtime_error("--print " + text + ": must be ID=FILE, a marker's id and its picture");
+        prints[id] = fs::absolute(text.substr(equals + 1));
+    }
+    return prints;
 }
 
 void write(const std::string &file, const std::string &text) {
@@ -81,7 +95,7 @@ int main(int argc, char **argv) {
                  "arhost conform");
     app.get_formatter()->column_width(34);
     RunSettings settings;
-    std::vector<std::string> option_texts;
+    std::vector<std::string> option_texts, print_texts;
     std::string plugin, pattern = "*", json, junit, html, child_test;
     const fs::path own_folder = fs::read_symlink("/proc/self/exe").parent_path();
     std::string reference = (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
@@ -92,6 +106,10 @@ int main(int argc, char **argv) {
     app.add_option("--only", pattern, "Only tests whose name matches, as 'raytracer.*'")->type_name("PATTERN");
     app.add_option("--set", option_texts, "An option of the plugin (again for more)")
         ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    app.add_option("--print", print_texts,
+                   "The PNG of a marker that the tracker finds (again for more), instead of tag36h11's")
+        ->type_name("ID=FILE")
         ->allow_extra_args(false);
     app.add_option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")->type_name("N");
     app.add_option("--jobs", settings.jobs, "Tests at a time")->type_name("N")->check(CLI::Range(1, 256));
@@ -121,6 +139,7 @@ int main(int argc, char **argv) {
         settings.subject.plugin = fs::absolute(plugin);
         settings.subject.reference = fs::absolute(reference);
         settings.subject.settings = parse_settings(option_texts);
+        settings.subject.prints = parse_prints(print_texts);
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
         const Report report = run(settings, pattern, quiet);

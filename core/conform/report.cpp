@@ -48,6 +48,8 @@ std::string Report::command(const Result &result) const {
         fmt::format("arhost conform {} --only {} --seed {}", quoted(subject.plugin), result.test, subject.seed);
     for (const auto &[key, value] : subject.settings)
         text += " --set " + quoted(key + "=" + value);
+    for (const auto &[id, file] : subject.prints)
+        text += fmt::format(" --print {}={}", id, quoted(file.string()));
     return text;
 }
 

@@ -109,6 +109,8 @@ public:
             "--reference",    subject.reference, "--scratch", scratch_.path()};
         for (const auto &[key, value] : subject.settings)
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
+        for (const auto &[id, file] : subject.prints)
+            arguments.insert(arguments.end(), {"--print", std::to_string(id) + "=" + file.string()});
         const pid_t parent = ::getpid();
         pid_ = ::fork();
         if (pid_ == 0)

@@ -6,6 +6,7 @@
 
 #include "conform/picture.hpp"
 #include "conform/plugin_library.hpp"
+#include "conform/prints.hpp"
 #include "conform/verdict.hpp"
 
 #include <arhost/plugin.h>
@@ -49,6 +50,7 @@ struct Context {
     std::mt19937_64 random;                  // of the seed, the same for every test
     ring::Json facts = ring::Json::object(); // of abi.load: what the plugin tells of itself
     std::string note{};                      // beside a pass: what was measured
+    PrintFiles prints{};                     // of the markers that a tracker finds; none: the suite's own
 
     double uniform(double low, double high) {
         // std::uniform_real_distribution differs between libraries.
@@ -74,13 +76,17 @@ std::span<const Test> raytracer_camera_tests();
 std::span<const Test> raytracer_image_tests();
 std::span<const Test> raytracer_life_tests();
 std::span<const Test> raytracer_light_tests();
+std::span<const Test> tracker_image_tests();
+std::span<const Test> tracker_life_tests();
+std::span<const Test> tracker_pose_tests();
 std::span<const Test> source_tests();
 std::span<const Test> sink_tests();
 
 inline std::vector<Test> all_tests() {
     std::vector<Test> all;
     for (const auto part : {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
-                            raytracer_light_tests(), raytracer_image_tests(), source_tests(), sink_tests()})
+                            raytracer_light_tests(), raytracer_image_tests(), tracker_life_tests(),
+                            tracker_pose_tests(), tracker_image_tests(), source_tests(), sink_tests()})
         all.insert(all.end(), part.begin(), part.end());
     return all;
 }

@@ -48,6 +48,20 @@ bool is_in_view(const Motion &motion, const Square &square) {
     return r.col(2).dot(motion.translation) < 0;
 }
 
+// Of a square that faces the camera, as undistorted pixels see it.
+Motion facing(const std::vector<cv::Point2d> &quad, const Lens &lens, double side_mm) {
+    const auto on_plane = [&](const cv::Point2d &px) { // z = 1
+        return cv::Point2d(px.x / lens.undistorted_matrix()(0, 0), px.y / lens.undistorted_matrix()(1, 1));
+    };
+    const cv::Point2d right = on_plane((quad[1] - quad[0] + quad[2] - quad[3]) / 2),
+                      centre = on_plane((quad[0] + quad[1] + quad[2] + quad[3]) / 4);
+    const cv::Point2d x = right / cv::norm(right);
+    Motion motion;
+    cv::Rodrigues(cv::Matx33d(x.x, x.y, 0, x.y, -x.x, 0, 0, 0, -1), motion.rotation);
+    motion.translation = side_mm / cv::norm(right) * cv::Vec3d(centre.x, centre.y, 1);
+    return motion;
+}
+
 // Levenberg–Marquardt on the reprojection error in distorted pixels.
 void refine(Motion &motion, const Corners &corners_px, const Lens &lens, const Square &square) {
     double damping = 1e-6;
@@ -199,6 +213,10 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
         if (is_in_view(motion, square) && std::isfinite(pose.reprojection_px))
             solutions.push_back({motion, pose});
     }
+    // A marker that faces the camera exactly is turned by 180° against OpenCV's axes, for which OpenCV's IPPE gives
+    // 0.
+    if (solutions.empty() && !rotations.empty() && !(cv::norm(rotations[0]) > 0))
+        solutions.push_back({facing(*ideal, lens, side_mm), {}});
     if (solutions.empty())
         return std::nullopt;
     if (solutions.size() == 2 && solutions[1].pose.reprojection_px < solutions[0].pose.reprojection_px)

@@ -21,17 +21,13 @@ public:
     nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }
     std::filesystem::path path(const std::string &name) const { return run_.path(name); }
 
-    // The wrong ray tracer with this defect, the source "source_…" or the sink "sink_…".
-    std::filesystem::path link_wrong(const std::string &defect) const {
-        for (const std::string kind : {"source", "sink"})
-            if (defect.starts_with(kind + "_")) {
-                std::filesystem::create_symlink(ARHOST_WRONG_PLUGIN_DIRECTORY "/wrong_" + kind + ".so",
-                                                path(defect + ".so"));
-                return path(defect + ".so");
-            }
-        const std::filesystem::path link = path("rt_" + defect + ".so");
+    // The wrong ray tracer with this defect, or that of another kind.
+    std::filesystem::path link_wrong(const std::string &defect, const std::string &kind = "rt") const {
+        const std::filesystem::path link = path(kind + "_" + defect + ".so");
         std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") +
-                                            (defect == "exports_more" ? "wrong_exports_more.so" : "wrong.so"),
+                                            (defect == "exports_more" ? "wrong_exports_more.so"
+                                             : kind == "rt"           ? "wrong.so"
+                                                                      : "wrong_" + kind + ".so"),
                                         link);
         return link;
     }

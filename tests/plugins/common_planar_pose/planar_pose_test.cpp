@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 #include <random>
 
@@ -83,6 +84,22 @@ TEST(PlanarPose, FacingMarkerHasXRightYUpAndZTowardsTheViewer) {
     ASSERT_TRUE(found);
     const Mt expected{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 50, 100, -1000, 1};
     EXPECT_THAT(found->best.mt, Pointwise(DoubleNear(1e-3), expected));
+}
+
+TEST(PlanarPose, SquareAboutTheAxisFacesTheCamera) {
+    const auto camera = intrinsics_of({320, 256}, 300, 300, 159.5, 127.5);
+    const double left = 112, right = 207, top = 80, bottom = 175, distance = 300 * side_mm / 95;
+    Corners corners = {{{left, top}, {right, top}, {right, bottom}, {left, bottom}}};
+    for (const int turn : {0, -90, -180, -270}) {
+        for (const double nudge : {0.0, 1e-9, 1e-7, 1e-6}) {
+            Corners nudged = corners;
+            nudged[1] += cv::Point2d(nudge, -nudge / 2);
+            const auto found = planar_pose(nudged, Lens(camera), side_mm);
+            ASSERT_TRUE(found) << turn << ", " << nudge;
+            EXPECT_THAT(found->best.mt, Pointwise(DoubleNear(1e-3), pose_of(0, 0, distance, 0, 0, turn))) << nudge;
+        }
+        std::ranges::rotate(corners, corners.begin() + 1);
+    }
 }
 
 TEST(PlanarPose, ReprojectionErrorIsTheRmsOverTheCornersInDistortedPixels) {

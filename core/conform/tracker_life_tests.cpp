@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A tracker's life from start to stop, what it refuses, what its records say, and that a frame is tracked for itself.
+#include "conform/process_usage.hpp"
+#include "conform/tracker.hpp"
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace arhost::conform {
+namespace {
+
+constexpr double side_mm = 80;
+
+Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25, 40, 15)) {
+    return {prints_of(context.prints).front(), side_mm, at};
+}
+
+// A tracker that has been started with that print alone.
+struct Started {
+    explicit Started(Context &context, Settings overrides = {})
+        : marker(first_print(context)), tracker(context, std::move(overrides)) {
+        tracker.start(wide_camera(), {{marker.print.id, side_mm}});
+    }
+    Grey at(const Pose &where) const { return draw(wide_camera(), Placed{marker.print, side_mm, where}); }
+
+    Placed marker;
+    Tracker tracker;
+};
+
+// Where a new instance that has seen nothing else finds it.
+Pose found_by_new(Context &context, const arhost_intrinsics &camera, const Placed &marker, const Grey &image) {
+    Tracker tracker(context);
+    tracker.start(camera, {{marker.print.id, marker.side_mm}});
+    return pose_of(expect_one(tracker.track(image), marker.print.id, "to a new instance", image));
+}
+
+void start(Context &context) {
+    Started started(context);
+}
+
+void track(Context &context) {
+    Started started(context);
+    const Grey image = started.at(pose({0, 0, -250}));
+    expect_one(started.tracker.track(image), started.marker.print.id, "facing the camera", image);
+}
+
+// ---- What it refuses -------------------------------------------------------------------------------
+
+void unknown_id(Context &context) {
+    Tracker tracker(context);
+    for (const int id : {-1, std::numeric_limits<int>::max()})
+        if (const arhost_status status = tracker.try_start(wide_camera(), {{id, side_mm}});
+            status != ARHOST_ERROR_CONFIGURATION)
+            throw Failure(fmt::format("with marker {}, which no dictionary has, start returned {}; it must be "
+                                      "CONFIGURATION",
+                                      id, status_name(status)));
+}
+
+void unusable_lens(Context &context) {
+    const Print print = prints_of(context.prints).front();
+    Tracker tracker(context);
+    const auto expect_refused = [&](const char *what, const arhost_intrinsics &camera) {
+        if (const arhost_status status = tracker.try_start(camera, {{print.id, side_mm}});
+            status != ARHOST_ERROR_CONFIGURATION && status != ARHOST_ERROR_UNSUPPORTED &&
+            status != ARHOST_ERROR_INVALID_ARGUMENT)
+            throw Failure(fmt::format("with {}, start returned {}; it must be CONFIGURATION, UNSUPPORTED or "
+                                      "INVALID_ARGUMENT",
+                                      what, status_name(status)));
+    };
+    const auto lens = [](arhost_distortion model, std::uint32_t count) {
+        arhost_intrinsics camera = wide_camera();
+        camera.distortion = model;
+        camera.coefficient_count = count;
+        return camera;
+    };
+    expect_refused("a distortion model of number 99", lens(99, 4));
+    expect_refused("Brown's model with 3 coefficients", lens(ARHOST_DISTORTION_BROWN, 3));
+    expect_refused("a fisheye lens with 5 coefficients", lens(ARHOST_DISTORTION_FISHEYE, 5));
+    expect_refused("a focal length of 0", pinhole(320, 256, 0));
+    expect_refused("a focal length that is NaN", pinhole(320, 256, std::numeric_limits<double>::quiet_NaN()));
+}
+
+void cancelled(Context &context) {
+    const auto expect_fine = [](const char *call, arhost_status status) {
+        if (status != ARHOST_OK && status != ARHOST_ERROR_CANCELLED)
+            throw Failure(fmt::format("cancelled before, {} returned {}; it must be OK or CANCELLED", call,
+                                      status_name(status)));
+    };
+    Started running(context);
+    running.tracker.instance().host().cancel();
+    expect_fine("track", running.tracker.try_track(
+                             SealedFrame(running.at(running.marker.camera_from_marker), ARHOST_GREY8), 0, 0));
+    Tracker starting(context);
+    starting.instance().host().cancel();
+    expect_fine("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
+}
+
+// ---- Again and again -------------------------------------------------------------------------------
+
+void start_again(Context &context) {
+    Started started(context);
+    started.tracker.track(started.at(started.marker.camera_from_marker));
+    const Placed marker{prints_of(context.prints).back(), side_mm / 2, tilted({-12, 8, -150}, 30, 100)};
+    const arhost_intrinsics camera = pinhole(240, 200, 250);
+    const Grey image = draw(camera, marker);
+    started.tracker.start(camera, {{marker.print.id, marker.side_mm}});
+    constexpr const char *where = "stopped, and started with another camera and marker";
+    expect_pose(expect_one(started.tracker.track(image), marker.print.id, where, image),
+                found_by_new(context, camera, marker, image), roughly, where, image);
+}
+
+void leaks(Context &context) {
+    constexpr int warm_up = 5, starts = 25, frames = 4;
+    const Placed marker = first_print(context);
+    const arhost_intrinsics camera = pinhole(192, 160, 180);
+    const Grey image = draw(camera, marker);
+    Tracker tracker(context);
+    ProcessUsage before{};
+    for (int i = 0; i < warm_up + starts; ++i) {
+        if (i == warm_up)
+            before = ProcessUsage::now();
+        tracker.start(camera, {{marker.print.id, side_mm}});
+        for (int frame = 0; frame < frames; ++frame)
+            tracker.track(image);
+        tracker.stop();
+    }
+    constexpr long allowed_kib = 8192;
+    if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
+        throw Failure(fmt::format("{} starts with {} frames each led {}", starts, frames, grown));
+}
+
+void longer_structs(Context &context) {
+    struct Longer {
+        arhost_marker_config known;
+        std::uint64_t unknown[2];
+    };
+    const std::vector<Print> prints = prints_of(context.prints);
+    if (prints.size() < 2)
+        throw Skip("it takes two prints");
+    const std::uint64_t garbage = 0xa5a5a5a5a5a5a5a5;
+    std::vector<Longer> listed;
+    listed.reserve(2);
+    for (const Print &print : {prints[1], prints[0]})
+        listed.push_back({{sizeof(Longer), print.id, side_mm}, {garbage, garbage}});
+    const arhost_intrinsics camera = wide_camera();
+    const arhost_frame_format format = format_of(camera.width, camera.height, ARHOST_GREY8);
+    Tracker tracker(context);
+    tracker.instance().expect_ok(
+        "with markers of a longer struct_size, start",
+        tracker.start_with({sizeof(arhost_tracker_setup), 2, &format, &camera, &listed[0].known}));
+    const Placed marker = first_print(context);
+    const Grey image = draw(camera, marker);
+    constexpr const char *where = "listed with a longer struct_size";
+    expect_pose(expect_one(tracker.track(image), marker.print.id, where, image),
+                found_by_new(context, camera, marker, image), roughly, where, image);
+}
+
+// ---- Sameness --------------------------------------------------------------------------------------
+
+bool same_bytes(const arhost_marker &a, const arhost_marker &b) {
+    return std::ranges::equal(std::as_bytes(std::span(&a, 1)), std::as_bytes(std::span(&b, 1)));
+}
+
+void expect_same(std::span<const arhost_marker> is, std::span<const arhost_marker> should, const std::string &where) {
+    if (is.size() != should.size())
+        throw Failure(
+            fmt::format("{}, the same frame has {} records and must have {}", where, is.size(), should.size()));
+    for (std::size_t i = 0; i < is.size(); ++i)
+        if (!same_bytes(is[i], should[i]))
+            throw Failure(fmt::format("{}, the same frame gives another record of marker {}: its place differs by "
+                                      "{:.3g} mm, its first corner by {:.3g} px",
+                                      where, should[i].id, glm::distance(pose_of(is[i])[3], pose_of(should[i])[3]),
+                                      std::hypot(is[i].corners_px[0][0] - should[i].corners_px[0][0],
+                                                 is[i].corners_px[0][1] - should[i].corners_px[0][1])));
+}
+
+void deterministic(Context &context) {
+    Started one(context), other(context);
+    const Grey image = one.at(one.marker.camera_from_marker);
+    const std::vector<arhost_marker> first = one.tracker.track(image);
+    expect_same(one.tracker.track(image), first, "the second time");
+    expect_same(one.tracker.track(image), first, "the third time");
+    expect_same(other.tracker.track(image), first, "in another instance");
+}
+
+void threads(Context &context) {
+    const arhost_option_descriptor *option = context.library.option("threads");
+    if (!option || option->type != ARHOST_OPTION_INTEGER)
+        throw Skip("it has no integer option 'threads'");
+    Started one(context, {{"threads", "1"}});
+    const Grey image = one.at(one.marker.camera_from_marker);
+    const std::vector<arhost_marker> alone = one.tracker.track(image);
+    for (const char *count : {"2", "3"})
+        expect_same(Started(context, {{"threads", count}}).tracker.track(image), alone,
+                    fmt::format("on {} threads", count));
+}
+
+void frames_before(Context &context) {
+    Started started(context);
+    const Pose here = started.marker.camera_from_marker, there = tilted({-60, 40, -320}, 45, 200, 120);
+    const Grey empty = filled(320, 256, [](auto, auto) { return background_code; });
+    const auto expect_at = [&](const Pose &where, const char *when) {
+        const Grey image = started.at(where);
+        expect_pose(expect_one(started.tracker.track(image), started.marker.print.id, when, image),
+                    found_by_new(context, wide_camera(), started.marker, image), roughly, when, image);
+    };
+    expect_at(here, "in the first frame");
+    expect_at(there, "elsewhere in the next frame");
+    expect_none(started.tracker.track(empty), "taken away", empty);
+    expect_none(started.tracker.track(empty), "taken away", empty);
+    expect_at(here, "there again");
+}
+
+void out_of_order(Context &context) {
+    struct Stamp {
+        const char *what;
+        std::uint64_t sequence;
+        std::int64_t capture_ns;
+    };
+    Started started(context);
+    const Pose places[] = {started.marker.camera_from_marker, tilted({-30, 30, -300}, 30, 130)};
+    const Grey images[] = {started.at(places[0]), started.at(places[1])};
+    const Pose found[] = {found_by_new(context, wide_camera(), started.marker, images[0]),
+                          found_by_new(context, wide_camera(), started.marker, images[1])};
+    std::size_t count = 0;
+    for (const Stamp &stamp :
+         {Stamp{"in the first frame", 0, 0}, Stamp{"in the second frame", 1, frame_ns},
+          Stamp{"in the same frame once more", 1, frame_ns}, Stamp{"after 7 dropped frames", 9, 9 * frame_ns},
+          Stamp{"in a frame of 4 frames ago", 5, 5 * frame_ns},
+          Stamp{"in another frame of the same time", 6, 5 * frame_ns},
+          Stamp{"after an hour", 108'000, 108'000 * frame_ns}, Stamp{"in the sequence's first frame again", 0, 0}}) {
+        const std::size_t which = count++ % 2;
+        started.tracker.instance().expect_ok(
+            fmt::format("{}, track", stamp.what).c_str(),
+            started.tracker.try_track(SealedFrame(images[which], ARHOST_GREY8), stamp.sequence, stamp.capture_ns));
+        const arhost_marker marker =
+            expect_one(started.tracker.detected(), started.marker.print.id, stamp.what, images[which]);
+        expect_pose(marker, found[which], roughly, stamp.what, images[which]);
+    }
+}
+
+// ---- Records ---------------------------------------------------------------------------------------
+
+constexpr double orthonormal = 1e-9; // arhost/tracker.h
+
+// What keeps a matrix from being a rigid motion, as the end of a sentence; empty: nothing.
+std::string not_rigid(const double *m, double tolerance) {
+    if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
+        return "is not finite";
+    if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
+        return fmt::format("has the last row ({}, {}, {}, {}), which must be (0, 0, 0, 1)", m[3], m[7], m[11], m[15]);
+    const glm::dvec3 axis[] = {{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j)
+            if (const double off = glm::dot(axis[i], axis[j]) - (i == j ? 1 : 0); !(std::abs(off) <= tolerance))
+                return fmt::format("has a rotation that is {:.3g} off orthonormal; {} are allowed", std::abs(off),
+                                   tolerance);
+    if (glm::dot(glm::cross(axis[0], axis[1]), axis[2]) < 0)
+        return "mirrors: its determinant is −1";
+    return "";
+}
+
+template <class Check> void of_several_poses(Context &context, Check &&check) {
+    Started started(context);
+    for (const Pose &at :
+         {pose({0, 0, -250}), tilted({40, 30, -300}, 50, 20, 90), tilted({-60, -20, -280}, 40, 250, 200)}) {
+        const Grey image = started.at(at);
+        const arhost_marker marker =
+            expect_one(started.tracker.track(image), started.marker.print.id, "in view", image);
+        if (const std::string problem = check(marker); !problem.empty())
+            throw Failure("the record's " + problem).with("frame", image.picture());
+    }
+}
+
+void rigid(Context &context) {
+    of_several_poses(context, [](const arhost_marker &marker) {
+        const std::string problem = not_rigid(marker.mt, orthonormal);
+        return problem.empty() ? "" : "mt " + problem;
+    });
+}
+
+void record(Context &context) {
+    of_several_poses(context, [](const arhost_marker &marker) -> std::string {
+        if (marker.struct_size != sizeof marker)
+            return fmt::format("struct_size is {} and must be {}", marker.struct_size, sizeof marker);
+        const auto *end = static_cast<const char *>(std::memchr(marker.family, 0, sizeof marker.family));
+        if (!end || end == marker.family)
+            return end ? "family is empty" : "family does not end within its 32 bytes";
+        if (marker.age_frames != 0)
+            return fmt::format("age_frames is {} in a frame where it is detected, and must be 0", marker.age_frames);
+        if (!(marker.reprojection_px >= 0 && marker.reprojection_px <= 1))
+            return fmt::format("reprojection_px is {} and must be from 0 to 1 in a sharp frame",
+                               marker.reprojection_px);
+        if (!(marker.ambiguity >= 0 && marker.ambiguity <= 1))
+            return fmt::format("ambiguity is {} and must be from 0 to 1", marker.ambiguity);
+        const double *other = marker.mt_alternative;
+        if (std::any_of(other, other + 16, [](double value) { return value != 0; }))
+            if (const std::string problem = not_rigid(other, orthonormal); !problem.empty())
+                return "mt_alternative " + problem;
+        return "";
+    });
+}
+
+// ---- Speed -----------------------------------------------------------------------------------------
+
+void speed(Context &context) {
+    constexpr int frames = 31;
+    const arhost_intrinsics camera = pinhole(640, 480, 600);
+    const Placed marker = first_print(context);
+    const SealedFrame frame(draw(camera, marker), ARHOST_GREY8);
+    Tracker tracker(context);
+    tracker.start(camera, {{marker.print.id, side_mm}});
+    tracker.track(frame);
+    std::vector<double> ms;
+    for (int i = 0; i < frames; ++i) {
+        const auto begin = std::chrono::steady_clock::now();
+        tracker.track(frame);
+        ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    }
+    std::ranges::sort(ms);
+    const double median = ms[frames / 2];
+    context.note = fmt::format("640×480 in {:.1f} ms p50, {:.1f} ms p99", median, ms[frames * 99 / 100]);
+    constexpr double bound_ms = 50;
+    if (median > bound_ms)
+        throw Warning(context.note);
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
+constexpr const char *gate = "tracker.track";
+constexpr Test tests[] = {
+    {"tracker.start", "It starts with a camera and a marker, and stops.", kind, "abi.create", 30s, start},
+    {"tracker.track",
+     "It finds a print that faces the camera, in a frame that is read-only and has no readable byte around.", kind,
+     "tracker.start", 30s, track},
+    {"tracker.start-again", "After a stop it starts with another camera, size and marker.", kind, gate, 30s,
+     start_again},
+    {"tracker.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
+     60s, leaks},
+    {"tracker.unknown-id", "An id that no dictionary has is refused as CONFIGURATION.", kind, gate, 20s, unknown_id},
+    {"tracker.unusable-lens", "A lens of no model, or without focal length, is refused.", kind, gate, 20s,
+     unusable_lens},
+    {"tracker.longer-structs", "It steps through the markers by their struct_size.", kind, gate, 20s, longer_structs},
+    {"tracker.cancelled", "Cancelled before, start and track return soon, OK or CANCELLED.", kind, gate, 20s,
+     cancelled},
+    {"tracker.record", "A record is whole: size, family, age 0, error and ambiguity within their ranges.", kind, gate,
+     20s, record},
+    {"tracker.rigid", "A pose is finite, orthonormal to 1e-9, with determinant 1 and last row 0 0 0 1.", kind, gate,
+     20s, rigid},
+    {"tracker.deterministic", "The same frame gives the same bytes, again and in another instance.", kind, gate, 20s,
+     deterministic},
+    {"tracker.threads", "Any number of threads gives the same result.", kind, gate, 20s, threads},
+    {"tracker.frames-before", "What is detected is in this frame, and its pose this frame's, whatever came before.",
+     kind, gate, 20s, frames_before},
+    {"tracker.out-of-order", "Dropped, repeated and older frames are tracked like others.", kind, gate, 20s,
+     out_of_order},
+    {"tracker.speed", "A frame of 640×480 takes less than 50 ms on the median; a warning otherwise.", kind, gate, 60s,
+     speed},
+};
+
+} // namespace
+
+std::span<const Test> tracker_life_tests() {
+    return tests;
+}
+
+} // namespace arhost::conform
