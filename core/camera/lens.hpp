@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where a camera sees a point: the formulas of arhost/camera.h in double precision, for tests and tools.
+// Where a camera sees a point: the formulas of arhost/camera.h in double precision.
 #pragma once
 
 #include <arhost/camera.h>

@@ -37,4 +37,16 @@ inline std::string growth(const ProcessUsage &before, const ProcessUsage &after,
     return {};
 }
 
+// What `work` leaves behind each time; empty: nothing. What an allocator keeps it keeps once, so a second look tells.
+template <class Work> std::string growth_by(Work &&work, long resident_kib_allowed) {
+    std::string grown;
+    for (int look = 0; look < 2; ++look) {
+        const ProcessUsage before = ProcessUsage::now();
+        work();
+        if ((grown = growth(before, ProcessUsage::now(), resident_kib_allowed)).empty())
+            break;
+    }
+    return grown;
+}
+
 } // namespace arhost::conform

@@ -56,7 +56,7 @@ arhost_marker marker(double z_mm) {
 
 } // namespace
 
-SealedFrame::SealedFrame(const Look &look) {
+SealedOutput::SealedOutput(const Look &look) {
     const Size &size = look.size;
     const std::uint32_t stride = ring::OutputSlot::stride(size.width) + look.padding;
     const std::size_t pixels = std::size_t{stride} * size.height, page = whole_pages(1);
@@ -94,14 +94,14 @@ SealedFrame::SealedFrame(const Look &look) {
     seal();
 }
 
-SealedFrame::~SealedFrame() {
+SealedOutput::~SealedOutput() {
     ::munmap(memory_, size_ + whole_pages(1));
 }
 
-void SealedFrame::seal() {
+void SealedOutput::seal() {
     ::mprotect(memory_, size_, PROT_READ);
 }
-void SealedFrame::unseal() {
+void SealedOutput::unseal() {
     ::mprotect(memory_, size_, PROT_READ | PROT_WRITE);
 }
 
@@ -150,18 +150,18 @@ void SinkRun::start(std::uint64_t first_sequence, const Size &size) {
     instance_->expect_ok("start", try_start(first_sequence, size));
 }
 
-arhost_status SinkRun::try_write(const SealedFrame &frame) {
+arhost_status SinkRun::try_write(const SealedOutput &frame) {
     return in_call(library_.calls(), Call::per_frame,
                    [&] { return functions_.write(instance_->get(), &frame.output()); });
 }
 
-void SinkRun::write(const SealedFrame &frame) {
+void SinkRun::write(const SealedOutput &frame) {
     instance_->expect_ok(fmt::format("write of frame {}", frame.output().record->sequence).c_str(), try_write(frame));
 }
 
 void SinkRun::write(std::uint64_t first, std::uint64_t end) {
     for (std::uint64_t sequence = first; sequence < end; ++sequence)
-        write(SealedFrame({sequence, size_}));
+        write(SealedOutput({sequence, size_}));
 }
 
 arhost_status SinkRun::try_idle() {

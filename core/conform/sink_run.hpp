@@ -19,7 +19,7 @@ struct Size {
 
 // A frame in memory that can't be written, as the host's is, with memory behind its last row that can't be read.
 // Its pixels are noise, which no encoder makes small: each frame is another.
-class SealedFrame {
+class SealedOutput {
 public:
     struct Look {
         std::uint64_t sequence;
@@ -28,10 +28,10 @@ public:
         std::uint8_t in_padding = 0; // what is there
         bool other = false;          // another frame of that number
     };
-    explicit SealedFrame(const Look &look);
-    ~SealedFrame();
-    SealedFrame(const SealedFrame &) = delete;
-    SealedFrame &operator=(const SealedFrame &) = delete;
+    explicit SealedOutput(const Look &look);
+    ~SealedOutput();
+    SealedOutput(const SealedOutput &) = delete;
+    SealedOutput &operator=(const SealedOutput &) = delete;
 
     // Only for who has not given it to a sink yet.
     template <class Change> void change(Change &&change) {
@@ -66,8 +66,8 @@ public:
 
     arhost_status try_start(std::uint64_t first_sequence = 0, const Size &size = {});
     void start(std::uint64_t first_sequence = 0, const Size &size = {}); // throws Failure unless it succeeds
-    arhost_status try_write(const SealedFrame &frame);
-    void write(const SealedFrame &frame); // throws Failure unless it succeeds
+    arhost_status try_write(const SealedOutput &frame);
+    void write(const SealedOutput &frame); // throws Failure unless it succeeds
     void write(std::uint64_t first, std::uint64_t end);
     arhost_status try_idle();
     arhost_status try_stop();

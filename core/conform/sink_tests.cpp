@@ -128,16 +128,16 @@ void two_instances(Context &context) {
 void leaks(Context &context) {
     constexpr int warm_up = 2, starts = 10;
     SinkRun run(context, "out");
-    ProcessUsage before{};
-    for (int i = 0; i < warm_up + starts; ++i) {
-        if (i == warm_up)
-            before = ProcessUsage::now();
-        run.start();
-        run.write(0, 8);
-        run.stop();
-    }
+    const auto work = [&](int count) {
+        for (int i = 0; i < count; ++i) {
+            run.start();
+            run.write(0, 8);
+            run.stop();
+        }
+    };
+    work(warm_up);
     constexpr long allowed_kib = 8192;
-    if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
+    if (const std::string grown = growth_by([&] { work(starts); }, allowed_kib); !grown.empty())
         throw Failure(fmt::format("{} starts with 8 frames each led {}", starts, grown));
 }
 
@@ -165,7 +165,7 @@ void cancelled(Context &context) {
     running.start();
     running.write(0, 1);
     running.instance().host().cancel();
-    expect_fine("write", running.try_write(SealedFrame({1})));
+    expect_fine("write", running.try_write(SealedOutput({1})));
     expect_fine("stop", running.try_stop());
     starting.instance().host().cancel();
     expect_fine("start", starting.try_start());
@@ -195,7 +195,7 @@ void stride(Context &context) {
         SinkRun sink(context, folder);
         sink.start(0, size);
         for (std::uint64_t n = 0; n < 3; ++n)
-            sink.write(SealedFrame({n, size, padding, in_padding}));
+            sink.write(SealedOutput({n, size, padding, in_padding}));
         sink.stop();
         return sink.files();
     };
@@ -209,7 +209,7 @@ void records(Context &context) {
     run.start();
     std::uint64_t n = 0;
     const auto write = [&](const char *what, void (*change)(arhost_record &)) {
-        SealedFrame frame({n++});
+        SealedOutput frame({n++});
         frame.change(change);
         run.instance().expect_ok(fmt::format("write of a frame {}", what).c_str(), run.try_write(frame));
     };
@@ -283,7 +283,7 @@ void last_frame(Context &context) {
     SinkRun run(context, "other");
     run.start();
     run.write(0, 2);
-    run.write(SealedFrame({.sequence = 2, .size = {}, .padding = 0, .in_padding = 0, .other = true}));
+    run.write(SealedOutput({.sequence = 2, .size = {}, .padding = 0, .in_padding = 0, .other = true}));
     run.stop();
     if (run.files() == one)
         throw Failure("with another last frame, and another camera, its files are the same");
@@ -433,7 +433,7 @@ void full_disk(Context &context) {
         const FullDisk disk(largest / 2);
         status = run.try_start();
         for (std::uint64_t n = 0; n < frames && status == ARHOST_OK; ++n)
-            status = run.try_write(SealedFrame({n}));
+            status = run.try_write(SealedOutput({n}));
         const arhost_status stopped = run.try_stop();
         status = status == ARHOST_OK ? stopped : status;
     }
@@ -457,7 +457,7 @@ void speed(Context &context) {
     run.start(0, size);
     std::vector<double> ms;
     for (std::uint64_t n = 0; n < 11; ++n) {
-        const SealedFrame frame({n, size});
+        const SealedOutput frame({n, size});
         const auto begin = std::chrono::steady_clock::now();
         run.write(frame);
         ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());

@@ -45,10 +45,10 @@ private:
     std::map<std::string, Promise> all_;
 };
 
-// source.capture-time: on the monotonic clock, a frame was captured before now, and not long before.
+// source.capture-time: on the monotonic clock, a frame was captured before now.
 void look_at_capture_time(Promises &promises, const arhost_record &record, std::int64_t now_ns);
 
-// tracker.order, tracker.numbers, and tracker.pose: each corner is where the pose has it, and as far off as is told.
+// tracker.order, tracker.numbers, and tracker.pose: corners are as far from where the pose has them as is told.
 void look_at_markers(Promises &promises, const arhost_record &record, const arhost_intrinsics &intrinsics,
                      std::span<const arhost_marker_config> markers);
 
@@ -56,7 +56,7 @@ void look_at_markers(Promises &promises, const arhost_record &record, const arho
 std::size_t sample_of(std::span<const std::byte> bytes, std::uint64_t frame);
 
 // raytracer.region: alpha is 0 outside of the region that is told.
-// raytracer.place: where alpha is 255 the camera looks towards a virtual object, while none moves.
+// raytracer.place: where alpha is 255 a pinhole camera looks towards a virtual object, while none moves.
 class OverlayPromises {
 public:
     explicit OverlayPromises(const arhost_scene &scene);
@@ -68,7 +68,9 @@ private:
     struct Box {
         glm::dvec3 min, max;
     };
-    bool knows_place_;               // else opaque pixels may be anywhere
+    static void extend(std::optional<Box> &box, const glm::dvec3 &point);
+
+    bool knows_place_ = false;       // else opaque pixels may be anywhere
     std::optional<Box> virtual_box_; // world, mm; none: no virtual object
 };
 

@@ -53,8 +53,9 @@ std::string read(const ImageRequest &request) {
                            texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
                            const_cast<ImageRequest *>(&request)))
         return "can't be loaded: " + input->geterror();
-    if (input->has_error()) // a cut JPEG: the decoder has filled in what is missing
-        return "is damaged: " + input->geterror();
+    // What is missing of a cut JPEG the decoder has filled in. What else it notes is harmless.
+    if (const std::string noted = input->geterror(); noted.find("Premature end") != noted.npos)
+        return "is cut short: " + noted;
     const std::size_t count = std::size_t(spec.width) * spec.height;
     if (is_float)
         expand(reinterpret_cast<float *>(texels), count, grey, alpha, 1.f);

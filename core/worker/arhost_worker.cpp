@@ -6,22 +6,6 @@
 
 #include <cstdio>
 #include <fcntl.h>
-#include <malloc.h>
-
-namespace {
-
-// What a plugin frees after a frame it wants again with the next one: giving it back to the system in between costs
-// trackers a quarter of their time, in page faults. (glibc raises these thresholds by itself only in processes that
-// have freed something large.)
-void keep_freed_memory() {
-#ifdef __GLIBC__
-    constexpr int mib = 1 << 20;
-    ::mallopt(M_MMAP_THRESHOLD, 32 * mib); // the most that it takes
-    ::mallopt(M_TRIM_THRESHOLD, 64 * mib);
-#endif
-}
-
-} // namespace
 
 int main() {
     using namespace arhost;
@@ -30,7 +14,7 @@ int main() {
         std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
         return 2;
     }
-    keep_freed_memory();
+    worker::keep_freed_memory();
     worker::Link link{ring::Channel(ring::UniqueFd(control_fd)), ring::UniqueFd(doorbell_fd)};
     return worker::work(link);
 }

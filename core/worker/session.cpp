@@ -8,6 +8,7 @@
 
 #include <cstdlib>
 #include <ctime>
+#include <malloc.h>
 #include <sys/prctl.h>
 
 namespace arhost::worker {
@@ -227,6 +228,14 @@ int serve(Link &link) {
 }
 
 } // namespace
+
+void keep_freed_memory() {
+#ifdef __GLIBC__
+    constexpr int mib = 1 << 20;
+    ::mallopt(M_MMAP_THRESHOLD, 32 * mib); // the most that it takes
+    ::mallopt(M_TRIM_THRESHOLD, 64 * mib);
+#endif
+}
 
 int work(Link &link) {
     try {

@@ -147,7 +147,7 @@ TEST(Conform, LeavesNothingOfASinksFilesBehind) {
     ConformRun run;
     std::filesystem::create_directory(run.path("tmp"));
     ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
-    run.link_wrong("sink_crash_in_stop");
+    run.link_wrong("crash_in_stop", "sink");
     EXPECT_EQ(run.run({"sink_crash_in_stop.so", "--only", "sink.w*", "--set", "path=out/frame"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("SIGSEGV in stop"));
     EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));

@@ -15,6 +15,7 @@ using testing::HasSubstr;
 std::string configuration(const std::string &raytracer, const std::string &more = "") {
     return R"(version: 1
 source: {plugin: source_synthetic, options: {frames: 40, width: 320, height: 240}, conform: true}
+camera: {width: 320, height: 240, fx: 300}
 tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], conform: true}
 raytracer: {plugin: )" +
            raytracer + R"(, scene: scene.yaml, conform: true, reads: [)" ARHOST_PLUGIN_DIRECTORY R"(]}

@@ -137,13 +137,14 @@ TEST(MarkerPromises, AreBrokenByOneThatIsNot) {
     expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is seen, and 3 frames old");
     expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
     expect([](arhost_marker &m) { m.mt[14] = -0.5; },
-           "tracker.pose: frame 12: marker 4: its pose has the corners"); // metres
+           "tracker.pose: frame 12: marker 4: its reprojection is told as 0.000 px"); // metres
     expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
     expect([](arhost_marker &m) { m.reprojection_px = 1; }, "its reprojection is told as 1.000 px and is 0.000 px");
-    EXPECT_THAT(broken_by({marker(4, 40)}), HasSubstr("its pose has the corners")) << "half the side";
+    EXPECT_THAT(broken_by({marker(4, 40)}), HasSubstr("its reprojection is told as 0.000 px and is "))
+        << "half the side";
 }
 
-TEST(CapturePromises, WantATimeBeforeNowAndNotLongBefore) {
+TEST(CapturePromises, WantATimeBeforeNow) {
     const auto captured = [](arhost_clock clock, std::int64_t capture_ns) {
         arhost_record r = record({});
         r.clock = clock;
@@ -155,8 +156,7 @@ TEST(CapturePromises, WantATimeBeforeNowAndNotLongBefore) {
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 99'990'000'000), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
               "source.capture-time: frame 12: was captured 0.250 s after it came");
-    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0),
-              "source.capture-time: frame 12: was captured 100 s before it came");
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "buffers may be long";
     EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "a film's times say nothing of now";
 }
 
@@ -193,7 +193,7 @@ TEST(OverlayPromises, AreBrokenOutsideTheRegionAndOffTheObjects) {
         "raytracer.region: frame 2: pixel (100, 50): alpha is 255 outside of the region, which is 60 x 70 px from "
         "(300, 200)");
     EXPECT_EQ(view.broken(), "raytracer.place: frame 2: pixel (100, 50): alpha is 255, but all virtual objects are "
-                             "between (296, 201) and (364, 269)");
+                             "between (297, 201) and (363, 269)");
 }
 
 TEST(OverlayPromises, KnowThatACatcherIsNoVirtualObject) {

@@ -153,7 +153,7 @@ TEST(Textures, TellWhatIsWrongWithTheirFile) {
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
     EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: can't be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: can't be loaded: "));
-    EXPECT_THAT(error("a.jpg", jpeg().substr(0, jpeg().size() - 3)), HasSubstr("a.jpg: is damaged: "));
+    EXPECT_THAT(error("a.jpg", jpeg().substr(0, jpeg().size() - 3)), HasSubstr("a.jpg: is cut short: "));
     EXPECT_EQ(error("a.png", png(16385, 1, 1, "")), "s.yaml:4:32: materials.a.texture: a.png: has 16385 x 1 pixels; "
                                                     "up to 16384 a side are loaded, so scale it down");
     EXPECT_EQ(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: b.png}\nobjects: []\n"),
