@@ -55,8 +55,11 @@ function(arhost_add_test name)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
+  # LeakSanitizer may crash on its way through the thread-locals of libraries that were opened late, as the module for
+  # images opens them: it goes without them.
+  set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT}
-                       ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0"
+                       ENVIRONMENT "LSAN_OPTIONS=${lsan_options}"
                        LABELS "${ARG_LABELS}")
 endfunction()
