@@ -52,13 +52,14 @@ std::string problem_with_numbers(const arhost_marker &marker) {
 // RMS over the corners, px; none where one is behind the camera.
 std::optional<double> reprojection_px(const arhost_marker &marker, const arhost_intrinsics &intrinsics,
                                       double side_mm) {
-    const double s = side_mm / 2, corners[4][2] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}}; // arhost/tracker.h
+    const double s = side_mm / 2;
+    const glm::dvec2 corners[] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}}; // arhost/tracker.h
     const double(&m)[16] = marker.mt;
     double sum = 0;
     for (int i = 0; i < 4; ++i) {
-        const auto [x, y] = corners[i];
-        const glm::dvec3 eye_space(m[0] * x + m[4] * y + m[12], m[1] * x + m[5] * y + m[13],
-                                   m[2] * x + m[6] * y + m[14]);
+        const glm::dvec2 &p = corners[i];
+        const glm::dvec3 eye_space(m[0] * p.x + m[4] * p.y + m[12], m[1] * p.x + m[5] * p.y + m[13],
+                                   m[2] * p.x + m[6] * p.y + m[14]);
         const auto seen = camera::project(intrinsics, {eye_space.x, -eye_space.y, -eye_space.z}); // GL → OpenCV
         if (!seen)
             return std::nullopt;
