@@ -82,10 +82,10 @@ std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsi
 struct Rectangle {
     glm::dvec2 min{1e30}, max{-1e30};
 };
-template <class Box> std::optional<Rectangle> rectangle_of(const Box &box, const arhost_camera &camera) {
+std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera &camera) {
     Rectangle seen;
     for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 part(corner & 1, corner >> 1 & 1, corner >> 2);
+        const glm::vec3 part(corner & 1, corner >> 1 & 1, corner >> 2);
         const auto at =
             camera::project(camera.intrinsics, camera::in_camera(camera, glm::mix(box.min, box.max, part)));
         if (!at)
@@ -149,40 +149,25 @@ OverlayPromises::OverlayPromises(const arhost_scene &scene) {
         scene.duration_s == 0 && !is_opaque(scene.shadow_alpha_opaque) && !is_opaque(scene.shadow_alpha_translucent);
     if (!knows_place_)
         return;
-    const auto at = [&]<class T>(const arhost_buffer &buffer, std::uint32_t i, const T *) {
-        return reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset +
-                                           std::size_t(i) * buffer.stride);
+    const auto all = [&]<class T>(const arhost_buffer &buffer, const T *) {
+        return std::span(reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset),
+                         buffer.count);
     };
-    std::map<std::uint32_t, std::optional<Box>> of_geometries; // which may be many objects'
-    for (std::uint32_t i = 0; i < scene.objects.count; ++i) {
-        const arhost_object &object = *at(scene.objects, i, static_cast<const arhost_object *>(nullptr));
-        if (object.role != ARHOST_VIRTUAL)
+    const auto geometries = all(scene.geometries, static_cast<const arhost_geometry *>(nullptr));
+    std::map<std::uint32_t, scene::Box> of_geometries; // which may be many objects'
+    for (const arhost_object &object : all(scene.objects, static_cast<const arhost_object *>(nullptr))) {
+        const arhost_geometry &geometry = geometries[object.geometry];
+        if (object.role != ARHOST_VIRTUAL || geometry.positions.count == 0)
             continue;
-        const auto [known, is_new] = of_geometries.try_emplace(object.geometry);
-        std::optional<Box> &box = known->second;
-        const auto &geometry = *at(scene.geometries, object.geometry, static_cast<const arhost_geometry *>(nullptr));
-        for (std::uint32_t v = 0; is_new && v < geometry.positions.count; ++v) {
-            const float *p = at(geometry.positions, v, static_cast<const float *>(nullptr));
-            const glm::dvec3 centre(p[0], p[1], p[2]), reach(geometry.type == ARHOST_SPHERES ? p[3] : 0);
-            extend(box, centre - reach);
-            extend(box, centre + reach);
-        }
-        const float(&m)[12] = object.world_from_object;
-        for (int corner = 0; box && corner < 8; ++corner) {
-            const glm::dvec3 p = glm::mix(box->min, box->max, glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2));
-            glm::dvec3 world;
-            for (int k = 0; k < 3; ++k)
-                world[k] = double(m[k]) * p.x + double(m[3 + k]) * p.y + double(m[6 + k]) * p.z + m[9 + k];
-            extend(virtual_box_, world);
-        }
+        const auto [box, is_new] = of_geometries.try_emplace(object.geometry);
+        if (is_new)
+            box->second = geometry.type == ARHOST_SPHERES
+                              ? scene::box_of(all(geometry.positions, static_cast<const glm::vec4 *>(nullptr)))
+                              : scene::box_of(all(geometry.positions, static_cast<const glm::vec3 *>(nullptr)));
+        if (!virtual_box_)
+            virtual_box_.emplace();
+        virtual_box_->include(scene::transformed(object.world_from_object, box->second));
     }
-}
-
-void OverlayPromises::extend(std::optional<Box> &box, const glm::dvec3 &point) {
-    if (!box)
-        box = Box{point, point};
-    box->min = glm::min(box->min, point);
-    box->max = glm::max(box->max, point);
 }
 
 void OverlayPromises::look(Promises &promises, std::uint64_t frame, const arhost_camera &camera, const Region &region,

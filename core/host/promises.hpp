@@ -6,13 +6,12 @@
 #pragma once
 
 #include "compositor/compositor.hpp"
+#include "scene/box.hpp"
 
 #include <arhost/frame.h>
 #include <arhost/scene.h>
 #include <arhost/sink.h>
 #include <arhost/tracker.h>
-
-#include <glm/vec3.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -65,13 +64,8 @@ public:
               const ImageView &overlay) const;
 
 private:
-    struct Box {
-        glm::dvec3 min, max;
-    };
-    static void extend(std::optional<Box> &box, const glm::dvec3 &point);
-
-    bool knows_place_ = false;       // else opaque pixels may be anywhere
-    std::optional<Box> virtual_box_; // world, mm; none: no virtual object
+    bool knows_place_ = false;              // else opaque pixels may be anywhere
+    std::optional<scene::Box> virtual_box_; // world, mm; none: no virtual object
 };
 
 } // namespace arhost::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Boxes round geometries. Private to core/scene.
+// Boxes round geometries.
 #pragma once
 
 #include "scene/arena.hpp"

@@ -42,6 +42,16 @@ inline void leak_memory() {
     kept.emplace_back(1 << 18, 'x');
 }
 
+// The plugin in this file of arhost's own, for who spoils it.
+inline const arhost_plugin &open_plugin(const char *file) {
+    void *library = ::dlopen(file, RTLD_NOW | RTLD_LOCAL);
+    const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
+    const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
+    arhost_answer answer{sizeof answer, 0, nullptr};
+    entry->negotiate(&offer, &answer);
+    return *answer.plugin;
+}
+
 // Negotiates for the class T under the file's name, which is another for each defect.
 template <class T>
 arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, const arhost_descriptor &descriptor,

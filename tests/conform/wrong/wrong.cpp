@@ -2,53 +2,27 @@
 //
 // Every wrong ray tracer at once: rt_embree with the one defect that this library's file name tells, so
 // rt_bgra.so, a link to it, has red and blue exchanged. A name that is no defect's has none.
+#include "defect.hpp"
+
 #include <arhost/arhost.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstdlib>
 #include <cstring>
-#include <dlfcn.h>
-#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <thread>
-#include <unistd.h>
-#include <utility>
 #include <vector>
 
 namespace {
 
-// ---- Which defect, and the ray tracer that is spoilt -------------------------------------------------
+using namespace arhost::test;
 
-std::string own_name() {
-    Dl_info info{};
-    ::dladdr(&arhost_entry, &info);
-    return std::filesystem::path(info.dli_fname).stem();
-}
-const std::string name = own_name();
-
-bool has(std::string_view defect) {
-    return name == "rt_" + std::string(defect);
-}
-
-void crash() {
-    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may have its own
-    std::raise(SIGSEGV);
-}
-void hang() {
-    for (;;)
-        ::pause();
-}
-void leak_memory() {
-    static std::vector<std::vector<char>> kept;
-    kept.emplace_back(1 << 18, 'x');
-}
+// ---- The ray tracer that is spoilt ------------------------------------------------------------------
 
 struct AtEnds {
     AtEnds() {
@@ -62,14 +36,7 @@ struct AtEnds {
 } at_ends;
 
 const arhost_plugin &embree() {
-    static const arhost_plugin &plugin = []() -> const arhost_plugin & {
-        void *library = ::dlopen(ARHOST_PLUGIN_DIRECTORY "/rt_embree.so", RTLD_NOW | RTLD_LOCAL);
-        const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
-        const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
-        arhost_answer answer{sizeof answer, 0, nullptr};
-        entry->negotiate(&offer, &answer);
-        return *answer.plugin;
-    }();
+    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/rt_embree.so");
     return plugin;
 }
 const arhost_raytracer &embree_functions() {
@@ -398,7 +365,7 @@ void stop(arhost_instance *instance) {
 }
 
 const void *get_extension(const char *) {
-    return has("any_extension") ? &name : nullptr;
+    return has("any_extension") ? &own_name() : nullptr;
 }
 
 const arhost_plugin &spoilt_plugin() {
@@ -406,7 +373,7 @@ const arhost_plugin &spoilt_plugin() {
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;
-    descriptor.id = has("id_unlike_file") ? "rt_other" : name.c_str();
+    descriptor.id = has("id_unlike_file") ? "rt_other" : own_name().c_str();
     descriptor.options = options.data();
     if (has("default_out_of_range"))
         options[0].default_value = "65";

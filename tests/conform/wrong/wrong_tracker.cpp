@@ -2,58 +2,29 @@
 //
 // Every wrong tracker at once: tracker_apriltag with the one defect that this library's file name tells, so
 // tracker_metres.so, a link to it, takes metres for millimetres. A name that is no defect's has none.
+#include "defect.hpp"
+
 #include <arhost/arhost.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstring>
-#include <dlfcn.h>
-#include <filesystem>
 #include <limits>
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <thread>
-#include <unistd.h>
-#include <utility>
 #include <vector>
 
 namespace {
 
-// ---- Which defect, and the tracker that is spoilt ----------------------------------------------------
+using namespace arhost::test;
 
-std::string own_name() {
-    Dl_info info{};
-    ::dladdr(&arhost_entry, &info);
-    return std::filesystem::path(info.dli_fname).stem();
-}
-const std::string name = own_name();
-
-bool has(std::string_view defect) {
-    return name == "tracker_" + std::string(defect);
-}
-
-void crash() {
-    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may have its own
-    std::raise(SIGSEGV);
-}
-void hang() {
-    for (;;)
-        ::pause();
-}
+// ---- The tracker that is spoilt ---------------------------------------------------------------------
 
 const arhost_plugin &real() {
-    static const arhost_plugin &plugin = []() -> const arhost_plugin & {
-        void *library = ::dlopen(ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so", RTLD_NOW | RTLD_LOCAL);
-        const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
-        const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
-        arhost_answer answer{sizeof answer, 0, nullptr};
-        entry->negotiate(&offer, &answer);
-        return *answer.plugin;
-    }();
+    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so");
     return plugin;
 }
 const arhost_tracker &real_functions() {
@@ -426,7 +397,7 @@ const void *get_extension(const char *) {
 const arhost_plugin &spoilt_plugin() {
     static constexpr arhost_tracker functions = {sizeof functions, start, track, stop};
     static arhost_descriptor descriptor = *real().descriptor;
-    descriptor.id = name.c_str();
+    descriptor.id = own_name().c_str();
     static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
     return plugin;
 }
