@@ -31,8 +31,8 @@ std::string base64(const std::vector<std::uint8_t> &bytes) {
 
 Picture::Picture(std::uint32_t width, std::uint32_t height, std::uint8_t fill)
     : width_(width), height_(height), stride_((4 * width + 63) / 64 * 64 + 64),
-      memory_((2 * guard_size + std::size_t{stride_} * height) / sizeof(Line)) {
-    std::memset(bytes(), guard, memory_.size() * sizeof(Line));
+      memory_((2 * guard_size + std::size_t{stride_} * height + sizeof(Page) - 1) / sizeof(Page)) {
+    std::memset(bytes(), guard, memory_.size() * sizeof(Page));
     for (std::uint32_t y = 0; y < height; ++y)
         std::memset(bytes() + row(y), fill, std::size_t{4} * width);
 }
@@ -61,7 +61,7 @@ std::string Picture::damage() const {
         return fmt::format("{} bytes before the image", guard_size - *at);
     for (std::uint32_t y = 0; y < height_; ++y)
         if (const auto at = first_in(row(y) + std::size_t{4} * width_,
-                                     y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Line)))
+                                     y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Page)))
             return y + 1 < height_ ? fmt::format("in row {}, {} bytes behind its last pixel", y, *at)
                                    : fmt::format("{} bytes behind the image's last pixel", *at);
     return {};

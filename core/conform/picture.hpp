@@ -36,18 +36,18 @@ public:
     std::string png_base64() const;
 
 private:
-    struct alignas(64) Line {
-        std::uint8_t bytes[64];
+    struct alignas(4096) Page { // which an image begins
+        std::uint8_t bytes[4096];
     };
     static constexpr std::uint8_t guard = 0xa5;
-    static constexpr std::size_t guard_size = 64 * sizeof(Line); // before and behind
+    static constexpr std::size_t guard_size = sizeof(Page); // before and behind
 
     std::uint8_t *bytes() { return memory_.front().bytes; }
     const std::uint8_t *bytes() const { return memory_.front().bytes; }
     std::size_t row(std::uint32_t y) const { return guard_size + std::size_t{stride_} * y; }
 
     std::uint32_t width_, height_, stride_;
-    std::vector<Line> memory_;
+    std::vector<Page> memory_;
 };
 
 // By more than `tolerance` codes; colours count where both are visible.

@@ -71,11 +71,14 @@ void Tracer::change_scene(scene::ArenaBuilder builder) {
 arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                                  const arhost_motion *motion) {
     const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
-    const arhost_image image = picture.image();
+    slot_ = picture; // of the same size as the one before, and so at its place
+    const arhost_image image = slot_->image();
     info = {};
     info.struct_size = sizeof info;
-    return in_call(instance_.library().calls(), Call::per_frame,
-                   [&] { return functions_.render(instance_.get(), &request, &image, &info); });
+    const arhost_status status = in_call(instance_.library().calls(), Call::per_frame,
+                                         [&] { return functions_.render(instance_.get(), &request, &image, &info); });
+    picture = *slot_;
+    return status;
 }
 
 Picture Tracer::render(const arhost_camera &camera, const arhost_motion *motion, std::uint8_t fill) {

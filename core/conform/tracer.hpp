@@ -53,6 +53,7 @@ private:
     std::optional<SealedScene> scene_; // ends after a stop
     const arhost_raytracer &functions_;
     std::optional<arhost_intrinsics> started_;
+    std::optional<Picture> slot_; // where all images are written from start to stop
     arhost_render_info info_{};
 };
 

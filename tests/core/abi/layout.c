@@ -1,0 +1,527 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The ABI's binary layout, as every plugin has it compiled in (64-bit Linux, x86-64 and AArch64 alike). In the
+ * draft a change is made here as well; once version 1 is frozen an existing line never changes (docs/abi.md).
+ */
+#include <arhost/arhost.h>
+
+#define VALUE(name, value) _Static_assert((name) == (value), #name)
+#define STRUCT(type, size) _Static_assert(sizeof(type) == (size), #type)
+#define FIELD(type, field, offset, size)                                                                             \
+    _Static_assert(offsetof(type, field) == (offset) && sizeof(((type *)0)->field) == (size), #type "." #field)
+
+/* arhost/plugin.h */
+VALUE(ARHOST_OK, 1);
+VALUE(ARHOST_END, 2);
+VALUE(ARHOST_END_CUT_SHORT, 3);
+VALUE(ARHOST_ERROR_INVALID_ARGUMENT, -1);
+VALUE(ARHOST_ERROR_CONFIGURATION, -2);
+VALUE(ARHOST_ERROR_UNSUPPORTED, -3);
+VALUE(ARHOST_ERROR_IO, -4);
+VALUE(ARHOST_ERROR_OUT_OF_MEMORY, -5);
+VALUE(ARHOST_ERROR_DEVICE_LOST, -6);
+VALUE(ARHOST_ERROR_CANCELLED, -7);
+VALUE(ARHOST_ERROR_INTERNAL, -8);
+VALUE(ARHOST_KIND_SOURCE, 1);
+VALUE(ARHOST_KIND_TRACKER, 2);
+VALUE(ARHOST_KIND_RAYTRACER, 3);
+VALUE(ARHOST_KIND_SINK, 4);
+VALUE(ARHOST_SEVERITY_DEBUG, 1);
+VALUE(ARHOST_SEVERITY_INFO, 2);
+VALUE(ARHOST_SEVERITY_WARNING, 3);
+VALUE(ARHOST_SEVERITY_ERROR, 4);
+VALUE(ARHOST_SEVERITY_HOST_MISBEHAVING, 5);
+VALUE(ARHOST_SEVERITY_PLUGIN_MISBEHAVING, 6);
+VALUE(ARHOST_OPTION_BOOL, 1);
+VALUE(ARHOST_OPTION_INTEGER, 2);
+VALUE(ARHOST_OPTION_REAL, 3);
+VALUE(ARHOST_OPTION_TEXT, 4);
+VALUE(ARHOST_OPTION_INPUT_PATH, 5);
+VALUE(ARHOST_OPTION_OUTPUT_PATH, 6);
+VALUE(ARHOST_CAN_SEEK, 1);
+VALUE(ARHOST_IS_LIVE, 2);
+VALUE(ARHOST_TRACES_LENS, 4);
+VALUE(ARHOST_IS_REALTIME_SINK, 16);
+
+STRUCT(arhost_host, 64);
+FIELD(arhost_host, struct_size, 0, 4);
+FIELD(arhost_host, abi_version, 4, 4);
+FIELD(arhost_host, name, 8, 8);
+FIELD(arhost_host, version, 16, 8);
+FIELD(arhost_host, context, 24, 8);
+FIELD(arhost_host, log, 32, 8);
+FIELD(arhost_host, progress, 40, 8);
+FIELD(arhost_host, cancelled, 48, 8);
+FIELD(arhost_host, get_extension, 56, 8);
+
+STRUCT(arhost_option_descriptor, 56);
+FIELD(arhost_option_descriptor, struct_size, 0, 4);
+FIELD(arhost_option_descriptor, type, 4, 4);
+FIELD(arhost_option_descriptor, key, 8, 8);
+FIELD(arhost_option_descriptor, default_value, 16, 8);
+FIELD(arhost_option_descriptor, minimum, 24, 8);
+FIELD(arhost_option_descriptor, maximum, 32, 8);
+FIELD(arhost_option_descriptor, choices, 40, 8);
+FIELD(arhost_option_descriptor, help, 48, 8);
+
+STRUCT(arhost_option, 40);
+FIELD(arhost_option, struct_size, 0, 4);
+FIELD(arhost_option, type, 4, 4);
+FIELD(arhost_option, key, 8, 8);
+FIELD(arhost_option, integer, 16, 8);
+FIELD(arhost_option, real, 24, 8);
+FIELD(arhost_option, text, 32, 8);
+
+STRUCT(arhost_descriptor, 80);
+FIELD(arhost_descriptor, struct_size, 0, 4);
+FIELD(arhost_descriptor, kind, 4, 4);
+FIELD(arhost_descriptor, id, 8, 8);
+FIELD(arhost_descriptor, name, 16, 8);
+FIELD(arhost_descriptor, version, 24, 8);
+FIELD(arhost_descriptor, vendor, 32, 8);
+FIELD(arhost_descriptor, licence, 40, 8);
+FIELD(arhost_descriptor, description, 48, 8);
+FIELD(arhost_descriptor, capabilities, 56, 4);
+FIELD(arhost_descriptor, option_count, 60, 4);
+FIELD(arhost_descriptor, options, 64, 8);
+FIELD(arhost_descriptor, needs, 72, 8);
+
+STRUCT(arhost_plugin, 48);
+FIELD(arhost_plugin, struct_size, 0, 4);
+FIELD(arhost_plugin, descriptor, 8, 8);
+FIELD(arhost_plugin, functions, 16, 8);
+FIELD(arhost_plugin, create, 24, 8);
+FIELD(arhost_plugin, destroy, 32, 8);
+FIELD(arhost_plugin, get_extension, 40, 8);
+
+STRUCT(arhost_offer, 12);
+FIELD(arhost_offer, struct_size, 0, 4);
+FIELD(arhost_offer, oldest_abi_version, 4, 4);
+FIELD(arhost_offer, newest_abi_version, 8, 4);
+
+STRUCT(arhost_answer, 16);
+FIELD(arhost_answer, struct_size, 0, 4);
+FIELD(arhost_answer, abi_version, 4, 4);
+FIELD(arhost_answer, plugin, 8, 8);
+
+STRUCT(arhost_entry_point, 16);
+FIELD(arhost_entry_point, struct_size, 0, 4);
+FIELD(arhost_entry_point, negotiate, 8, 8);
+
+/* arhost/frame.h */
+VALUE(ARHOST_GREY8, 1);
+VALUE(ARHOST_RGB8, 2);
+VALUE(ARHOST_BGR8, 3);
+VALUE(ARHOST_YUYV, 4);
+VALUE(ARHOST_NV12, 5);
+VALUE(ARHOST_I420, 6);
+VALUE(ARHOST_BT601, 1);
+VALUE(ARHOST_BT709, 2);
+VALUE(ARHOST_LIMITED_RANGE, 1);
+VALUE(ARHOST_FULL_RANGE, 2);
+VALUE(ARHOST_CLOCK_MONOTONIC, 1);
+VALUE(ARHOST_CLOCK_MEDIA, 2);
+VALUE(ARHOST_MAX_PLANES, 3);
+VALUE(ARHOST_MAX_IMAGE_SIDE, 16384);
+
+STRUCT(arhost_frame_format, 96);
+FIELD(arhost_frame_format, struct_size, 0, 4);
+FIELD(arhost_frame_format, pixel_format, 4, 4);
+FIELD(arhost_frame_format, width, 8, 4);
+FIELD(arhost_frame_format, height, 12, 4);
+FIELD(arhost_frame_format, yuv_matrix, 16, 4);
+FIELD(arhost_frame_format, yuv_range, 20, 4);
+FIELD(arhost_frame_format, fps, 24, 8);
+FIELD(arhost_frame_format, plane_count, 32, 4);
+FIELD(arhost_frame_format, stride, 36, 12);
+FIELD(arhost_frame_format, offset, 48, 24);
+FIELD(arhost_frame_format, grey_stride, 72, 4);
+FIELD(arhost_frame_format, grey_offset, 80, 8);
+FIELD(arhost_frame_format, byte_size, 88, 8);
+
+STRUCT(arhost_frame, 64);
+FIELD(arhost_frame, struct_size, 0, 4);
+FIELD(arhost_frame, clock, 4, 4);
+FIELD(arhost_frame, format, 8, 8);
+FIELD(arhost_frame, plane, 16, 24);
+FIELD(arhost_frame, grey, 40, 8);
+FIELD(arhost_frame, sequence, 48, 8);
+FIELD(arhost_frame, capture_ns, 56, 8);
+
+/* arhost/camera.h */
+VALUE(ARHOST_DISTORTION_NONE, 1);
+VALUE(ARHOST_DISTORTION_BROWN, 2);
+VALUE(ARHOST_DISTORTION_FISHEYE, 3);
+VALUE(ARHOST_MAX_DISTORTION, 12);
+
+STRUCT(arhost_intrinsics, 152);
+FIELD(arhost_intrinsics, struct_size, 0, 4);
+FIELD(arhost_intrinsics, width, 4, 4);
+FIELD(arhost_intrinsics, height, 8, 4);
+FIELD(arhost_intrinsics, distortion, 12, 4);
+FIELD(arhost_intrinsics, fx, 16, 8);
+FIELD(arhost_intrinsics, fy, 24, 8);
+FIELD(arhost_intrinsics, cx, 32, 8);
+FIELD(arhost_intrinsics, cy, 40, 8);
+FIELD(arhost_intrinsics, coefficient_count, 48, 4);
+FIELD(arhost_intrinsics, reserved, 52, 4);
+FIELD(arhost_intrinsics, coefficients, 56, 96);
+
+STRUCT(arhost_camera, 232);
+FIELD(arhost_camera, struct_size, 0, 4);
+FIELD(arhost_camera, reserved, 4, 4);
+FIELD(arhost_camera, eye, 8, 24);
+FIELD(arhost_camera, look_at, 32, 24);
+FIELD(arhost_camera, up, 56, 24);
+FIELD(arhost_camera, intrinsics, 80, 152);
+
+/* arhost/source.h */
+
+STRUCT(arhost_source_setup, 40);
+FIELD(arhost_source_setup, struct_size, 0, 4);
+FIELD(arhost_source_setup, reserved, 4, 4);
+FIELD(arhost_source_setup, first_sequence, 8, 8);
+FIELD(arhost_source_setup, fps, 16, 8);
+FIELD(arhost_source_setup, paced, 24, 4);
+FIELD(arhost_source_setup, intrinsics, 32, 8);
+
+STRUCT(arhost_source_properties, 264);
+FIELD(arhost_source_properties, struct_size, 0, 4);
+FIELD(arhost_source_properties, has_intrinsics, 4, 4);
+FIELD(arhost_source_properties, format, 8, 96);
+FIELD(arhost_source_properties, intrinsics, 104, 152);
+FIELD(arhost_source_properties, frame_count, 256, 8);
+
+STRUCT(arhost_frame_buffer, 56);
+FIELD(arhost_frame_buffer, struct_size, 0, 4);
+FIELD(arhost_frame_buffer, reserved, 4, 4);
+FIELD(arhost_frame_buffer, format, 8, 8);
+FIELD(arhost_frame_buffer, plane, 16, 24);
+FIELD(arhost_frame_buffer, grey, 40, 8);
+FIELD(arhost_frame_buffer, sequence, 48, 8);
+
+STRUCT(arhost_frame_info, 160);
+FIELD(arhost_frame_info, struct_size, 0, 4);
+FIELD(arhost_frame_info, clock, 4, 4);
+FIELD(arhost_frame_info, capture_ns, 8, 8);
+FIELD(arhost_frame_info, skipped, 16, 4);
+FIELD(arhost_frame_info, has_grey, 20, 4);
+FIELD(arhost_frame_info, has_truth, 24, 4);
+FIELD(arhost_frame_info, truth_id, 28, 4);
+FIELD(arhost_frame_info, true_mt, 32, 128);
+
+STRUCT(arhost_source, 32);
+FIELD(arhost_source, struct_size, 0, 4);
+FIELD(arhost_source, start, 8, 8);
+FIELD(arhost_source, read, 16, 8);
+FIELD(arhost_source, stop, 24, 8);
+
+/* arhost/tracker.h */
+VALUE(ARHOST_MAX_MARKERS, 64);
+VALUE(ARHOST_MAX_FAMILY, 32);
+VALUE(ARHOST_MARKER_DETECTED, 1);
+VALUE(ARHOST_MARKER_PREDICTED, 2);
+VALUE(ARHOST_MARKER_LOST, 3);
+
+STRUCT(arhost_marker_config, 16);
+FIELD(arhost_marker_config, struct_size, 0, 4);
+FIELD(arhost_marker_config, id, 4, 4);
+FIELD(arhost_marker_config, side_mm, 8, 8);
+
+STRUCT(arhost_marker, 384);
+FIELD(arhost_marker, struct_size, 0, 4);
+FIELD(arhost_marker, id, 4, 4);
+FIELD(arhost_marker, family, 8, 32);
+FIELD(arhost_marker, state, 40, 4);
+FIELD(arhost_marker, age_frames, 44, 4);
+FIELD(arhost_marker, corners_px, 48, 64);
+FIELD(arhost_marker, mt, 112, 128);
+FIELD(arhost_marker, mt_alternative, 240, 128);
+FIELD(arhost_marker, reprojection_px, 368, 8);
+FIELD(arhost_marker, ambiguity, 376, 8);
+
+STRUCT(arhost_tracker_setup, 32);
+FIELD(arhost_tracker_setup, struct_size, 0, 4);
+FIELD(arhost_tracker_setup, marker_count, 4, 4);
+FIELD(arhost_tracker_setup, format, 8, 8);
+FIELD(arhost_tracker_setup, intrinsics, 16, 8);
+FIELD(arhost_tracker_setup, markers, 24, 8);
+
+STRUCT(arhost_tracker_result, 24584);
+FIELD(arhost_tracker_result, struct_size, 0, 4);
+FIELD(arhost_tracker_result, marker_count, 4, 4);
+FIELD(arhost_tracker_result, markers, 8, 24576);
+
+STRUCT(arhost_tracker, 32);
+FIELD(arhost_tracker, struct_size, 0, 4);
+FIELD(arhost_tracker, start, 8, 8);
+FIELD(arhost_tracker, track, 16, 8);
+FIELD(arhost_tracker, stop, 24, 8);
+
+/* arhost/scene.h */
+VALUE(ARHOST_Z_UP, 1);
+VALUE(ARHOST_Y_UP, 2);
+VALUE(ARHOST_TRIANGLES, 1);
+VALUE(ARHOST_SPHERES, 2);
+VALUE(ARHOST_TEXEL_SRGB8, 1);
+VALUE(ARHOST_TEXEL_RGBA8, 2);
+VALUE(ARHOST_TEXEL_RGBA32F, 3);
+VALUE(ARHOST_WRAP_REPEAT, 1);
+VALUE(ARHOST_WRAP_CLAMP, 2);
+VALUE(ARHOST_WRAP_MIRROR, 3);
+VALUE(ARHOST_DIFFUSE, 1);
+VALUE(ARHOST_SPECULAR, 2);
+VALUE(ARHOST_MIRROR, 3);
+VALUE(ARHOST_METAL, 4);
+VALUE(ARHOST_GLASS, 5);
+VALUE(ARHOST_METALLIC_ROUGHNESS, 6);
+VALUE(ARHOST_VIRTUAL, 1);
+VALUE(ARHOST_CATCHER, 2);
+VALUE(ARHOST_OCCLUDER, 3);
+VALUE(ARHOST_CHANNEL_TRANSLATION, 1);
+VALUE(ARHOST_CHANNEL_ROTATION, 2);
+VALUE(ARHOST_CHANNEL_SCALE, 3);
+VALUE(ARHOST_CHANNEL_MORPH_WEIGHTS, 4);
+VALUE(ARHOST_INTERPOLATION_STEP, 1);
+VALUE(ARHOST_INTERPOLATION_LINEAR, 2);
+VALUE(ARHOST_INTERPOLATION_CUBIC, 3);
+VALUE(ARHOST_POINT_LIGHT, 1);
+VALUE(ARHOST_DIRECTIONAL_LIGHT, 2);
+VALUE(ARHOST_SPOT_LIGHT, 3);
+VALUE(ARHOST_RECTANGLE_LIGHT, 4);
+VALUE(ARHOST_SPHERE_LIGHT, 5);
+VALUE(ARHOST_FALLOFF_NONE, 1);
+VALUE(ARHOST_FALLOFF_INVERSE_SQUARE, 2);
+
+STRUCT(arhost_buffer, 16);
+FIELD(arhost_buffer, offset, 0, 8);
+FIELD(arhost_buffer, count, 8, 4);
+FIELD(arhost_buffer, stride, 12, 4);
+
+STRUCT(arhost_geometry, 136);
+FIELD(arhost_geometry, type, 0, 4);
+FIELD(arhost_geometry, reserved, 4, 4);
+FIELD(arhost_geometry, positions, 8, 16);
+FIELD(arhost_geometry, normals, 24, 16);
+FIELD(arhost_geometry, texcoords, 40, 16);
+FIELD(arhost_geometry, indices, 56, 16);
+FIELD(arhost_geometry, joints, 72, 16);
+FIELD(arhost_geometry, weights, 88, 16);
+FIELD(arhost_geometry, morph_positions, 104, 16);
+FIELD(arhost_geometry, morph_normals, 120, 16);
+
+STRUCT(arhost_texture, 40);
+FIELD(arhost_texture, format, 0, 4);
+FIELD(arhost_texture, width, 4, 4);
+FIELD(arhost_texture, height, 8, 4);
+FIELD(arhost_texture, wrap_u, 12, 4);
+FIELD(arhost_texture, wrap_v, 16, 4);
+FIELD(arhost_texture, name, 20, 4);
+FIELD(arhost_texture, texels, 24, 16);
+
+STRUCT(arhost_material, 172);
+FIELD(arhost_material, model, 0, 4);
+FIELD(arhost_material, colour_texture, 4, 4);
+FIELD(arhost_material, ambient, 8, 12);
+FIELD(arhost_material, diffuse, 20, 12);
+FIELD(arhost_material, specular, 32, 12);
+FIELD(arhost_material, exponent, 44, 4);
+FIELD(arhost_material, reflectivity, 48, 12);
+FIELD(arhost_material, emission, 60, 12);
+FIELD(arhost_material, alpha_cutoff, 72, 4);
+FIELD(arhost_material, metallic, 76, 4);
+FIELD(arhost_material, roughness, 80, 4);
+FIELD(arhost_material, metallic_roughness_texture, 84, 4);
+FIELD(arhost_material, normal_texture, 88, 4);
+FIELD(arhost_material, emission_texture, 92, 4);
+FIELD(arhost_material, index, 96, 4);
+FIELD(arhost_material, fresnel_exponent, 100, 4);
+FIELD(arhost_material, fresnel_minimum, 104, 4);
+FIELD(arhost_material, fresnel_maximum, 108, 4);
+FIELD(arhost_material, refraction, 112, 12);
+FIELD(arhost_material, extinction, 124, 12);
+FIELD(arhost_material, shadow_attenuation, 136, 12);
+FIELD(arhost_material, cutoff_colour, 148, 12);
+FIELD(arhost_material, importance_cutoff, 160, 4);
+FIELD(arhost_material, reflection_depth, 164, 4);
+FIELD(arhost_material, refraction_depth, 168, 4);
+
+STRUCT(arhost_object, 80);
+FIELD(arhost_object, geometry, 0, 4);
+FIELD(arhost_object, material, 4, 4);
+FIELD(arhost_object, role, 8, 4);
+FIELD(arhost_object, name, 12, 4);
+FIELD(arhost_object, world_from_object, 16, 48);
+FIELD(arhost_object, moves, 64, 4);
+FIELD(arhost_object, deforms, 68, 4);
+FIELD(arhost_object, node, 72, 4);
+FIELD(arhost_object, skin, 76, 4);
+
+STRUCT(arhost_node, 112);
+FIELD(arhost_node, parent, 0, 4);
+FIELD(arhost_node, animated, 4, 4);
+FIELD(arhost_node, parent_from_node, 8, 48);
+FIELD(arhost_node, translation, 56, 12);
+FIELD(arhost_node, rotation, 68, 16);
+FIELD(arhost_node, scale, 84, 12);
+FIELD(arhost_node, morph_weights, 96, 16);
+
+STRUCT(arhost_channel, 48);
+FIELD(arhost_channel, node, 0, 4);
+FIELD(arhost_channel, target, 4, 4);
+FIELD(arhost_channel, interpolation, 8, 4);
+FIELD(arhost_channel, reserved, 12, 4);
+FIELD(arhost_channel, times, 16, 16);
+FIELD(arhost_channel, values, 32, 16);
+
+STRUCT(arhost_skin, 32);
+FIELD(arhost_skin, joints, 0, 16);
+FIELD(arhost_skin, node_from_mesh, 16, 16);
+
+STRUCT(arhost_light, 80);
+FIELD(arhost_light, type, 0, 4);
+FIELD(arhost_light, falloff, 4, 4);
+FIELD(arhost_light, position, 8, 12);
+FIELD(arhost_light, direction, 20, 12);
+FIELD(arhost_light, intensity, 32, 12);
+FIELD(arhost_light, axis_u, 44, 12);
+FIELD(arhost_light, axis_v, 56, 12);
+FIELD(arhost_light, radius, 68, 4);
+FIELD(arhost_light, cosine_inner, 72, 4);
+FIELD(arhost_light, cosine_outer, 76, 4);
+
+STRUCT(arhost_environment, 80);
+FIELD(arhost_environment, texture, 0, 4);
+FIELD(arhost_environment, intensity, 4, 4);
+FIELD(arhost_environment, environment_from_world, 8, 36);
+FIELD(arhost_environment, rows, 48, 16);
+FIELD(arhost_environment, columns, 64, 16);
+
+STRUCT(arhost_scene, 320);
+FIELD(arhost_scene, magic, 0, 8);
+FIELD(arhost_scene, version, 8, 4);
+FIELD(arhost_scene, struct_size, 12, 4);
+FIELD(arhost_scene, byte_size, 16, 8);
+FIELD(arhost_scene, axes, 24, 4);
+FIELD(arhost_scene, max_depth, 28, 4);
+FIELD(arhost_scene, ambient, 32, 12);
+FIELD(arhost_scene, background, 44, 12);
+FIELD(arhost_scene, bounds_min, 56, 12);
+FIELD(arhost_scene, bounds_max, 68, 12);
+FIELD(arhost_scene, shadow_alpha_opaque, 80, 4);
+FIELD(arhost_scene, shadow_alpha_translucent, 84, 4);
+FIELD(arhost_scene, coloured_shadows, 88, 4);
+FIELD(arhost_scene, duration_s, 92, 4);
+FIELD(arhost_scene, environment, 96, 80);
+FIELD(arhost_scene, geometries, 176, 16);
+FIELD(arhost_scene, textures, 192, 16);
+FIELD(arhost_scene, materials, 208, 16);
+FIELD(arhost_scene, objects, 224, 16);
+FIELD(arhost_scene, lights, 240, 16);
+FIELD(arhost_scene, nodes, 256, 16);
+FIELD(arhost_scene, channels, 272, 16);
+FIELD(arhost_scene, skins, 288, 16);
+FIELD(arhost_scene, names, 304, 16);
+
+/* arhost/motion.h */
+
+STRUCT(arhost_moved_object, 52);
+FIELD(arhost_moved_object, object, 0, 4);
+FIELD(arhost_moved_object, world_from_object, 4, 48);
+
+STRUCT(arhost_deformed_geometry, 24);
+FIELD(arhost_deformed_geometry, object, 0, 4);
+FIELD(arhost_deformed_geometry, vertex_count, 4, 4);
+FIELD(arhost_deformed_geometry, positions, 8, 8);
+FIELD(arhost_deformed_geometry, normals, 16, 8);
+
+STRUCT(arhost_motion, 32);
+FIELD(arhost_motion, struct_size, 0, 4);
+FIELD(arhost_motion, moved_count, 4, 4);
+FIELD(arhost_motion, moved, 8, 8);
+FIELD(arhost_motion, deformed, 16, 8);
+FIELD(arhost_motion, deformed_count, 24, 4);
+FIELD(arhost_motion, reserved, 28, 4);
+
+/* arhost/raytracer.h */
+
+STRUCT(arhost_raytracer_setup, 32);
+FIELD(arhost_raytracer_setup, struct_size, 0, 4);
+FIELD(arhost_raytracer_setup, width, 4, 4);
+FIELD(arhost_raytracer_setup, height, 8, 4);
+FIELD(arhost_raytracer_setup, reserved, 12, 4);
+FIELD(arhost_raytracer_setup, scene, 16, 8);
+FIELD(arhost_raytracer_setup, intrinsics, 24, 8);
+
+STRUCT(arhost_render_request, 264);
+FIELD(arhost_render_request, struct_size, 0, 4);
+FIELD(arhost_render_request, reserved, 4, 4);
+FIELD(arhost_render_request, sequence, 8, 8);
+FIELD(arhost_render_request, time_s, 16, 8);
+FIELD(arhost_render_request, camera, 24, 232);
+FIELD(arhost_render_request, motion, 256, 8);
+
+STRUCT(arhost_image, 24);
+FIELD(arhost_image, struct_size, 0, 4);
+FIELD(arhost_image, stride, 4, 4);
+FIELD(arhost_image, width, 8, 4);
+FIELD(arhost_image, height, 12, 4);
+FIELD(arhost_image, rgba, 16, 8);
+
+STRUCT(arhost_render_info, 24);
+FIELD(arhost_render_info, struct_size, 0, 4);
+FIELD(arhost_render_info, has_region, 4, 4);
+FIELD(arhost_render_info, region_x, 8, 4);
+FIELD(arhost_render_info, region_y, 12, 4);
+FIELD(arhost_render_info, region_width, 16, 4);
+FIELD(arhost_render_info, region_height, 20, 4);
+
+STRUCT(arhost_raytracer, 32);
+FIELD(arhost_raytracer, struct_size, 0, 4);
+FIELD(arhost_raytracer, start, 8, 8);
+FIELD(arhost_raytracer, render, 16, 8);
+FIELD(arhost_raytracer, stop, 24, 8);
+
+/* arhost/sink.h */
+VALUE(ARHOST_OVERLAY_RENDERED, 1);
+VALUE(ARHOST_OVERLAY_HELD, 2);
+VALUE(ARHOST_OVERLAY_NONE, 3);
+
+STRUCT(arhost_sink_setup, 40);
+FIELD(arhost_sink_setup, struct_size, 0, 4);
+FIELD(arhost_sink_setup, width, 4, 4);
+FIELD(arhost_sink_setup, height, 8, 4);
+FIELD(arhost_sink_setup, reserved, 12, 4);
+FIELD(arhost_sink_setup, fps, 16, 8);
+FIELD(arhost_sink_setup, first_sequence, 24, 8);
+FIELD(arhost_sink_setup, intrinsics, 32, 8);
+
+STRUCT(arhost_record, 24984);
+FIELD(arhost_record, struct_size, 0, 4);
+FIELD(arhost_record, clock, 4, 4);
+FIELD(arhost_record, sequence, 8, 8);
+FIELD(arhost_record, capture_ns, 16, 8);
+FIELD(arhost_record, overlay, 24, 4);
+FIELD(arhost_record, has_camera, 28, 4);
+FIELD(arhost_record, has_truth, 32, 4);
+FIELD(arhost_record, truth_id, 36, 4);
+FIELD(arhost_record, true_mt, 40, 128);
+FIELD(arhost_record, camera, 168, 232);
+FIELD(arhost_record, marker_count, 400, 4);
+FIELD(arhost_record, reserved, 404, 4);
+FIELD(arhost_record, markers, 408, 24576);
+
+STRUCT(arhost_output, 32);
+FIELD(arhost_output, struct_size, 0, 4);
+FIELD(arhost_output, stride, 4, 4);
+FIELD(arhost_output, width, 8, 4);
+FIELD(arhost_output, height, 12, 4);
+FIELD(arhost_output, bgr, 16, 8);
+FIELD(arhost_output, record, 24, 8);
+
+STRUCT(arhost_sink, 40);
+FIELD(arhost_sink, struct_size, 0, 4);
+FIELD(arhost_sink, start, 8, 8);
+FIELD(arhost_sink, write, 16, 8);
+FIELD(arhost_sink, idle, 24, 8);
+FIELD(arhost_sink, stop, 32, 8);
