@@ -53,7 +53,8 @@ impl Way {
     }
 
     fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
-        loop {
+        // About ten seconds: the other side may have died.
+        for _ in 0..if polling { 1 << 28 } else { 10 } {
             if let Some(sample) = self.subscriber.receive()? {
                 return Ok(*sample);
             }
@@ -63,6 +64,7 @@ impl Way {
                 self.listener.timed_wait_one(Duration::from_secs(1))?;
             }
         }
+        Err("the other process does not answer".into())
     }
 }
 
