@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a test plugin does in its next frame after SIGUSR1 has come with a number: the low byte says what
- * (enum misbehaviour), the others are a seed. tools/faults sends it.
+ * What a test plugin does in its next frame after SIGRTMIN has come with a number: the low byte says what
+ * (enum misbehaviour), the others are a seed. tools/faults sends it. Of several before a frame the last counts
+ * (of a signal that is not queued it would be the first).
  */
 #ifndef ARHOST_TEST_MISBEHAVE_H
 #define ARHOST_TEST_MISBEHAVE_H
@@ -48,7 +49,7 @@ static inline void misbehave_install(void) {
     memset(&action, 0, sizeof action);
     action.sa_sigaction = misbehave_on_signal;
     action.sa_flags = SA_SIGINFO | SA_RESTART;
-    sigaction(SIGUSR1, &action, NULL);
+    sigaction(SIGRTMIN, &action, NULL);
 }
 
 static inline uint32_t misbehave_random(uint32_t *seed) {
