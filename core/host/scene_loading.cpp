@@ -10,7 +10,7 @@ using namespace ring;
 namespace {
 
 // Which files a scene, and the meshes that it names, name in turn is known when they have been parsed. So all
-// may be read, but for the kernel's; what comes out is an arena and no file.
+// may be read, but for the kernel's and devices; what comes out is an arena and no file.
 sandbox::Policy policy_of(sandbox::Mode mode) {
     sandbox::Policy policy;
     policy.mode = mode;
@@ -18,6 +18,7 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
     for (const auto &entry : std::filesystem::directory_iterator("/"))
         if (const auto name = entry.path().filename(); name != "proc" && name != "sys" && name != "dev")
             policy.readable.push_back(entry.path());
+    policy.readable.push_back("/dev/shm"); // files in memory, not devices
     return policy;
 }
 

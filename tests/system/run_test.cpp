@@ -94,6 +94,15 @@ TEST(Run, TakesValuesFromTheCommandLine) {
     EXPECT_FALSE(run.exists("counted.txt"));
 }
 
+TEST(Run, ReadsASceneThatLiesInMemory) {
+    const std::filesystem::path scene = "/dev/shm/arhost-run-test-" + std::to_string(::getpid()) + ".yaml";
+    std::ofstream(scene) << small_scene;
+    ArhostRun run(counting("lockstep", "frames: 3", "", ""));
+    const int status = run.run({"--config", "run.yaml", "--set", "raytracer.scene=" + scene.string()});
+    std::filesystem::remove(scene);
+    EXPECT_EQ(status, 0) << run.output();
+}
+
 TEST(Run, PassesTheVideoOnWhileNoMarkerIsInView) {
     ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 10, lost_to: 20", ""));
     run.write("scene.yaml", small_scene);
