@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/scenes.hpp"
 
+#include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace arhost::conform {
 namespace {
@@ -80,6 +83,34 @@ scene::TriangleMesh box(const glm::vec3 &half_sides) {
                                  glm::vec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
     mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    return mesh;
+}
+
+scene::TriangleMesh ball(std::uint32_t stacks, std::uint32_t slices, bool shared) {
+    scene::TriangleMesh mesh;
+    for (std::uint32_t stack = 0; stack <= stacks; ++stack)
+        for (std::uint32_t slice = 0; slice < slices; ++slice) {
+            const double down = stack * glm::pi<double>() / stacks, round = slice * glm::two_pi<double>() / slices;
+            mesh.positions.emplace_back(std::sin(down) * std::sin(round), std::cos(down),
+                                        std::sin(down) * std::cos(round));
+        }
+    for (std::uint32_t stack = 0; stack < stacks; ++stack)
+        for (std::uint32_t slice = 0; slice < slices; ++slice) {
+            const std::uint32_t next = (slice + 1) % slices, above = stack * slices, below = above + slices;
+            if (stack > 0) // at the poles one side of each quad has no length
+                mesh.triangles.emplace_back(above + slice, below + slice, above + next);
+            if (stack + 1 < stacks)
+                mesh.triangles.emplace_back(above + next, below + slice, below + next);
+        }
+    if (!shared) {
+        const std::vector<glm::vec3> positions = std::exchange(mesh.positions, {});
+        for (glm::uvec3 &triangle : mesh.triangles)
+            for (int corner = 0; corner < 3; ++corner) {
+                mesh.positions.push_back(positions[triangle[corner]]);
+                triangle[corner] = static_cast<std::uint32_t>(mesh.positions.size() - 1);
+            }
+    }
+    mesh.normals = mesh.positions;
     return mesh;
 }
 

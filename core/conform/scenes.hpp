@@ -31,6 +31,9 @@ arhost_light lamp(const glm::vec3 &position, float intensity); // a point, witho
 // A square in the plane z = `z`, seen from +z.
 scene::TriangleMesh square(float half_side, float z);
 scene::TriangleMesh box(const glm::vec3 &half_sides);
+// About the origin, of radius 1, with normals; 2·slices·(stacks − 1) triangles. `shared`: vertices are; otherwise
+// each triangle has three of its own.
+scene::TriangleMesh ball(std::uint32_t stacks, std::uint32_t slices, bool shared = true);
 
 // One sphere (centre and radius) in ambient light of 1.
 scene::ArenaBuilder one_sphere(const glm::vec4 &sphere, const arhost_material &material = glowing(glm::vec3(0.5f)));

@@ -76,6 +76,7 @@ std::span<const Test> raytracer_camera_tests();
 std::span<const Test> raytracer_image_tests();
 std::span<const Test> raytracer_life_tests();
 std::span<const Test> raytracer_light_tests();
+std::span<const Test> raytracer_scene_tests();
 std::span<const Test> tracker_image_tests();
 std::span<const Test> tracker_life_tests();
 std::span<const Test> tracker_pose_tests();
@@ -84,9 +85,10 @@ std::span<const Test> sink_tests();
 
 inline std::vector<Test> all_tests() {
     std::vector<Test> all;
-    for (const auto part : {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
-                            raytracer_light_tests(), raytracer_image_tests(), tracker_life_tests(),
-                            tracker_pose_tests(), tracker_image_tests(), source_tests(), sink_tests()})
+    for (const auto part :
+         {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
+          raytracer_light_tests(), raytracer_scene_tests(), raytracer_image_tests(), tracker_life_tests(),
+          tracker_pose_tests(), tracker_image_tests(), source_tests(), sink_tests()})
         all.insert(all.end(), part.begin(), part.end());
     return all;
 }

@@ -43,15 +43,18 @@ const arhost_raytracer &embree_functions() {
     return *static_cast<const arhost_raytracer *>(embree().functions);
 }
 
+using SceneCopy = std::unique_ptr<std::byte, decltype(&std::free)>;
+
 struct Wrong {
     arhost_instance *real = nullptr;
     const arhost_host *host = nullptr;
-    bool was_started = false;
+    bool was_started = false, is_tiny = false;
     unsigned users = 0;
     std::int64_t threads = 0;              // the option
     std::vector<std::uint8_t> last;        // image
+    SceneCopy scene{nullptr, &std::free};  // spoilt
     arhost_instance *glass_only = nullptr; // shadows_add: another instance, and its scene
-    std::unique_ptr<std::byte, decltype(&std::free)> glass_scene{nullptr, &std::free};
+    SceneCopy glass_scene{nullptr, &std::free};
 };
 Wrong &wrong(arhost_instance *instance) {
     return *reinterpret_cast<Wrong *>(instance);
@@ -177,6 +180,8 @@ void spoil(const Pixels &pixels) {
 
 // ---- The plugin --------------------------------------------------------------------------------------
 
+Wrong *only = nullptr; // one_instance: the one that lives
+
 arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
                      arhost_instance **instance) {
     if (has("crash_in_create"))
@@ -195,10 +200,9 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         (void)::dup(0);
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
-    static Wrong *only = nullptr;
     if (has("cancelled_create_is_internal") && host->cancelled(host))
         return ARHOST_ERROR_INTERNAL;
-    if (has("one_instance") && only && only->users > 0) {
+    if (has("one_instance") && only) {
         ++only->users;
         *instance = reinterpret_cast<arhost_instance *>(only);
         return ARHOST_OK;
@@ -226,6 +230,7 @@ void destroy(arhost_instance *instance) {
     embree().destroy(self.real);
     if (self.glass_only)
         embree().destroy(self.glass_only);
+    only = nullptr;
     delete &self;
 }
 
@@ -241,16 +246,57 @@ bool has_degenerate_triangle(const arhost_scene &scene) {
     return false;
 }
 
+SceneCopy make_copy(const arhost_scene &scene) {
+    SceneCopy copy(static_cast<std::byte *>(std::aligned_alloc(64, (scene.byte_size + 63) / 64 * 64)), &std::free);
+    std::memcpy(copy.get(), &scene, scene.byte_size);
+    return copy;
+}
+arhost_scene &scene_in(const SceneCopy &copy) {
+    return *reinterpret_cast<arhost_scene *>(copy.get());
+}
+
+template <class T> std::span<T> view(arhost_scene &scene, const arhost_buffer &buffer) {
+    const auto seen = view<T>(std::as_const(scene), buffer);
+    return {const_cast<T *>(seen.data()), seen.size()};
+}
+
+void spoil(arhost_scene &scene) {
+    const auto geometries = view<arhost_geometry>(scene, scene.geometries);
+    const auto objects = view<arhost_object>(scene, scene.objects);
+    if (has("knows_8_objects"))
+        scene.objects.count = std::min(scene.objects.count, 8u);
+    if (has("knows_256_objects"))
+        scene.objects.count = std::min(scene.objects.count, 256u);
+    if (has("materials_by_object"))
+        for (std::uint32_t i = 0; i < objects.size(); ++i)
+            objects[i].material = std::min(i, scene.materials.count - 1);
+    if (has("indices_of_16_bits"))
+        for (const arhost_geometry &geometry : geometries)
+            for (auto &triangle : view<std::array<std::uint32_t, 3>>(scene, geometry.indices))
+                for (std::uint32_t &index : triangle)
+                    index &= 0xffff;
+    if (has("normals_like_points")) // by the inverse's transpose these come out as if they were turned like points
+        for (const arhost_object &object : objects) {
+            const float *m = object.world_from_object;
+            for (auto &normal : view<std::array<float, 3>>(scene, geometries[object.geometry].normals)) {
+                std::array<float, 3> turned{}, back{};
+                for (std::size_t i = 0; i < 9; ++i)
+                    turned[i % 3] += m[i] * normal[i / 3];
+                for (std::size_t i = 0; i < 9; ++i)
+                    back[i / 3] += m[i] * turned[i % 3];
+                normal = back;
+            }
+        }
+}
+
 // Of the scene's virtual objects the others are far below.
 void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
-    const std::size_t size = setup.scene->byte_size;
-    self.glass_scene.reset(static_cast<std::byte *>(std::aligned_alloc(64, (size + 63) / 64 * 64)));
-    std::memcpy(self.glass_scene.get(), setup.scene, size);
-    auto *scene = reinterpret_cast<arhost_scene *>(self.glass_scene.get());
+    self.glass_scene = make_copy(*setup.scene);
+    arhost_scene *scene = &scene_in(self.glass_scene);
     const auto materials = view<arhost_material>(*scene, scene->materials);
-    for (const arhost_object &object : view<arhost_object>(*scene, scene->objects))
+    for (arhost_object &object : view<arhost_object>(*scene, scene->objects))
         if (object.role == ARHOST_VIRTUAL && materials[object.material].model != ARHOST_GLASS)
-            const_cast<arhost_object &>(object).world_from_object[11] -= 1e6f;
+            object.world_from_object[11] -= 1e6f;
     setup.scene = scene;
     embree_functions().start(self.glass_only, &setup);
 }
@@ -269,9 +315,16 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
     const arhost_intrinsics intrinsics = spoil(*setup->intrinsics);
     arhost_raytracer_setup spoilt = *setup;
     spoilt.intrinsics = &intrinsics;
-    if (wrong(instance).glass_only)
-        start_glass_only(wrong(instance), spoilt);
-    return embree_functions().start(wrong(instance).real, &spoilt);
+    Wrong &self = wrong(instance);
+    SceneCopy copy = make_copy(*setup->scene);
+    spoil(scene_in(copy));
+    spoilt.scene = &scene_in(copy);
+    self.is_tiny = spoilt.scene->bounds_max[0] - spoilt.scene->bounds_min[0] < 1;
+    if (self.glass_only)
+        start_glass_only(self, spoilt);
+    const arhost_status status = embree_functions().start(self.real, &spoilt);
+    self.scene = std::move(copy); // only now the one before may go
+    return status;
 }
 
 arhost_status render(arhost_instance *instance, const arhost_render_request *request, const arhost_image *image,
@@ -312,6 +365,8 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         return status;
 
     spoil(pixels);
+    if (has("nothing_tiny") && self.is_tiny)
+        pixels.each([](std::uint8_t *p) { p[3] = 0; });
     if (has("unwritten_pixel"))
         std::copy(before.back().begin(), before.back().end(), pixels.at(image->width - 1, image->height - 1));
     if (has("unwritten_misses")) {

@@ -141,6 +141,40 @@ impl arhost_raytracer_setup {
     }
 }
 
+impl arhost_render_request {
+    /// Where what moves is in this image; `None` where nothing in the scene does.
+    pub fn motion(&self) -> Option<&arhost_motion> {
+        unsafe { self.motion.as_ref() }
+    }
+}
+
+impl arhost_motion {
+    pub fn moved(&self) -> &[arhost_moved_object] {
+        unsafe { array(self.moved, self.moved_count) }
+    }
+    pub fn deformed(&self) -> &[arhost_deformed_geometry] {
+        unsafe { array(self.deformed, self.deformed_count) }
+    }
+}
+
+impl arhost_deformed_geometry {
+    pub fn positions(&self) -> &[[f32; 3]] {
+        unsafe { array(self.positions.cast(), self.vertex_count) }
+    }
+    /// Empty where the geometry has none.
+    pub fn normals(&self) -> &[[f32; 3]] {
+        unsafe { array(self.normals.cast(), if self.normals.is_null() { 0 } else { self.vertex_count }) }
+    }
+}
+
+/// The pointer may be null where the count is 0.
+unsafe fn array<'a, T>(first: *const T, count: u32) -> &'a [T] {
+    if count == 0 {
+        return &[];
+    }
+    slice::from_raw_parts(first, count as usize)
+}
+
 impl arhost_frame_format {
     /// arhost_frame_layout of `arhost/frame.h`: fills the second group of fields from the first. False where the
     /// first group is not valid.

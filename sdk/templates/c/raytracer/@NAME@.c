@@ -1,89 +1,93 @@
-/* @NAME@: a ray tracer for arhost. It draws one sphere that fills the scene's bounds. */
-#include <arhost/arhost.h>
+/* @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in
+ * tracer.h. */
+#include "tracer.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct arhost_instance {
     const arhost_host *host;
-    double colour[3]; /* linear light */
-    double centre[3], radius;
+    int side; /* of the grid of rays through a pixel */
+    tracer *tracer;
 };
 
-/* ---- vectors ---- */
+/* ---- the camera ---- */
 
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/* Pixel centres are at integers, rows run downwards, the camera looks along -back. */
+typedef struct view {
+    const arhost_intrinsics *lens;
+    vec eye, right, up, back; /* the last three of length 1 */
+} view;
+
+/* False where up is parallel to the view, and where a number is not finite. */
+static int look_through(view *v, const arhost_camera *camera) {
+    const vec up = {camera->up[0], camera->up[1], camera->up[2]};
+    const vec look_at = {camera->look_at[0], camera->look_at[1], camera->look_at[2]};
+    vec back, right;
+    v->lens = &camera->intrinsics;
+    v->eye = (vec){camera->eye[0], camera->eye[1], camera->eye[2]};
+    back = subtract(v->eye, look_at);
+    right = cross(up, back);
+    if (!(length(right) > 1e-9 * length(up) * length(back)))
+        return 0;
+    v->back = normalised(back);
+    v->right = normalised(right);
+    v->up = cross(v->back, v->right);
+    return 1;
 }
-static void cross(double out[3], const double a[3], const double b[3]) {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-static void normalise(double a[3]) {
-    const double length = sqrt(dot(a, a));
-    int i;
-    for (i = 0; i < 3; ++i)
-        a[i] /= length;
+
+static ray ray_through(const view *v, double column, double row) {
+    const double x = (column - v->lens->cx) / v->lens->fx, y = (row - v->lens->cy) / v->lens->fy;
+    const vec ahead = subtract(subtract(scale(x, v->right), scale(y, v->up)), v->back);
+    return (ray){v->eye, normalised(ahead), INFINITY};
 }
 
 /* ---- the image ---- */
 
-/* The distance along a ray of unit direction to the sphere, or negative where it misses. */
-static double hit(const arhost_instance *self, const double origin[3], const double direction[3]) {
-    double from_centre[3], b, discriminant;
-    int i;
-    for (i = 0; i < 3; ++i)
-        from_centre[i] = origin[i] - self->centre[i];
-    b = dot(from_centre, direction);
-    discriminant = b * b - dot(from_centre, from_centre) + self->radius * self->radius;
-    return discriminant < 0 ? -1 : -b - sqrt(discriminant);
+static uint8_t byte(double share) {
+    return (uint8_t)(255 * fmin(fmax(share, 0), 1) + 0.5);
+}
+static double srgb(double linear) {
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-static uint8_t srgb_byte(double linear) {
-    const double encoded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
-    return (uint8_t)(255 * fmin(fmax(encoded, 0), 1) + 0.5);
+/* The mean over a grid of rays. Alpha is straight: the colour is that of what was seen, not multiplied by how much of
+ * the pixel it covers. */
+static void write_pixel(uint8_t *pixel, const arhost_instance *self, const view *v, double column, double row) {
+    const int side = self->side;
+    vec sum = {0, 0, 0}; /* of colours times alphas */
+    double alphas = 0;
+    int i;
+    for (i = 0; i < side * side; ++i) {
+        const double right = (i % side + 0.5) / side - 0.5, down = (i / side + 0.5) / side - 0.5;
+        const seen what = tracer_look(self->tracer, ray_through(v, column + right, row + down));
+        sum = add(sum, scale(what.alpha, what.colour));
+        alphas += what.alpha;
+    }
+    if (alphas > 0)
+        sum = scale(1 / alphas, sum);
+    pixel[0] = byte(srgb(sum.x));
+    pixel[1] = byte(srgb(sum.y));
+    pixel[2] = byte(srgb(sum.z));
+    pixel[3] = byte(alphas / (side * side));
 }
 
 static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
                             arhost_render_info *info) {
-    const arhost_camera *camera = &request->camera;
-    const arhost_intrinsics *lens = &camera->intrinsics;
-    double right[3], up[3], back[3];
     uint32_t column, row;
-    int i;
+    view v;
     (void)info; /* it could tell a region outside of which every alpha is 0 */
-    for (i = 0; i < 3; ++i)
-        back[i] = camera->eye[i] - camera->look_at[i];
-    normalise(back);
-    cross(right, camera->up, back);
-    normalise(right);
-    cross(up, back, right);
-
+    if (!look_through(&v, &request->camera)) {
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR, "the camera's up is parallel to its view");
+        return ARHOST_ERROR_INVALID_ARGUMENT;
+    }
+    if (request->motion)
+        tracer_move(self->tracer, request->motion);
     for (row = 0; row < image->height; ++row) {
-        uint8_t *pixel = image->rgba + (size_t)row * image->stride;
         if (self->host->cancelled(self->host)) /* arhost wants to end: rows must not keep it waiting */
             return ARHOST_ERROR_CANCELLED;
-        for (column = 0; column < image->width; ++column, pixel += 4) {
-            /* Pixel centres are at integers, rows run downwards, the camera looks along -back. */
-            const double x = (column - lens->cx) / lens->fx, y = (row - lens->cy) / lens->fy;
-            double direction[3], distance, light = 0;
-            for (i = 0; i < 3; ++i)
-                direction[i] = x * right[i] - y * up[i] - back[i];
-            normalise(direction);
-            distance = hit(self, camera->eye, direction);
-            if (distance <= 0) {
-                memset(pixel, 0, 4); /* alpha exactly 0: the video shows */
-                continue;
-            }
-            /* FILL IN: your shading. This is a lamp at the camera. */
-            for (i = 0; i < 3; ++i)
-                light -= direction[i] * (camera->eye[i] + distance * direction[i] - self->centre[i]) / self->radius;
-            for (i = 0; i < 3; ++i)
-                pixel[i] = srgb_byte(self->colour[i] * (0.1 + 0.9 * light));
-            pixel[3] = 255; /* were it less, the colour would still not be multiplied by it */
-        }
+        for (column = 0; column < image->width; ++column)
+            write_pixel(image->rgba + (size_t)row * image->stride + 4 * (size_t)column, self, &v, column, row);
     }
     return ARHOST_OK;
 }
@@ -91,19 +95,13 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
 /* ---- start and end ---- */
 
 static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
-    /* FILL IN: read setup->scene->objects and geometries (arhost/scene.h), build what makes rays fast. */
-    const arhost_scene *scene = setup->scene;
-    int i;
-    self->radius = INFINITY;
-    for (i = 0; i < 3; ++i) {
-        self->centre[i] = (scene->bounds_min[i] + scene->bounds_max[i]) / 2;
-        self->radius = fmin(self->radius, (scene->bounds_max[i] - scene->bounds_min[i]) / 2);
-    }
-    return ARHOST_OK;
+    self->tracer = tracer_new(setup->scene);
+    return self->tracer ? ARHOST_OK : ARHOST_ERROR_OUT_OF_MEMORY;
 }
 
 static void stop(arhost_instance *self) {
-    (void)self;
+    tracer_free(self->tracer);
+    self->tracer = NULL;
 }
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
@@ -114,12 +112,8 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
     for (i = 0; i < option_count; ++i) {
-        if (!strcmp(options[i].key, "red"))
-            self->colour[0] = options[i].real;
-        else if (!strcmp(options[i].key, "green"))
-            self->colour[1] = options[i].real;
-        else if (!strcmp(options[i].key, "blue"))
-            self->colour[2] = options[i].real;
+        if (!strcmp(options[i].key, "samples"))
+            self->side = (int)sqrt((double)options[i].integer);
     }
     *instance = self;
     return ARHOST_OK;
@@ -138,9 +132,8 @@ static const void *get_extension(const char *id) {
 
 /* arhost checks the configuration against these before create sees a value. */
 static const arhost_option_descriptor options[] = {
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "red", "0.8", 0, 1, NULL, "Share of red light reflected."},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "green", "0.3", 0, 1, NULL, "Likewise green."},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "blue", "0.1", 0, 1, NULL, "Likewise blue."},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "samples", "1", 1, 64, NULL,
+     "Rays a pixel: the largest square number up to it."},
 };
 static const arhost_raytracer functions = {sizeof functions, start, render, stop};
 static const arhost_descriptor descriptor = {
@@ -151,7 +144,7 @@ static const arhost_descriptor descriptor = {
     .version = "0.1.0",
     .vendor = "unknown", /* FILL IN: you */
     .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
-    .description = "Draws a sphere.",
+    .description = "Traces rays by brute force.",
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };

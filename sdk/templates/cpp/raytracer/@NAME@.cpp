@@ -1,115 +1,91 @@
-// @NAME@: a ray tracer for arhost. It draws one sphere that fills the scene's bounds.
+// @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in
+// tracer.hpp.
+#include "tracer.hpp"
+
 #include <arhost-cpp/plugin.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
 namespace {
 
-struct Vec {
-    double x = 0, y = 0, z = 0;
-};
-Vec operator+(Vec a, Vec b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
+std::uint8_t byte(double share) {
+    return static_cast<std::uint8_t>(255 * std::clamp(share, 0.0, 1.0) + 0.5);
 }
-Vec operator*(double s, Vec a) {
-    return {s * a.x, s * a.y, s * a.z};
-}
-Vec operator-(Vec a, Vec b) {
-    return a + -1 * b;
-}
-double dot(Vec a, Vec b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Vec cross(Vec a, Vec b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-Vec normalised(Vec a) {
-    return 1 / std::sqrt(dot(a, a)) * a;
-}
-template <class Number> Vec vec(const Number (&a)[3]) {
-    return {double(a[0]), double(a[1]), double(a[2])};
+double srgb(double linear) {
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-std::uint8_t srgb_byte(double linear) {
-    const double encoded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(255 * std::clamp(encoded, 0.0, 1.0) + 0.5);
-}
+// Pixel centres are at integers, rows run downwards, the camera looks along -back.
+class Camera {
+public:
+    explicit Camera(const arhost_camera &camera) : eye_(vec(camera.eye)), lens_(camera.intrinsics) {
+        const Vec back = eye_ - vec(camera.look_at), up = vec(camera.up), right = cross(up, back);
+        if (!(length(right) > 1e-9 * length(up) * length(back))) // nor is it where a number is not finite
+            throw arhost::Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view");
+        back_ = normalised(back);
+        right_ = normalised(right);
+        up_ = cross(back_, right_);
+    }
+    Ray ray(double column, double row) const {
+        const double x = (column - lens_.cx) / lens_.fx, y = (row - lens_.cy) / lens_.fy;
+        return {eye_, normalised(x * right_ - y * up_ - back_)};
+    }
+
+private:
+    Vec eye_, back_, right_, up_;
+    const arhost_intrinsics &lens_;
+};
 
 class @CLASS@ {
 public:
     @CLASS@(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), colour_{options.real("red"), options.real("green"), options.real("blue")} {}
+        : host_(host), side_(std::sqrt(options.integer("samples"))) {}
 
-    void start(const arhost_raytracer_setup &setup) {
-        // FILL IN: read setup.scene->objects and geometries (arhost/scene.h), build what makes rays fast.
-        const Vec low = vec(setup.scene->bounds_min), high = vec(setup.scene->bounds_max);
-        centre_ = 0.5 * (low + high);
-        radius_ = 0.5 * std::min({high.x - low.x, high.y - low.y, high.z - low.z});
-    }
+    void start(const arhost_raytracer_setup &setup) { tracer_.emplace(*setup.scene); }
+    void stop() { tracer_.reset(); }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &) {
-        const arhost_intrinsics &lens = request.camera.intrinsics;
-        const Vec eye = vec(request.camera.eye);
-        const Vec back = normalised(eye - vec(request.camera.look_at));
-        const Vec right = normalised(cross(vec(request.camera.up), back));
-        const Vec up = cross(back, right);
+        const Camera camera(request.camera);
+        if (request.motion)
+            tracer_->move(*request.motion);
         for (std::uint32_t row = 0; row < image.height; ++row) {
             if (host_.cancelled()) // arhost wants to end: rows must not keep it waiting
                 throw arhost::Failure(ARHOST_ERROR_CANCELLED, "cancelled");
             std::uint8_t *pixel = image.rgba + std::size_t(row) * image.stride;
-            for (std::uint32_t column = 0; column < image.width; ++column, pixel += 4) {
-                // Four samples a pixel. Pixel centres are at integers, rows run downwards, the camera looks
-                // along -back.
-                Vec sum;
-                int hits = 0;
-                for (const auto [dx, dy] : samples) {
-                    const double x = (column + dx - lens.cx) / lens.fx, y = (row + dy - lens.cy) / lens.fy;
-                    if (const auto colour = trace(eye, normalised(x * right - y * up - back))) {
-                        sum = sum + *colour;
-                        ++hits;
-                    }
-                }
-                // Straight alpha: the colour of those that hit, not multiplied by how many did. Where none
-                // did, alpha is exactly 0, and the video shows.
-                const Vec colour = 1.0 / std::max(hits, 1) * sum;
-                pixel[0] = srgb_byte(colour.x);
-                pixel[1] = srgb_byte(colour.y);
-                pixel[2] = srgb_byte(colour.z);
-                pixel[3] = static_cast<std::uint8_t>((255 * hits + 2) / 4);
-            }
+            for (std::uint32_t column = 0; column < image.width; ++column, pixel += 4)
+                write(pixel, camera, column, row);
         }
     }
 
 private:
-    static constexpr std::array<std::array<double, 2>, 4> samples = {
-        {{-0.25, -0.25}, {0.25, -0.25}, {-0.25, 0.25}, {0.25, 0.25}}};
-
-    // What is seen along a ray of unit direction, in linear light; nothing where it misses.
-    std::optional<Vec> trace(Vec origin, Vec direction) const {
-        const Vec from_centre = origin - centre_;
-        const double b = dot(from_centre, direction);
-        const double discriminant = b * b - dot(from_centre, from_centre) + radius_ * radius_;
-        const double distance = discriminant < 0 ? -1 : -b - std::sqrt(discriminant);
-        if (distance <= 0)
-            return std::nullopt;
-        // FILL IN: your shading. This is a lamp at the camera.
-        const Vec normal = 1 / radius_ * (from_centre + distance * direction);
-        return (0.1 - 0.9 * dot(normal, direction)) * colour_;
+    // The mean over a grid of rays. Alpha is straight: the colour is that of what was seen, not multiplied by how much
+    // of the pixel it covers.
+    void write(std::uint8_t *pixel, const Camera &camera, double column, double row) const {
+        Vec sum; // of colours times alphas
+        double alphas = 0;
+        for (int i = 0; i < side_ * side_; ++i) {
+            const double right = (i % side_ + 0.5) / side_ - 0.5, down = (i / side_ + 0.5) / side_ - 0.5;
+            const Seen seen = tracer_->look(camera.ray(column + right, row + down));
+            sum = sum + seen.alpha * seen.colour;
+            alphas += seen.alpha;
+        }
+        const Vec colour = alphas > 0 ? 1 / alphas * sum : Vec{};
+        pixel[0] = byte(srgb(colour.x));
+        pixel[1] = byte(srgb(colour.y));
+        pixel[2] = byte(srgb(colour.z));
+        pixel[3] = byte(alphas / (side_ * side_));
     }
 
     arhost::Host host_;
-    Vec colour_, centre_;
-    double radius_ = 0; // mm, as all of the scene
+    int side_; // of the grid of rays through a pixel
+    std::optional<Tracer> tracer_;
 };
 
 // arhost checks the configuration against these before the constructor sees a value.
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_REAL, "red", "0.8", "Share of red light reflected.", 0, 1),
-    arhost::option(ARHOST_OPTION_REAL, "green", "0.3", "Likewise green.", 0, 1),
-    arhost::option(ARHOST_OPTION_REAL, "blue", "0.1", "Likewise blue.", 0, 1),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel: the largest square number up to it.", 1, 64),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -120,8 +96,8 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "unknown", // FILL IN: you
     "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
-    "Draws a sphere.",
-    0,
+    "Traces rays by brute force.",
+    0, // FILL IN: ARHOST_TRACES_LENS, once rays go through the lens
     std::size(options),
     options,
     nullptr, // what of the machine it needs: arhost/plugin.h

@@ -1,68 +1,84 @@
-//! @NAME@: a ray tracer for arhost. It draws one sphere that fills the scene's bounds.
+//! @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in tracer.rs.
+
+mod tracer;
+mod vec3;
 
 use arhost_sys::*;
+use tracer::{Ray, Tracer};
+use vec3::*;
 
-type Vec3 = [f64; 3];
-
-fn dot(a: Vec3, b: Vec3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn byte(share: f64) -> u8 {
+    (255.0 * share.clamp(0.0, 1.0)).round() as u8
 }
-fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-/// a + s·b
-fn along(a: Vec3, s: f64, b: Vec3) -> Vec3 {
-    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
-}
-fn normalised(a: Vec3) -> Vec3 {
-    along([0.0; 3], 1.0 / dot(a, a).sqrt(), a)
+fn srgb(linear: f64) -> f64 {
+    if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn srgb_byte(linear: f64) -> u8 {
-    let encoded = if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * encoded.clamp(0.0, 1.0)).round() as u8
+/// Pixel centres are at integers, rows run downwards, the camera looks along -back.
+struct View<'a> {
+    lens: &'a arhost_intrinsics,
+    eye: Vec3,
+    right: Vec3, // these three of length 1
+    up: Vec3,
+    back: Vec3,
+}
+
+impl View<'_> {
+    fn new(camera: &arhost_camera) -> Result<View<'_>, Failure> {
+        let (eye, up) = (vec3(&camera.eye), vec3(&camera.up));
+        let back = eye - vec3(&camera.look_at);
+        let right = cross(up, back);
+        // Nor is it longer where a number is not finite.
+        if !(length(right) > 1e-9 * length(up) * length(back)) {
+            return Err(Failure::new(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view"));
+        }
+        let (right, back) = (normalised(right), normalised(back));
+        Ok(View { lens: &camera.intrinsics, eye, right, up: cross(back, right), back })
+    }
+
+    fn ray(&self, column: f64, row: f64) -> Ray {
+        let x = (column - self.lens.cx) / self.lens.fx;
+        let y = (row - self.lens.cy) / self.lens.fy;
+        let direction = normalised(x * self.right - y * self.up - self.back);
+        Ray { origin: self.eye, direction, end: f64::INFINITY }
+    }
+}
+
+/// The mean over a grid of rays, `side` to a side. Alpha is straight: the colour is that of what was seen, not
+/// multiplied by how much of the pixel it covers.
+fn pixel(tracer: &Tracer, view: &View, side: u32, column: f64, row: f64) -> [u8; 4] {
+    let mut sum = Vec3([0.0; 3]); // of colours times alphas
+    let mut alphas = 0.0;
+    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(side) - 0.5;
+    for i in 0..side * side {
+        let seen = tracer.look(&view.ray(column + place(i % side), row + place(i / side)));
+        sum = sum + seen.alpha * seen.colour;
+        alphas += seen.alpha;
+    }
+    let colour = if alphas > 0.0 { 1.0 / alphas * sum } else { sum };
+    [byte(srgb(colour[0])), byte(srgb(colour[1])), byte(srgb(colour[2])), byte(alphas / f64::from(side * side))]
 }
 
 struct @CLASS@ {
     host: Host,
-    colour: Vec3, // linear light
-    centre: Vec3, // mm, as all of the scene
-    radius: f64,
-}
-
-impl @CLASS@ {
-    /// What is seen along a ray of unit direction, in linear light; nothing where it misses.
-    fn trace(&self, origin: Vec3, direction: Vec3) -> Option<Vec3> {
-        let from_centre = along(origin, -1.0, self.centre);
-        let b = dot(from_centre, direction);
-        let discriminant = b * b - dot(from_centre, from_centre) + self.radius * self.radius;
-        let distance = -b - discriminant.sqrt(); // NaN where the ray misses
-        if !(distance > 0.0) {
-            return None;
-        }
-        // FILL IN: your shading. This is a lamp at the camera.
-        let normal = normalised(along(from_centre, distance, direction));
-        Some(along([0.0; 3], 0.1 - 0.9 * dot(normal, direction), self.colour))
-    }
+    side: u32, // of the grid of rays through a pixel
+    tracer: Option<Tracer>,
 }
 
 impl Plugin for @CLASS@ {
     fn new(host: Host, options: &Options) -> Result<Self, Failure> {
-        let colour = [options.real("red"), options.real("green"), options.real("blue")];
-        Ok(@CLASS@ { host, colour, centre: [0.0; 3], radius: 0.0 })
+        let side = (options.integer("samples") as f64).sqrt() as u32;
+        Ok(@CLASS@ { host, side, tracer: None })
+    }
+    fn stop(&mut self) -> Result<(), Failure> {
+        self.tracer = None; // the scene is no longer there
+        Ok(())
     }
 }
 
 impl Raytracer for @CLASS@ {
     fn start(&mut self, setup: &arhost_raytracer_setup) -> Result<(), Failure> {
-        // FILL IN: read setup.scene().objects and geometries (arhost/scene.h), build what makes rays fast.
-        let scene = setup.scene();
-        self.radius = f64::INFINITY;
-        for i in 0..3 {
-            let (low, high) = (f64::from(scene.bounds_min[i]), f64::from(scene.bounds_max[i]));
-            self.centre[i] = (low + high) / 2.0;
-            self.radius = self.radius.min((high - low) / 2.0);
-        }
+        self.tracer = Some(Tracer::new(setup.scene()));
         Ok(())
     }
 
@@ -72,25 +88,17 @@ impl Raytracer for @CLASS@ {
         image: &mut Image,
         _info: &mut arhost_render_info, // it could tell a region outside of which every alpha is 0
     ) -> Result<(), Failure> {
-        let camera = &request.camera;
-        let lens = &camera.intrinsics;
-        let back = normalised(along(camera.eye, -1.0, camera.look_at));
-        let right = normalised(cross(camera.up, back));
-        let up = cross(back, right);
+        let view = View::new(&request.camera)?;
+        let tracer = self.tracer.as_mut().expect("started");
+        if let Some(now) = request.motion() {
+            tracer.move_to(now);
+        }
         for row in 0..image.height() {
             if self.host.cancelled() {
                 return Err(Failure::new(ARHOST_ERROR_CANCELLED, "")); // rows must not keep arhost waiting
             }
-            for (column, pixel) in image.row_mut(row).iter_mut().enumerate() {
-                // Pixel centres are at integers, rows run downwards, the camera looks along -back.
-                let x = (column as f64 - lens.cx) / lens.fx;
-                let y = (f64::from(row) - lens.cy) / lens.fy;
-                let direction = normalised(along(along(along([0.0; 3], x, right), -y, up), -1.0, back));
-                *pixel = match self.trace(camera.eye, direction) {
-                    // Were alpha less than 255, the colour would still not be multiplied by it.
-                    Some(colour) => [srgb_byte(colour[0]), srgb_byte(colour[1]), srgb_byte(colour[2]), 255],
-                    None => [0; 4], // alpha exactly 0: the video shows
-                };
+            for (column, rgba) in image.row_mut(row).iter_mut().enumerate() {
+                *rgba = pixel(tracer, &view, self.side, column as f64, f64::from(row));
             }
         }
         Ok(())
@@ -98,12 +106,10 @@ impl Raytracer for @CLASS@ {
 }
 
 plugin! {
-    raytracer @CLASS@, "@NAME@", "Draws a sphere.",
-    capabilities: 0,
+    raytracer @CLASS@, "@NAME@", "Traces rays by brute force.",
+    capabilities: 0, // FILL IN: ARHOST_TRACES_LENS, once rays go through the lens
     // arhost checks the configuration against these before `new` sees a value.
     options: [
-        option!(ARHOST_OPTION_REAL, "red", "0.8", "Share of red light reflected.", 0.0, 1.0),
-        option!(ARHOST_OPTION_REAL, "green", "0.3", "Likewise green.", 0.0, 1.0),
-        option!(ARHOST_OPTION_REAL, "blue", "0.1", "Likewise blue.", 0.0, 1.0),
+        option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel: the largest square number up to it.", 1.0, 64.0),
     ]
 }
