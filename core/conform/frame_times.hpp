@@ -40,7 +40,7 @@ inline double percentile(const std::vector<double> &sorted, double percent) {
 inline void judge_speed(Context &context, std::uint32_t width, std::uint32_t height,
                         const std::vector<double> &sorted_ms, double bound_ms) {
     const double p50 = percentile(sorted_ms, 50);
-    context.note = fmt::format("{}×{}: p50 {:.1f} ms, p99 {:.1f} ms, of {} frames", width, height, p50,
+    context.note = fmt::format("{}×{}: p50 {:.3g} ms, p99 {:.3g} ms, of {} frames", width, height, p50,
                                percentile(sorted_ms, 99), sorted_ms.size());
     if (p50 > bound_ms)
         throw Warning(fmt::format("{}; more than {} ms", context.note, bound_ms));
