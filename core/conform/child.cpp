@@ -48,7 +48,9 @@ Result run(const Test &test, Context &context) {
 
 int run_child(const std::string &name, const Subject &subject) {
     const CallPage calls = map_call_page();
-    for (const Test &test : all_tests()) {
+    std::vector<Test> tests = all_tests();
+    tests.insert(tests.end(), helper_tests().begin(), helper_tests().end());
+    for (const Test &test : tests) {
         if (name != test.name)
             continue;
         PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);

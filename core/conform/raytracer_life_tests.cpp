@@ -2,10 +2,10 @@
 //
 // A ray tracer's life from start to stop, what it refuses, and what it survives.
 #include "conform/expect.hpp"
+#include "conform/frame_times.hpp"
 #include "conform/process_usage.hpp"
 #include "conform/tracer.hpp"
 
-#include <algorithm>
 #include <limits>
 
 namespace arhost::conform {
@@ -32,16 +32,16 @@ void start_again(Context &context) {
 void leaks(Context &context) {
     constexpr int warm_up = 5, starts = 25, frames = 4;
     Tracer tracer(context, still_life());
-    ProcessUsage before{};
-    for (int i = 0; i < warm_up + starts; ++i) {
-        if (i == warm_up)
-            before = ProcessUsage::now();
-        tracer.stop();
-        for (int frame = 0; frame < frames; ++frame)
-            tracer.render(of_still_life(pinhole(40, 30, 50)));
-    }
+    const auto work = [&](int count) {
+        for (int i = 0; i < count; ++i) {
+            tracer.stop();
+            for (int frame = 0; frame < frames; ++frame)
+                tracer.render(of_still_life(pinhole(40, 30, 50)));
+        }
+    };
+    work(warm_up);
     constexpr long allowed_kib = 8192;
-    if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
+    if (const std::string grown = growth_by([&] { work(starts); }, allowed_kib); !grown.empty())
         throw Failure(fmt::format("{} starts with {} frames each led {}", starts, frames, grown));
 }
 
@@ -137,18 +137,7 @@ void speed(Context &context) {
     Tracer tracer(context, still_life());
     const arhost_camera view = of_still_life(pinhole(640, 480, 800));
     tracer.render(view);
-    std::vector<double> ms;
-    for (int i = 0; i < 11; ++i) {
-        const auto begin = std::chrono::steady_clock::now();
-        tracer.render(view);
-        ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-    }
-    std::sort(ms.begin(), ms.end());
-    const double median = ms[ms.size() / 2];
-    context.note = fmt::format("640×480 in {:.1f} ms on the median, {:.1f} ms at the most", median, ms.back());
-    constexpr double bound_ms = 250;
-    if (median > bound_ms)
-        throw Warning(context.note);
+    judge_speed(context, 640, 480, frame_times_ms([&] { return tracer.render(view), true; }), 250);
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;

@@ -33,7 +33,7 @@ public:
     SealedOutput(const SealedOutput &) = delete;
     SealedOutput &operator=(const SealedOutput &) = delete;
 
-    // Only for who has not given it to a sink yet.
+    // While no sink has it.
     template <class Change> void change(Change &&change) {
         unseal();
         change(record());

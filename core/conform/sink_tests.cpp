@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Sinks: what they take, and what becomes of their files, in peace, after a kill and on a full disk.
+#include "conform/frame_times.hpp"
 #include "conform/process_usage.hpp"
+#include "conform/sink_process.hpp"
 #include "conform/sink_run.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <csignal>
-#include <fcntl.h>
+#include <deque>
 #include <fstream>
 #include <limits>
-#include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <thread>
 
 namespace arhost::conform {
@@ -237,9 +237,18 @@ void records(Context &context) {
         r.truth_id = 3;
         std::copy_n(r.markers[0].mt, 16, r.true_mt);
     });
-    write("with an error that is not finite", [](arhost_record &r) {
-        r.markers[0].reprojection_px = std::numeric_limits<double>::infinity();
-        r.markers[0].ambiguity = std::numeric_limits<double>::quiet_NaN();
+    write("with a marker that is predicted, and one that is lost, far away", [](arhost_record &r) {
+        r.marker_count = 2;
+        r.markers[0].state = ARHOST_MARKER_PREDICTED;
+        r.markers[0].age_frames = std::numeric_limits<std::uint32_t>::max();
+        r.markers[1] = r.markers[0];
+        r.markers[1].state = ARHOST_MARKER_LOST;
+        r.markers[1].mt[14] = -1e9;
+    });
+    write("with numbers as large as they can be", [](arhost_record &r) {
+        constexpr double most = std::numeric_limits<double>::max();
+        r.markers[0].reprojection_px = r.markers[0].ambiguity = most;
+        r.markers[0].corners_px[0][0] = -most;
     });
     run.stop();
 }
@@ -254,15 +263,19 @@ void gaps(Context &context) {
 
 // ---- What becomes of it ----------------------------------------------------------------------------
 
-void deterministic(Context &context) {
-    const Files should = course_of(context, 4).end;
+void files(Context &context) {
+    const Files once = course_of(context, 4).end;
+    if (once.empty())
+        throw Failure("4 frames were written, and there is no file");
     SinkRun run(context, "again");
     run.start();
     run.write(0, 4);
     run.stop();
-    if (should.empty())
-        throw Failure("4 frames were written, and there is no file");
-    expect_same(run.files(), should, "given the same frames again");
+    try {
+        expect_same(run.files(), once, "given the same frames again");
+    } catch (const Failure &difference) { // a date, say
+        throw Skip(std::string("its runs can't be compared: ") + difference.what());
+    }
 }
 
 void every_frame(Context &context) {
@@ -313,50 +326,6 @@ void no_place(Context &context) {
 
 // ---- Kills -----------------------------------------------------------------------------------------
 
-// Writes `frames` frames into `folder` in a process of its own, which SIGTERM ends, if it has not yet ended,
-// `moment` after `done` of them were written.
-void write_and_kill(Context &context, const std::string &folder, std::uint64_t frames, const Size &size,
-                    std::uint64_t done, std::chrono::duration<double> moment) {
-    int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0)
-        ring::throw_errno("pipe2");
-    const ring::UniqueFd read_end(ends[0]);
-    ring::UniqueFd write_end(ends[1]);
-    const pid_t pid = ::fork();
-    if (pid < 0)
-        ring::throw_errno("fork");
-    if (pid == 0) {
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        try {
-            SinkRun run(context, folder);
-            run.start(0, size);
-            for (std::uint64_t n = 0; n < frames; ++n) {
-                run.write(n, n + 1);
-                if (::write(write_end.get(), "", 1) != 1)
-                    break;
-            }
-            for (;;) // what is not on the disk yet will never be
-                ::pause();
-        } catch (const std::exception &) {
-            ::_exit(1);
-        }
-    }
-    write_end.reset();
-    char byte = 0;
-    std::uint64_t written = 0;
-    while (written < done && ::read(read_end.get(), &byte, 1) == 1)
-        ++written;
-    std::this_thread::sleep_for(moment);
-    ::kill(pid, SIGTERM);
-    int status = 0;
-    for (int i = 0; i < 500 && ::waitpid(pid, &status, WNOHANG) == 0; ++i) // it may do something about it
-        std::this_thread::sleep_for(2ms);
-    if (::kill(pid, SIGKILL) == 0)
-        ::waitpid(pid, &status, 0);
-    if (written < done)
-        throw Failure(fmt::format("in a process of its own it gave up after {} frames", written));
-}
-
 void killed(Context &context) {
     constexpr std::uint64_t frames = 4, done = 2;
     constexpr Size size{160, 120};
@@ -365,8 +334,11 @@ void killed(Context &context) {
     const std::chrono::duration<double> a_frame = (std::chrono::steady_clock::now() - begin) / frames;
     int i = 0;
     for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9}) {
-        const std::string folder = fmt::format("killed {}", i++);
-        write_and_kill(context, folder, frames, size, done, part * a_frame);
+        const std::string folder = fmt::format("killed-{}", i++);
+        SinkProcess process(context, {folder, frames, size});
+        process.wait_until_written(done);
+        std::this_thread::sleep_for(part * a_frame);
+        process.kill();
         for (const auto &[name, bytes] : files_in(context.library.scratch() / folder))
             if (course.end.contains(name) && !course.has_been(name, bytes))
                 throw Failure(
@@ -379,7 +351,11 @@ void killed(Context &context) {
 void restart(Context &context) {
     constexpr std::uint64_t frames = 8, first = 4;
     const Files should = course_of(context, frames).end;
-    write_and_kill(context, "killed", frames, {}, frames, {});
+    {
+        SinkProcess process(context, {"killed", frames, {}});
+        process.wait_until_written(frames);
+        process.kill();
+    }
     SinkRun run(context, "killed");
     run.start(first);
     run.write(first, frames);
@@ -455,19 +431,17 @@ void speed(Context &context) {
     constexpr Size size{640, 480};
     SinkRun run(context, "out");
     run.start(0, size);
-    std::vector<double> ms;
-    for (std::uint64_t n = 0; n < 11; ++n) {
-        const SealedOutput frame({n, size});
-        const auto begin = std::chrono::steady_clock::now();
-        run.write(frame);
-        ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-    }
-    std::sort(ms.begin(), ms.end());
-    const double median = ms[ms.size() / 2];
-    context.note = fmt::format("640×480 in {:.1f} ms on the median, {:.1f} ms at the most", median, ms.back());
-    constexpr double bound_ms = 100;
-    if (median > bound_ms)
-        throw Warning(context.note);
+    std::deque<SealedOutput> frames; // made before, since noise takes its time
+    for (std::uint64_t n = 0; n < 8; ++n)
+        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = size});
+    std::uint64_t next = 0;
+    const std::vector<double> ms = frame_times_ms([&] {
+        SealedOutput &frame = frames[next % frames.size()];
+        frame.change([&](arhost_record &record) { record.sequence = next; });
+        ++next;
+        return run.write(frame), true;
+    });
+    judge_speed(context, size.width, size.height, ms, 100);
 }
 
 template <void (*test)(Context &)> void of_files(Context &context) {
@@ -476,22 +450,23 @@ template <void (*test)(Context &)> void of_files(Context &context) {
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_SINK;
-constexpr const char *gate = "sink.write", *same = "sink.deterministic";
+constexpr const char *gate = "sink.write", *same = "sink.files";
 constexpr Test tests[] = {
     {"sink.start", "It starts and stops.", kind, "abi.create", 30s, start},
     {"sink.write", "It takes frames that can't be written, and reads nothing behind them.", kind, "sink.start", 30s,
      write},
     {"sink.sizes", "It takes frames of one pixel, one row, one column, odd and usual sizes, or says why not.", kind,
      gate, 60s, sizes},
-    {"sink.records", "It takes frames with any count of markers, without a camera, and with numbers that are none.",
-     kind, gate, 30s, records},
+    {"sink.records", "It takes frames with any count of markers, without a camera, and with huge numbers.", kind,
+     gate, 30s, records},
     {"sink.gaps", "It takes frames with gaps in their numbers.", kind, gate, 30s, gaps},
     {"sink.idle", "Between frames idle does no harm.", kind, gate, 30s, idle},
     {"sink.cancelled", "Cancelled before, start, write and stop return soon, OK or CANCELLED.", kind, gate, 30s,
      cancelled},
     {"sink.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate, 60s,
      leaks},
-    {"sink.deterministic", "The same frames give the same files.", kind, gate, 30s, of_files<deterministic>},
+    {"sink.files", "Its frames become files. Unless they are the same in each run, runs are not compared.", kind,
+     gate, 30s, of_files<files>},
     {"sink.start-again", "Once it has been stopped another instance starts, with the same files for the same frames.",
      kind, same, 30s, of_files<start_again>},
     {"sink.two-instances", "Two instances at work at a time do not mix their files.", kind, same, 30s,
@@ -499,7 +474,7 @@ constexpr Test tests[] = {
     {"sink.stride", "Its files depend on pixels, not on what lies between rows.", kind, same, 30s, of_files<stride>},
     {"sink.every-frame", "Once write has returned OK the frame is in a file.", kind, gate, 30s,
      of_files<every_frame>},
-    {"sink.last-frame", "Its files at the end show the last frame.", kind, gate, 30s, of_files<last_frame>},
+    {"sink.last-frame", "Its files at the end show the last frame.", kind, same, 30s, of_files<last_frame>},
     {"sink.earlier-files", "Until its first frame it leaves an earlier run's files as they are.", kind, gate, 30s,
      of_files<earlier_files>},
     {"sink.no-place", "Where nothing can be written start says so.", kind, gate, 30s, of_files<no_place>},

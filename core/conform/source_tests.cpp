@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Sources: frames as memory, their times, the end, and the same frames again.
+#include "conform/frame_times.hpp"
 #include "conform/process_usage.hpp"
 #include "conform/source_run.hpp"
 #include "pixels/grey.hpp"
@@ -45,6 +46,16 @@ std::int64_t now_ns() {
     timespec now{};
     ::clock_gettime(CLOCK_MONOTONIC, &now);
     return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
+}
+
+bool is_refusal(arhost_status status) {
+    return status == ARHOST_ERROR_UNSUPPORTED || status == ARHOST_ERROR_CONFIGURATION;
+}
+
+// At this rate, or at its own where it refuses that.
+void start_at(SourceRun &run, double fps, bool paced) {
+    const arhost_status status = run.try_start({0, fps, paced, nullptr});
+    run.accept(is_refusal(status) ? run.try_start({0, 0, paced, nullptr}) : status);
 }
 
 // ---- From start to stop ----------------------------------------------------------------------------
@@ -187,9 +198,6 @@ void times(Context &context) {
         if (i > 0 && info.capture_ns < frames[i - 1].info.capture_ns)
             throw Failure(fmt::format("frame {} is of {} ns, before the one before it, which is of {} ns", i,
                                       info.capture_ns, frames[i - 1].info.capture_ns));
-        if (!run.is_live() && info.skipped > 0)
-            throw Failure(fmt::format("frame {} tells of {} lost ones, though it was given all the time it wanted", i,
-                                      info.skipped));
         // A camera's exposure may have been long ago where frames wait in buffers.
         constexpr std::int64_t buffered_ns = 10'000'000'000;
         if (info.clock == ARHOST_CLOCK_MONOTONIC &&
@@ -199,17 +207,17 @@ void times(Context &context) {
         if (info.clock == ARHOST_CLOCK_MEDIA && info.capture_ns < 0)
             throw Failure(fmt::format("frame {} is of {} ns, before the beginning", i, info.capture_ns));
     }
-    if (frames.size() < 2)
+    if (frames.size() < 2 || run.is_live() || run.format().fps == 0)
         return;
-    const double period_ns = static_cast<double>(frames.back().info.capture_ns - frames.front().info.capture_ns) /
-                             static_cast<double>(frames.size() - 1);
-    if (!(period_ns > 0))
-        throw Failure(fmt::format("{} frames are all of {} ns", frames.size(), frames[0].info.capture_ns));
-    // A film's frames need not be evenly spaced, and a camera in the dark is slow.
+    double periods = 0; // those of skipped frames too
+    for (std::size_t i = 1; i < frames.size(); ++i)
+        periods += 1 + frames[i].info.skipped;
+    const double period_ns =
+        static_cast<double>(frames.back().info.capture_ns - frames.front().info.capture_ns) / periods;
+    // A film's frames need not be evenly spaced.
     constexpr double factor = 4;
     if (const double nominal_ns = 1e9 / run.format().fps;
-        !run.is_live() && run.format().fps > 0 &&
-        (period_ns > factor * nominal_ns || period_ns < nominal_ns / factor))
+        period_ns > factor * nominal_ns || period_ns < nominal_ns / factor)
         throw Failure(fmt::format("from frame to frame it is {:.3f} ms, and with its {} frames a second it should be "
                                   "{:.3f} ms",
                                   period_ns / 1e6, run.format().fps, nominal_ns / 1e6));
@@ -220,14 +228,17 @@ void rate(Context &context) {
     if (run.is_live())
         throw Skip(is_live);
     for (const double fps : {10.0, 48.0}) {
-        run.start({0, fps, false, nullptr});
+        const arhost_status status = run.try_start({0, fps, false, nullptr});
+        if (is_refusal(status))
+            continue;
+        run.accept(status);
         if (run.format().fps != fps)
             throw Failure(
                 fmt::format("asked for {} frames a second, it says that it gives {}", fps, run.format().fps));
         const std::vector<Frame> frames = run.read_up_to(4);
         for (std::size_t i = 1; i < frames.size(); ++i) {
             const double ms = static_cast<double>(frames[i].info.capture_ns - frames[i - 1].info.capture_ns) / 1e6;
-            if (constexpr double tolerance_ms = 0.01; std::abs(ms - 1000 / fps) > tolerance_ms)
+            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of the files' clocks
                 throw Failure(fmt::format(
                     "asked for {} frames a second, frame {} comes {:.3f} ms after the one before", fps, i, ms));
         }
@@ -239,12 +250,12 @@ void late_reader(Context &context) {
     if (run.is_live())
         throw Skip(is_live);
     constexpr double fps = 50;
-    run.start({0, fps, true, nullptr});
+    start_at(run, fps, true);
     std::vector<Frame> frames = run.read_up_to(2);
     std::this_thread::sleep_for(200ms);
     for (Frame &frame : run.read_up_to(3))
         frames.push_back(std::move(frame));
-    in_time.start({0, fps, false, nullptr});
+    start_at(in_time, fps, false);
     std::optional<Frame> should = in_time.read();
     for (std::size_t i = 0; i < frames.size(); ++i) {
         while (should && should->info.capture_ns < frames[i].info.capture_ns)
@@ -355,7 +366,7 @@ void cancelled(Context &context) {
 void cancel_while_waiting(Context &context) {
     SourceRun run(context);
     constexpr double fps = 0.01; // the second frame is due in 100 s, long after this test's time
-    run.start({0, fps, true, nullptr});
+    start_at(run, fps, true);
     std::atomic<bool> is_cancelled{false};
     std::thread other([&] {
         std::this_thread::sleep_for(100ms);
@@ -385,9 +396,8 @@ void intrinsics(Context &context) {
                                   format.width, format.height));
     if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
         throw Failure(fmt::format("its focal lengths are {} and {} px", camera.fx, camera.fy));
-    if (!(camera.cx >= -0.5 && camera.cx < camera.width && camera.cy >= -0.5 && camera.cy < camera.height))
-        throw Failure(fmt::format("its principal point ({}, {}) is not in its frames of {}×{}", camera.cx, camera.cy,
-                                  camera.width, camera.height));
+    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // outside of the frames is fine: they may be a part
+        throw Failure(fmt::format("its principal point is ({}, {})", camera.cx, camera.cy));
     const std::uint32_t n = camera.coefficient_count;
     const bool fits = (camera.distortion == ARHOST_DISTORTION_NONE && n == 0) ||
                       (camera.distortion == ARHOST_DISTORTION_BROWN && (n == 4 || n == 5 || n == 8 || n == 12)) ||
@@ -432,22 +442,13 @@ void truth(Context &context) {
 void speed(Context &context) {
     SourceRun run(context);
     run.start();
-    std::vector<double> ms;
-    for (int i = 0; i < 12; ++i) {
-        const auto begin = std::chrono::steady_clock::now();
-        if (run.try_read() != ARHOST_OK)
-            break;
-        ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-    }
+    const std::uint64_t count = run.properties().frame_count; // its end is no frame
+    std::uint64_t next = 0;
+    const std::vector<double> ms =
+        frame_times_ms([&] { return (count == 0 || next++ < count) && run.try_read() == ARHOST_OK; });
     if (ms.empty())
         throw Skip("it gives no frame");
-    std::sort(ms.begin(), ms.end());
-    const double median = ms[ms.size() / 2];
-    context.note = fmt::format("{}×{} in {:.1f} ms on the median, {:.1f} ms at the most", run.format().width,
-                               run.format().height, median, ms.back());
-    constexpr double bound_ms = 100;
-    if (median > bound_ms)
-        throw Warning(context.note);
+    judge_speed(context, run.format().width, run.format().height, ms, 100);
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_SOURCE;
@@ -464,13 +465,14 @@ constexpr Test tests[] = {
      kind, "source.deterministic", 30s, two_instances},
     {"source.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
      120s, leaks},
-    {"source.writes-every-pixel", "Every byte of a frame is written, whatever was there.", kind, gate, 30s,
+    {"source.writes-every-pixel", "Every pixel of a frame is written, whatever was there.", kind, gate, 30s,
      writes_every_pixel},
     {"source.writes-nothing-else", "No byte before or behind the slot is written.", kind, gate, 30s,
      writes_nothing_else},
     {"source.grey", "A grey plane that it writes is the frame's luma.", kind, gate, 30s, grey},
-    {"source.times", "Capture times never go back, and are of the rate that it tells.", kind, gate, 30s, times},
-    {"source.rate", "One that is not live gives as many frames a second as it is asked for.", kind, gate, 30s, rate},
+    {"source.times", "Capture times never go back, and are about of the rate that it tells.", kind, gate, 30s, times},
+    {"source.rate", "One that is not live gives as many frames a second as it is asked for, or refuses.", kind, gate,
+     30s, rate},
     {"source.late-reader", "In mode live a late reader gets the frames of their times.", kind, "source.deterministic",
      30s, late_reader},
     {"source.end", "It has as many frames as it tells, and once at its end it stays there.", kind, gate, 60s, end},

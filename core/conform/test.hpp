@@ -83,6 +83,9 @@ std::span<const Test> tracker_pose_tests();
 std::span<const Test> source_tests();
 std::span<const Test> sink_tests();
 
+// What some of the tests run in a further process; none of the suite's own.
+std::span<const Test> helper_tests();
+
 inline std::vector<Test> all_tests() {
     std::vector<Test> all;
     for (const auto part :

@@ -90,14 +90,22 @@ arhost_frame SealedFrame::frame(std::uint64_t sequence, std::int64_t capture_ns)
 }
 
 Tracker::Tracker(Context &context, Settings overrides)
-    : instance_(context.library, std::move(overrides)),
+    : library_(context.library), overrides_(std::move(overrides)),
       functions_(*static_cast<const arhost_tracker *>(context.library.plugin().functions)),
       result_memory_(sizeof(arhost_tracker_result)) {
-    instance_.create_or_fail();
+    create();
+}
+
+void Tracker::create() {
+    instance_.emplace(library_, overrides_);
+    instance_->create_or_fail();
 }
 
 arhost_status Tracker::try_start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
                                  arhost_pixel_format pixel_format) {
+    camera_ = camera;
+    listed_ = listed;
+    format_ = pixel_format;
     std::vector<arhost_marker_config> markers;
     markers.reserve(listed.size());
     for (const Listed &marker : listed)
@@ -109,45 +117,60 @@ arhost_status Tracker::try_start(const arhost_intrinsics &camera, const std::vec
 
 arhost_status Tracker::start_with(const arhost_tracker_setup &setup) {
     stop();
+    if (!std::exchange(fresh_, false))
+        create();
     const arhost_status status =
-        in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
+        in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
     started_ = status == ARHOST_OK;
+    sequence_ = 0;
     return status;
 }
 
 void Tracker::start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
                     arhost_pixel_format pixel_format) {
-    instance_.expect_ok("start", try_start(camera, listed, pixel_format));
+    instance_->expect_ok("start", try_start(camera, listed, pixel_format));
 }
 
 void Tracker::stop() {
     if (std::exchange(started_, false))
-        in_call(instance_.library().calls(), Call::stop, [&] { functions_.stop(instance_.get()); });
+        in_call(library_.calls(), Call::stop, [&] { functions_.stop(instance_->get()); });
 }
 
 arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns) {
     auto *result = new (result_memory_.data()) arhost_tracker_result{};
     result->struct_size = sizeof *result;
     const arhost_frame given = frame.frame(sequence, capture_ns);
-    return in_call(instance_.library().calls(), Call::per_frame,
-                   [&] { return functions_.track(instance_.get(), &given, result); });
+    return in_call(library_.calls(), Call::per_frame,
+                   [&] { return functions_.track(instance_->get(), &given, result); });
 }
 
-std::vector<arhost_marker> Tracker::detected() const {
+std::vector<arhost_marker> Tracker::records() const {
     const auto &result = *reinterpret_cast<const arhost_tracker_result *>(result_memory_.data());
     if (result.marker_count > ARHOST_MAX_MARKERS)
         throw Failure(
             fmt::format("it reports {} markers; {} are the most", result.marker_count, +ARHOST_MAX_MARKERS));
-    std::vector<arhost_marker> detected;
-    std::copy_if(result.markers, result.markers + result.marker_count, std::back_inserter(detected),
-                 [](const arhost_marker &marker) { return marker.state == ARHOST_MARKER_DETECTED; });
-    return detected;
+    return {result.markers, result.markers + result.marker_count};
+}
+
+std::vector<arhost_marker> Tracker::seen() const {
+    std::vector<arhost_marker> all = records();
+    std::erase_if(all, [](const arhost_marker &marker) {
+        const bool is_smoothed = marker.state == ARHOST_MARKER_PREDICTED && marker.age_frames == 0;
+        return marker.state != ARHOST_MARKER_DETECTED && !is_smoothed;
+    });
+    return all;
 }
 
 std::vector<arhost_marker> Tracker::track(const SealedFrame &frame) {
-    instance_.expect_ok("track", try_track(frame, sequence_, static_cast<std::int64_t>(sequence_) * frame_ns));
+    instance_->expect_ok("track", try_track(frame, sequence_, static_cast<std::int64_t>(sequence_) * frame_ns));
     ++sequence_;
-    return detected();
+    return seen();
+}
+
+std::vector<arhost_marker> Tracker::look(const SealedFrame &frame) {
+    if (sequence_ > 0)
+        start(camera_, listed_, format_);
+    return track(frame);
 }
 
 // ---- Expectations ----------------------------------------------------------------------------------
@@ -164,7 +187,7 @@ double angle_degrees(const Pose &a, const Pose &b) {
 arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
                          const Grey &image) {
     if (found.size() != 1)
-        throw Failure(fmt::format("{}, {} markers are detected and must be one", where, found.size()))
+        throw Failure(fmt::format("{}, {} markers are seen and must be one", where, found.size()))
             .with("frame", image.picture());
     if (found[0].id != id)
         throw Failure(fmt::format("{}, marker {} is reported and {} is in view", where, found[0].id, id))
@@ -191,12 +214,12 @@ void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &
 
 void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image) {
     if (!found.empty())
-        throw Failure(fmt::format("{}, marker {} is detected", where, found[0].id)).with("frame", image.picture());
+        throw Failure(fmt::format("{}, marker {} is seen", where, found[0].id)).with("frame", image.picture());
 }
 
 void expect_found(Tracker &tracker, const Placed &marker, const Grey &image, const Bounds &bounds,
                   const std::string &where) {
-    expect_pose(expect_one(tracker.track(image), marker.print.id, where, image), marker.camera_from_marker, bounds,
+    expect_pose(expect_one(tracker.look(image), marker.print.id, where, image), marker.camera_from_marker, bounds,
                 where, image);
 }
 

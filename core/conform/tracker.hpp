@@ -46,6 +46,7 @@ struct Listed { // in the configuration
     double side_mm;
 };
 
+// An instance is started once: another start makes another one.
 class Tracker {
 public:
     explicit Tracker(Context &context, Settings overrides = {});
@@ -62,20 +63,31 @@ public:
     void stop();
 
     arhost_status try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns);
-    std::vector<arhost_marker> detected() const; // by the last track
+    std::vector<arhost_marker> records() const; // of the last track
+    std::vector<arhost_marker> seen() const;    // those of markers in the frame, whatever their pose is made of
 
-    // Those that it detects in the next frame, 30 a second. Throws Failure unless it succeeds.
+    // Those that it sees in the next frame, 30 a second. Throws Failure unless it succeeds.
     std::vector<arhost_marker> track(const SealedFrame &frame);
     std::vector<arhost_marker> track(const Grey &image) { return track(SealedFrame(image, ARHOST_GREY8)); }
+    // In a frame that is the first since start, and so has no history to smooth with.
+    std::vector<arhost_marker> look(const SealedFrame &frame);
+    std::vector<arhost_marker> look(const Grey &image) { return look(SealedFrame(image, ARHOST_GREY8)); }
 
-    Instance &instance() { return instance_; }
+    Instance &instance() { return *instance_; }
 
 private:
-    Instance instance_;
+    void create();
+
+    PluginLibrary &library_;
+    Settings overrides_;
+    std::optional<Instance> instance_;
     const arhost_tracker &functions_;
     GuardedMemory result_memory_;
-    bool started_ = false;
-    std::uint64_t sequence_ = 0;
+    bool fresh_ = true, started_ = false;
+    arhost_intrinsics camera_{}; // as it was last started
+    std::vector<Listed> listed_;
+    arhost_pixel_format format_ = ARHOST_GREY8;
+    std::uint64_t sequence_ = 0; // of the next frame
 };
 
 inline constexpr std::int64_t frame_ns = 33'333'333;
@@ -96,7 +108,7 @@ inline constexpr Bounds roughly{3, 0.02};
 double angle_degrees(const Pose &a, const Pose &b);
 Pose pose_of(const arhost_marker &marker);
 
-// The one marker that is detected, and where it must be.
+// The one marker that is seen, and where it must be.
 arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
                          const Grey &image);
 void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,

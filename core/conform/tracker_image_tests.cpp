@@ -86,7 +86,7 @@ void occlusion(Context &context) {
                 const Grey image = filled(whole.width, whole.height, [&](auto x, auto y) {
                     return glm::distance(glm::dvec2(x, y), hidden[corner]) < radius ? code : whole.at(x, y);
                 });
-                for (const arhost_marker &found : tracker.track(image))
+                for (const arhost_marker &found : tracker.look(image))
                     expect_pose(found, marker.camera_from_marker, {5, 0.03}, where, image);
             }
 }
@@ -105,7 +105,7 @@ void recall(Context &context) {
         const Placed marker{print, side_mm,
                             tilted(centre, context.uniform(0, 50), context.uniform(0, 360), context.uniform(0, 360))};
         const Grey image = draw(wide_camera(), marker);
-        const std::vector<arhost_marker> markers = tracker.track(image);
+        const std::vector<arhost_marker> markers = tracker.look(image);
         if (markers.empty()) {
             missed = image;
             continue;
@@ -156,9 +156,9 @@ void several(Context &context) {
         for (const Placed &marker : order)
             list.push_back({marker.print.id, marker.side_mm});
         tracker.start(wide_camera(), list);
-        const std::vector<arhost_marker> found = tracker.track(image);
+        const std::vector<arhost_marker> found = tracker.look(image);
         if (found.size() != order.size())
-            throw Failure(fmt::format("of {} markers in view {} are detected", order.size(), found.size()))
+            throw Failure(fmt::format("of {} markers in view {} are seen", order.size(), found.size()))
                 .with("frame", image.picture());
         for (std::size_t i = 0; i < order.size(); ++i) {
             if (found[i].id != order[i].print.id)
@@ -175,7 +175,7 @@ void unlisted(Context &context) {
     const Grey image = draw(wide_camera(), group.markers);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{group.markers[1].print.id, group.markers[1].side_mm}});
-    expect_one(tracker.track(image), group.markers[1].print.id, "with others in view that are not listed", image);
+    expect_one(tracker.look(image), group.markers[1].print.id, "with others in view that are not listed", image);
 }
 
 void seen_twice(Context &context) {
@@ -185,7 +185,7 @@ void seen_twice(Context &context) {
     const Grey image = draw(wide_camera(), twice);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{print.id, 60}});
-    expect_one(tracker.track(image), print.id, "with the same print seen twice", image);
+    expect_one(tracker.look(image), print.id, "with the same print seen twice", image);
 }
 
 void mirrored(Context &context) {
@@ -194,7 +194,7 @@ void mirrored(Context &context) {
     tracker.start(wide_camera(), listed(prints));
     for (const Print &print : prints) {
         const Grey image = draw(wide_camera(), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
-        expect_none(tracker.track(image), "of a mirrored print", image);
+        expect_none(tracker.look(image), "of a mirrored print", image);
     }
 }
 
@@ -206,7 +206,7 @@ void no_marker(Context &context) {
     tracker.start(wide_camera(), listed(prints));
     const auto expect_nothing = [&](const std::string &what, const auto &code) {
         const Grey image = filled(320, 256, code);
-        expect_none(tracker.track(image), "in " + what, image);
+        expect_none(tracker.look(image), "in " + what, image);
     };
     for (const int grey : {0, 255, 128})
         expect_nothing(fmt::format("an image of code {}", grey), [&](auto, auto) { return grey; });
@@ -230,7 +230,7 @@ void no_marker(Context &context) {
         for (std::uint32_t y = y0; y < y1; ++y)
             std::fill(&clutter.at(x0, y), &clutter.at(x0, y) + (x1 - x0), code);
     }
-    expect_none(tracker.track(clutter), "among rectangles", clutter);
+    expect_none(tracker.look(clutter), "among rectangles", clutter);
 }
 
 // ---- Sizes and layouts -----------------------------------------------------------------------------
@@ -252,7 +252,7 @@ void sizes(Context &context) {
             const Grey image = filled(size.width, size.height, [&](auto, auto) {
                 return flat ? 0 : static_cast<int>(context.random() & 255);
             });
-            expect_none(tracker.track(image),
+            expect_none(tracker.look(image),
                         fmt::format("in {} of {}×{}", flat ? "black" : "noise", size.width, size.height), image);
         }
     }
@@ -266,7 +266,7 @@ void stride(Context &context) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, side_mm}});
     for (const std::uint64_t filler : {1, 2}) {
-        const arhost_marker found = expect_one(tracker.track(SealedFrame(image, ARHOST_GREY8, filler)),
+        const arhost_marker found = expect_one(tracker.look(SealedFrame(image, ARHOST_GREY8, filler)),
                                                marker.print.id, "in rows with bytes between them", image);
         expect_pose(found, marker.camera_from_marker, roughly, "in rows with bytes between them", image);
     }
@@ -285,7 +285,7 @@ void formats(Context &context) {
         tracker.start(wide_camera(), {{marker.print.id, side_mm}}, format);
         const std::string where = fmt::format("in a frame of {}", name);
         const arhost_marker found =
-            expect_one(tracker.track(SealedFrame(image, format)), marker.print.id, where, image);
+            expect_one(tracker.look(SealedFrame(image, format)), marker.print.id, where, image);
         expect_pose(found, marker.camera_from_marker, roughly, where, image);
     }
 }

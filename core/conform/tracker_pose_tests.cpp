@@ -29,7 +29,7 @@ public:
     Shot shoot(const Pose &at, const std::string &where) {
         const Placed marker{print_, side_mm, at};
         const Grey image = draw(camera_, marker);
-        return {marker, image, expect_one(tracker_.track(image), print_.id, where, image)};
+        return {marker, image, expect_one(tracker_.look(image), print_.id, where, image)};
     }
     void expect_found(const Pose &at, const Bounds &bounds, const std::string &where) {
         const Shot shot = shoot(at, where);
@@ -69,7 +69,7 @@ void millimetres(Context &context) {
     Tracker tracker(context);
     for (const double factor : {1.0, 0.5, 3.0}) {
         tracker.start(wide_camera(), {{print.id, factor * side_mm}});
-        const glm::dvec3 is = pose_of(expect_one(tracker.track(image), print.id, "in view", image))[3],
+        const glm::dvec3 is = pose_of(expect_one(tracker.look(image), print.id, "in view", image))[3],
                          must = factor * glm::dvec3(at[3]);
         if (!(glm::distance(is, must) <= 0.02 * glm::length(must)))
             throw Failure(fmt::format("listed with a side of {} mm, the marker is at {} mm and must be at {}",

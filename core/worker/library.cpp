@@ -2,38 +2,52 @@
 #include "worker/library.hpp"
 
 #include <dlfcn.h>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace arhost::worker {
 namespace {
 
-// The functions that a kind must have, none NULL; a short struct lacks its last ones.
-bool kind_is_complete(arhost_kind kind, const void *functions) {
-    switch (kind) {
-    case ARHOST_KIND_SOURCE: {
-        const auto &f = *static_cast<const arhost_source *>(functions);
-        return f.struct_size >= sizeof f && f.start && f.read && f.stop;
-    }
-    case ARHOST_KIND_TRACKER: {
-        const auto &f = *static_cast<const arhost_tracker *>(functions);
-        return f.struct_size >= sizeof f && f.start && f.track && f.stop;
-    }
-    case ARHOST_KIND_RAYTRACER: {
-        const auto &f = *static_cast<const arhost_raytracer *>(functions);
-        return f.struct_size >= sizeof f && f.start && f.render && f.stop;
-    }
-    case ARHOST_KIND_SINK: {
-        const auto &f = *static_cast<const arhost_sink *>(functions);
-        return f.struct_size >= sizeof f && f.start && f.write && f.stop;
-    }
-    default:
-        return false;
-    }
-}
-
 [[noreturn]] void refuse(const std::filesystem::path &file, const std::string &why) {
     throw std::runtime_error(file.string() + ": " + why);
+}
+
+using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // is it there?
+
+void check_functions(const std::filesystem::path &file, NamedFunctions functions, const std::string &owner) {
+    for (const auto &[name, is_there] : functions)
+        if (!is_there)
+            refuse(file, "its function '" + std::string(name) + "' is NULL, which " + owner + " must have");
+}
+
+template <class Functions, class PerFrame>
+void check_kind(const std::filesystem::path &file, const void *given, PerFrame per_frame, const char *name,
+                const std::string &owner) {
+    const auto &f = *static_cast<const Functions *>(given);
+    if (f.struct_size < sizeof f)
+        refuse(file, "the struct of its functions is shorter than that of " + owner +
+                         "; build it against this arhost's headers");
+    check_functions(file, {{"start", f.start}, {name, f.*per_frame}, {"stop", f.stop}}, owner);
+}
+
+void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) {
+    if (!plugin.functions)
+        refuse(file, "its kind's functions are NULL");
+    switch (plugin.descriptor->kind) {
+    case ARHOST_KIND_SOURCE:
+        return check_kind<arhost_source>(file, plugin.functions, &arhost_source::read, "read", "a source");
+    case ARHOST_KIND_TRACKER:
+        return check_kind<arhost_tracker>(file, plugin.functions, &arhost_tracker::track, "track", "a tracker");
+    case ARHOST_KIND_RAYTRACER:
+        return check_kind<arhost_raytracer>(file, plugin.functions, &arhost_raytracer::render, "render",
+                                            "a ray tracer");
+    case ARHOST_KIND_SINK:
+        return check_kind<arhost_sink>(file, plugin.functions, &arhost_sink::write, "write", "a sink");
+    default:
+        refuse(file, "its kind is " + std::to_string(plugin.descriptor->kind) + ", which is none");
+    }
 }
 
 } // namespace
@@ -69,16 +83,16 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
         refuse(file, "its id is '" + id + "'; the file must bear that name");
-    if (!plugin->create || !plugin->destroy || !plugin->get_extension)
-        refuse(file, "lacks create, destroy or get_extension");
+    check_functions(
+        file, {{"create", plugin->create}, {"destroy", plugin->destroy}, {"get_extension", plugin->get_extension}},
+        "every plugin");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
         refuse(file, "its descriptor counts options but lists none");
     if (plugin->descriptor->option_count > 0 &&
         (plugin->descriptor->options->struct_size < sizeof(arhost_option_descriptor) ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
         refuse(file, "its options' struct_size is not that of an arhost_option_descriptor");
-    if (!plugin->functions || !kind_is_complete(plugin->descriptor->kind, plugin->functions))
-        refuse(file, "its kind is unknown or lacks a function that the kind must have");
+    check_kind(file, *plugin);
     return *plugin;
 }
 

@@ -214,8 +214,8 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
             solutions.push_back({motion, pose});
     }
     // A marker that faces the camera exactly is turned by 180° against OpenCV's axes, for which OpenCV's IPPE gives
-    // 0.
-    if (solutions.empty() && !rotations.empty() && !(cv::norm(rotations[0]) > 0))
+    // 0 or anything.
+    if (solutions.empty())
         solutions.push_back({facing(*ideal, lens, side_mm), {}});
     if (solutions.empty())
         return std::nullopt;

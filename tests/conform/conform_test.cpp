@@ -7,6 +7,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 
 namespace arhost::test {
 namespace {
@@ -86,6 +87,29 @@ TEST(Conform, PassesTheTrackers) {
     }
 }
 
+TEST(Conform, SaysWhichFunctionIsMissing) {
+    const std::array<std::array<std::string, 3>, 4> lacking = {{{"rt", "render", "a ray tracer"},
+                                                                {"tracker", "track", "a tracker"},
+                                                                {"source", "read", "a source"},
+                                                                {"sink", "write", "a sink"}}};
+    for (const auto &[kind, function, owner] : lacking) {
+        ConformRun run;
+        EXPECT_EQ(run.run({run.link_wrong("no_" + function, kind).string()}), 1);
+        EXPECT_THAT(run.output(),
+                    HasSubstr("its function '" + function + "' is NULL, which " + owner + " must have"));
+    }
+}
+
+TEST(Conform, TellsHowLongAFrameTakesWhereItIsSoonEnoughToo) {
+    ConformRun run;
+    run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--patience", "3", "--only", "tracker.speed", "--json",
+             "results.json", "--html", "page.html"});
+    const auto measured = testing::ContainsRegex("640×480: p50 [0-9.]+ ms, p99 [0-9.]+ ms, of [0-9]+ frames");
+    EXPECT_THAT(run.output(), measured);
+    EXPECT_THAT(run.json("results.json").at("results")[0].at("message").get<std::string>(), measured);
+    EXPECT_THAT(run.read("page.html"), measured);
+}
+
 TEST(Conform, RunsTheTestsOfThePluginsKindAlone) {
     ConformRun run;
     run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--only", "*.start", "--json", "results.json"});
@@ -122,7 +146,7 @@ TEST(Conform, DrawsTheMarkersThatAreGiven) {
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("it takes three prints"));
     EXPECT_EQ(run.run({tracker, "--print", "5=" + tag, "--only", "tracker.track"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("0 markers are detected and must be one"));
+    EXPECT_THAT(run.output(), HasSubstr("0 markers are seen and must be one"));
     EXPECT_THAT(run.output(),
                 HasSubstr("again: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
 }
@@ -169,7 +193,7 @@ TEST(Conform, WritesJUnitForContinuousIntegration) {
     ConformRun run;
     run.run({run.link_wrong("no_licence").string(), "--only", "abi.*", "--junit", "junit.xml"});
     const std::string xml = run.read("junit.xml");
-    EXPECT_THAT(xml, HasSubstr("tests=\"9\" failures=\"1\" errors=\"0\" skipped=\"0\""));
+    EXPECT_THAT(xml, HasSubstr("tests=\"10\" failures=\"1\" errors=\"0\" skipped=\"0\""));
     EXPECT_THAT(xml, HasSubstr("<testcase classname=\"abi\" name=\"descriptor\""));
     EXPECT_THAT(xml, HasSubstr("<failure type=\"fail\" message=\"the descriptor's licence is empty\">"));
 }

@@ -194,6 +194,8 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         host->log(host, ARHOST_SEVERITY_ERROR, "no");
         return ARHOST_ERROR_UNSUPPORTED;
     }
+    if (has("needs_an_extension") && *static_cast<const int *>(host->get_extension(host, "arhost.host.depth/1")) == 0)
+        return ARHOST_ERROR_UNSUPPORTED;
     if (has("leaks_memory"))
         leak_memory();
     if (has("leaks_descriptors"))
@@ -424,7 +426,7 @@ const void *get_extension(const char *) {
 }
 
 const arhost_plugin &spoilt_plugin() {
-    static constexpr arhost_raytracer functions = {sizeof functions, start, render, stop};
+    static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop};
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;
@@ -436,7 +438,13 @@ const arhost_plugin &spoilt_plugin() {
         descriptor.licence = "";
     if (has("other_kinds_capability"))
         descriptor.capabilities |= ARHOST_IS_LIVE;
-    static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+    if (has("unknown_capability"))
+        descriptor.capabilities |= 1u << 31;
+    static bool was_asked = false;
+    if (has("withdraws_a_capability") && std::exchange(was_asked, true))
+        descriptor.capabilities &= ~ARHOST_TRACES_LENS;
+    static const arhost_plugin plugin = {
+        sizeof plugin, &descriptor, &functions, create, destroy, has("no_get_extension") ? nullptr : get_extension};
     return plugin;
 }
 

@@ -57,12 +57,19 @@ bool is_in_use = false;
 class Files {
 public:
     Files(const Host &host, const Options &options) : host_(host), path_(options.text("path")) {}
+    ~Files() {
+        if (has("crash_after_a_failed_start") && is_starting_)
+            crash();
+    }
+    Files(const Files &) = delete;
+    Files &operator=(const Files &) = delete;
 
     void start(const arhost_sink_setup &setup) {
         if (has("crash_in_start"))
             crash();
         if (has("hang_in_start"))
             hang();
+        is_starting_ = true;
         if (has("starts_once") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_ERROR_IO, "the file is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
@@ -83,8 +90,9 @@ public:
         }
         if (has("empties_at_start") && fresh_)
             put(path_ + ".log", "", O_TRUNC);
-        if (!fresh_)
+        if (!fresh_ && !has("writes_no_file"))
             put(path_ + ".log", log_, O_TRUNC);
+        is_starting_ = false;
     }
 
     arhost_status write(const arhost_output &output) {
@@ -177,12 +185,14 @@ private:
             lines += frame.line;
         }
         waiting_.clear();
-        if (!lines.empty())
+        if (!lines.empty() && !has("writes_no_file"))
             put(path + ".log", lines,
                 std::exchange(fresh_, false) && !has("appends_to_an_old_log") ? O_TRUNC : O_APPEND);
     }
 
     static void write_frame(const std::string &path, const Waiting &frame) {
+        if (has("writes_no_file"))
+            return;
         const std::string name = path + std::to_string(frame.sequence), part = path + ".part";
         if (has("half_files")) {
             const std::size_t half = frame.pixels.size() / 2;
@@ -207,7 +217,7 @@ private:
     std::string path_, log_, before_;
     std::vector<Waiting> waiting_;
     std::uint64_t next_ = 0;
-    bool fresh_ = true;
+    bool fresh_ = true, is_starting_ = false;
 };
 
 constexpr arhost_option_descriptor options[] = {
@@ -231,6 +241,9 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
     sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
-        return negotiate_as<Files>(offer, answer, descriptor, &detail::sink_functions<Files>);
+        static arhost_sink functions = detail::sink_functions<Files>;
+        if (has("no_write"))
+            functions.write = nullptr;
+        return negotiate_as<Files>(offer, answer, descriptor, &functions);
     }};
 }

@@ -23,6 +23,12 @@ class Pattern {
 public:
     Pattern(const Host &host, const Options &options)
         : host_(host), frames_(static_cast<std::uint64_t>(options.integer("frames"))) {}
+    ~Pattern() {
+        if (start_failed_)
+            crash();
+    }
+    Pattern(const Pattern &) = delete;
+    Pattern &operator=(const Pattern &) = delete;
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         if (has("crash_in_start"))
@@ -33,6 +39,12 @@ public:
             throw Failure(ARHOST_ERROR_IO, "the device is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
             throw Failure(ARHOST_ERROR_INTERNAL, "what now?");
+        if (has("crash_after_a_failed_start") && host_.cancelled()) {
+            start_failed_ = true;
+            throw Failure(ARHOST_ERROR_CANCELLED, "it was cancelled");
+        }
+        if (has("one_rate_alone") && setup.fps > 0 && setup.fps != 25)
+            throw Failure(ARHOST_ERROR_UNSUPPORTED, "it has 25 frames a second");
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
         given_ = 0;
@@ -58,7 +70,7 @@ public:
         camera.fx = has("no_focal_length") ? 0 : 70;
         camera.fy = 70;
         camera.cx = 30.5;
-        camera.cy = has("lens_aside") ? 460 : 22.5;
+        camera.cy = has("no_principal_point") ? std::nan("") : 22.5;
         camera.distortion = ARHOST_DISTORTION_BROWN;
         camera.coefficient_count = has("seven_coefficients") ? 7 : 5;
     }
@@ -141,8 +153,6 @@ private:
             info.clock = ARHOST_CLOCK_MONOTONIC;
             info.capture_ns += 1'700'000'000'000'000'000;
         }
-        if (has("tells_of_lost_frames"))
-            info.skipped = 1;
         info.has_truth = 1;
         const double a = 0.1 * static_cast<double>(n), c = std::cos(a), s = std::sin(a);
         const double mt[16] = {c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 5, 7, -400, 1};
@@ -188,7 +198,7 @@ private:
     Host host_;
     std::uint64_t frames_, first_ = 0, given_ = 0;
     double fps_ = 25;
-    bool paced_ = false, at_end_ = false;
+    bool paced_ = false, at_end_ = false, start_failed_ = false;
     std::uint64_t instance_ = ++instances;
     Clock::time_point made_ = Clock::now(), began_;
 };
@@ -205,6 +215,9 @@ constexpr arhost_descriptor descriptor = {
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
     sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
-        return negotiate_as<Pattern>(offer, answer, descriptor, &detail::source_functions<Pattern>);
+        static arhost_source functions = detail::source_functions<Pattern>;
+        if (has("no_read"))
+            functions.read = nullptr;
+        return negotiate_as<Pattern>(offer, answer, descriptor, &functions);
     }};
 }

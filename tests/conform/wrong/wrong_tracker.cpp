@@ -31,11 +31,14 @@ const arhost_tracker &real_functions() {
     return *static_cast<const arhost_tracker *>(real().functions);
 }
 
+// Of all instances.
+bool was_started = false;
+arhost_intrinsics first_camera{};
+
 struct Wrong {
     arhost_instance *real = nullptr;
     const arhost_host *host = nullptr;
-    bool was_started = false;
-    arhost_intrinsics first_camera{};
+    bool start_failed = false;
     arhost_frame_format format{};
     std::vector<arhost_marker_config> listed;
     std::int64_t threads = 0; // the option
@@ -193,7 +196,7 @@ void spoil(Wrong &self, arhost_marker &marker, const arhost_marker_config &confi
     if (has("family_without_end"))
         std::memset(marker.family, 'x', sizeof marker.family);
     if (has("age_counts_frames"))
-        marker.age_frames = self.tracks;
+        marker.age_frames = self.tracks + 1;
     if (has("corners_from_bottom_left"))
         std::rotate(&marker.corners_px[0][0], &marker.corners_px[3][0], &marker.corners_px[3][0] + 2);
     if (has("corners_at_half"))
@@ -243,11 +246,19 @@ void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &re
         marker.mt[0] = marker.mt[5] = marker.mt[10] = marker.mt[15] = 1;
         marker.mt[14] = -distance;
     }
-    if (has("smooths") && !markers.empty() && self.last->marker_count > 0)
+    const bool has_last = self.last->marker_count > 0;
+    if ((has("smooths") || has("predicts")) && !markers.empty() && has_last) {
         for (int i = 12; i < 15; ++i)
             markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
+        if (has("predicts"))
+            markers[0].state = ARHOST_MARKER_PREDICTED;
+    }
+    if (has("predicts") && markers.empty() && has_last) {
+        result = *self.last;
+        result.markers[0].state = ARHOST_MARKER_PREDICTED;
+        ++result.markers[0].age_frames;
+    }
     const arhost_tracker_result now = result;
-    const bool has_last = self.last->marker_count > 0;
     if ((has("stale_pose") || (has("holds_what_is_gone") && result.marker_count == 0)) && has_last)
         result = *self.last;
     if (has("only_fresh_frames") && frame.sequence == self.last_sequence && self.tracks > 0)
@@ -275,6 +286,8 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
 }
 
 void destroy(arhost_instance *instance) {
+    if (wrong(instance).start_failed && has("crash_after_a_failed_start"))
+        crash();
     real().destroy(wrong(instance).real);
     delete &wrong(instance);
 }
@@ -285,15 +298,15 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
         crash();
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
-    const bool again = std::exchange(self.was_started, true);
+    const bool again = std::exchange(was_started, true);
     if (has("starts_once") && again)
         return ARHOST_ERROR_INTERNAL;
     if (!again)
-        self.first_camera = *setup->intrinsics;
+        first_camera = *setup->intrinsics;
     self.format = *setup->format;
     self.tracks = 0;
     self.last->marker_count = 0;
-    arhost_intrinsics camera = spoil(has("keeps_the_first_camera") ? self.first_camera : *setup->intrinsics);
+    arhost_intrinsics camera = spoil(has("keeps_the_first_camera") ? first_camera : *setup->intrinsics);
     arhost_tracker_setup spoilt = *setup;
     spoilt.intrinsics = &camera;
     const auto real_start = [&] {
@@ -308,11 +321,12 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
         status = real_start();
     }
     if (has("accepts_any_lens") && status == ARHOST_ERROR_CONFIGURATION && self.listed[0].id == 31) {
-        camera = self.first_camera;
+        camera = first_camera;
         camera.distortion = ARHOST_DISTORTION_NONE;
         camera.fx = camera.fy = 300;
         status = real_start();
     }
+    self.start_failed = status != ARHOST_OK;
     return status;
 }
 
@@ -395,7 +409,7 @@ const void *get_extension(const char *) {
 }
 
 const arhost_plugin &spoilt_plugin() {
-    static constexpr arhost_tracker functions = {sizeof functions, start, track, stop};
+    static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop};
     static arhost_descriptor descriptor = *real().descriptor;
     descriptor.id = own_name().c_str();
     static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};

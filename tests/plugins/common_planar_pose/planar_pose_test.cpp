@@ -102,6 +102,19 @@ TEST(PlanarPose, SquareAboutTheAxisFacesTheCamera) {
     }
 }
 
+TEST(PlanarPose, SquareAsideOfTheAxisFacesTheCamera) {
+    const auto camera = intrinsics_of({320, 256}, 300, 300, 159.5, 127.5);
+    for (int left = 52; left <= 172; ++left) {
+        const double top = 80, side = 95, scale = side_mm / side;
+        const auto found = planar_pose(
+            {{{1.0 * left, top}, {left + side, top}, {left + side, top + side}, {1.0 * left, top + side}}},
+            Lens(camera), side_mm);
+        ASSERT_TRUE(found) << left;
+        const auto expected = pose_of((left + side / 2 - 159.5) * scale, 0, 300 * scale, 0, 0, 0);
+        EXPECT_THAT(found->best.mt, Pointwise(DoubleNear(1e-3), expected)) << left;
+    }
+}
+
 TEST(PlanarPose, ReprojectionErrorIsTheRmsOverTheCornersInDistortedPixels) {
     const auto &camera = lenses[5].camera;
     const Lens lens(camera);

@@ -8,6 +8,7 @@
  * Call order (docs/abi.md draws it):
  *   arhost_entry.negotiate -> plugin.create -> the kind's start -> its per-frame function, again and
  *   again -> the kind's stop -> plugin.destroy -> the process ends.
+ * After a start that failed, or without one, destroy comes without stop.
  *
  * Rules that hold for every function of this ABI unless its comment says otherwise:
  * - Thread: [worker] is the one thread of arhost-worker that calls the plugin. A plugin may start
@@ -73,7 +74,7 @@ enum {
     ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 6 /* the worker saw the plugin break it */
 };
 
-/* What the plugin may ask of its host. Lives as long as the process. All functions are [any]. */
+/* What the plugin may ask of its host. Lives as long as the process. All functions are [any], none is NULL. */
 typedef struct arhost_host {
     uint32_t struct_size;
     uint32_t abi_version; /* the version that negotiate chose */
@@ -92,7 +93,7 @@ typedef struct arhost_host {
      * One atomic load: ask in every loop that can take longer than 100 ms. */
     int32_t (*cancelled)(const struct arhost_host *host);
 
-    /* [any] A host extension by id and revision ("arhost.host.something/1"), or NULL. */
+    /* [any] A host extension by id and revision ("arhost.host.something/1"), or NULL: a plugin does without. */
     const void *(*get_extension)(const struct arhost_host *host, const char *id);
 } arhost_host;
 
@@ -160,11 +161,13 @@ typedef struct arhost_descriptor {
 /* One made plugin; what is in it is the plugin's own affair. */
 typedef struct arhost_instance arhost_instance;
 
+/* Static, with all that it points to: the same whenever negotiate is asked. No function is NULL, here or among
+ * the kind's, unless its comment says so: a plugin that lacks one is refused. */
 typedef struct arhost_plugin {
     uint32_t struct_size;
     const arhost_descriptor *descriptor;
 
-    /* The kind's functions: arhost_source, arhost_tracker, arhost_raytracer or arhost_sink. Static. */
+    /* The kind's functions: arhost_source, arhost_tracker, arhost_raytracer or arhost_sink. */
     const void *functions;
 
     /* [worker] Makes an instance. On success *instance is not NULL. On failure the reason has been

@@ -33,7 +33,7 @@ enum {
     ARHOST_OVERLAY_NONE = 3      /* the plain video: no marker in view, or a backend is down */
 };
 
-/* All that is known of a frame. */
+/* All that is known of a frame. What is set is finite. */
 typedef struct arhost_record {
     uint32_t struct_size;
     arhost_clock clock;

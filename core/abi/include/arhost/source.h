@@ -17,23 +17,27 @@ typedef struct arhost_source_setup {
     uint32_t struct_size;
     uint32_t reserved;       /* 0 */
     uint64_t first_sequence; /* 0, or where a restarted source goes on; a live one ignores it */
-    double fps;              /* asked for by the configuration; 0: the source's own */
-    int32_t paced;           /* non-zero (mode live): a source that is no camera gives its frames in real
-                                time, at its fps; 0 (lockstep): as fast as they are asked for */
+    /* Asked for by the configuration; 0: the source's own. One that is not live gives its frames 1/fps apart or
+     * refuses (UNSUPPORTED); a live one comes as near as it can. The format's fps tells what it gives. */
+    double fps;
+    int32_t paced; /* non-zero (mode live): a source that is no camera gives its frames in real
+                      time, at its fps, and may leave out those that it is late for; 0
+                      (lockstep): every frame, as fast as they are asked for */
     /* The camera that the configuration names, or NULL. A synthetic source takes it as its own; a real
      * one may check that its frames have that size. */
     const arhost_intrinsics *intrinsics;
 } arhost_source_setup;
 
 typedef struct arhost_source_properties {
-    uint32_t struct_size;       /* set by the worker; all else comes zeroed */
-    int32_t has_intrinsics;     /* non-zero where the source knows its own camera */
-    arhost_frame_format format; /* with its struct_size set; laid out by arhost_frame_layout */
-    arhost_intrinsics intrinsics;
-    uint64_t frame_count; /* of the whole sequence; 0: unknown or endless */
+    uint32_t struct_size;         /* set by the worker; all else comes zeroed */
+    int32_t has_intrinsics;       /* non-zero where the source knows its own camera */
+    arhost_frame_format format;   /* with its struct_size set; laid out by arhost_frame_layout */
+    arhost_intrinsics intrinsics; /* of these frames: their size is its size */
+    uint64_t frame_count;         /* of the whole sequence; 0: unknown or endless */
 } arhost_source_properties;
 
-/* Where `read` puts a frame. Bytes that it does not write keep an older frame's value. */
+/* Where `read` puts a frame. Every pixel of its planes is to be written: a byte that is not keeps some older
+ * frame's value. Bytes of a row past its pixels may be left. */
 typedef struct arhost_frame_buffer {
     uint32_t struct_size;
     uint32_t reserved;
@@ -47,8 +51,10 @@ typedef struct arhost_frame_buffer {
 /* What `read` tells of the frame. Comes zeroed but for struct_size. */
 typedef struct arhost_frame_info {
     uint32_t struct_size;
-    arhost_clock clock; /* must be set */
-    int64_t capture_ns; /* never smaller than that of the frame before */
+    arhost_clock clock; /* must be set, to the same for all frames */
+    /* Never smaller than that of the frame before; of CLOCK_MONOTONIC never in the future. Where the format
+     * tells fps, frames are about 1/fps apart on the mean, the skipped ones counted; live ones may be slower. */
+    int64_t capture_ns;
     uint32_t skipped;   /* frames that the device lost since the one before */
     int32_t has_grey;   /* non-zero: `grey` has been written */
     int32_t has_truth;  /* non-zero: `true_mt` is set */
@@ -59,7 +65,8 @@ typedef struct arhost_frame_info {
 typedef struct arhost_source {
     uint32_t struct_size;
 
-    /* [worker] Once after create: opens the device or file. */
+    /* [worker] Once after create: opens the device or file. A source that is not live gives the same frames
+     * at the same times each time that it is started. */
     arhost_status (*start)(arhost_instance *instance, const arhost_source_setup *setup,
                            arhost_source_properties *properties);
 

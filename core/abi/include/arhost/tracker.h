@@ -30,8 +30,9 @@ typedef struct arhost_marker_config {
 
 typedef int32_t arhost_marker_state;
 enum {
-    ARHOST_MARKER_DETECTED = 1,  /* seen in this frame */
-    ARHOST_MARKER_PREDICTED = 2, /* not seen; its pose was carried forward by a motion model */
+    ARHOST_MARKER_DETECTED = 1,  /* seen in this frame, and all that is told of it is of this frame alone */
+    ARHOST_MARKER_PREDICTED = 2, /* its pose is a motion model's: smoothed where it is seen (age_frames 0),
+                                    carried forward where it is not */
     ARHOST_MARKER_LOST = 3       /* not seen, no pose: `mt` is the last one known */
 };
 
@@ -40,7 +41,7 @@ typedef struct arhost_marker {
     int32_t id;
     char family[ARHOST_MAX_FAMILY]; /* "tag36h11", "DICT_6X6_250" */
     arhost_marker_state state;
-    uint32_t age_frames; /* since it was last detected; 0 where state is DETECTED */
+    uint32_t age_frames; /* since it was last seen; 0 where state is DETECTED */
     double corners_px[4][2];
     /* Marker-to-camera, column-major, GL eye space: x right, y up, looking along −z; millimetres.
      * Rotation orthonormal to 1e-9, last row 0 0 0 1. */
@@ -67,12 +68,17 @@ typedef struct arhost_tracker_result {
 typedef struct arhost_tracker {
     uint32_t struct_size;
 
-    /* [worker] Once after create. ARHOST_ERROR_CONFIGURATION where an id is not in the dictionary. */
+    /* [worker] Once after create. ARHOST_ERROR_CONFIGURATION where an id is not in the dictionary; that or
+     * ARHOST_ERROR_UNSUPPORTED where the lens is of a model, or of a count of coefficients, that it can't do. */
     arhost_status (*start)(arhost_instance *instance, const arhost_tracker_setup *setup);
 
     /* [worker] Finds the listed markers and no others, in the order of the setup's list. Those not
-     * found are left out. The frame is read-only and may be gone after the call. The same frames give
-     * the same result. `result` comes zeroed but for struct_size. ARHOST_OK also when none is found. */
+     * found are left out. The frame is read-only and may be gone after the call. `result` comes zeroed
+     * but for struct_size. ARHOST_OK also when none is found.
+     * What is DETECTED, and the bytes of its record, depend on the frame's pixels alone: not on frames before,
+     * its number, its time, or threads. So a tracker that is killed and started again goes on as if nothing
+     * had happened. One that smooths or predicts tells that as PREDICTED, which depends on the frames since
+     * start; the same frames give the same bytes. Frames may be missing, come twice, or be older than the last. */
     arhost_status (*track)(arhost_instance *instance, const arhost_frame *frame, arhost_tracker_result *result);
 
     /* [worker] Once before destroy, if start succeeded. */
