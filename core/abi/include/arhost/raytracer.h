@@ -54,14 +54,15 @@ typedef struct arhost_render_info {
 typedef struct arhost_raytracer {
     uint32_t struct_size;
 
-    /* [worker] Once after create: builds acceleration structures, compiles shaders; reports progress. */
+    /* [worker] After create, and again after a stop, then with another scene and size: builds acceleration
+     * structures, compiles shaders; reports progress. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
     /* [worker] Traces one image. The same request gives the same bytes, on any number of threads. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 
-    /* [worker] Once before destroy, if start succeeded. */
+    /* [worker] Once after each start that succeeded, before the next or destroy. */
     void (*stop)(arhost_instance *instance);
 } arhost_raytracer;
 
