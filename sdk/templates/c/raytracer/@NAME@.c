@@ -109,18 +109,13 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
-    for (i = 0; i < option_count; ++i) {
-        if (!strcmp(options[i].key, "red"))
-            self->colour[0] = options[i].real;
-        else if (!strcmp(options[i].key, "green"))
-            self->colour[1] = options[i].real;
-        else if (!strcmp(options[i].key, "blue"))
-            self->colour[2] = options[i].real;
-    }
+    /* Every option that is declared below is there. */
+    self->colour[0] = arhost_find_option(options, option_count, "red")->real;
+    self->colour[1] = arhost_find_option(options, option_count, "green")->real;
+    self->colour[2] = arhost_find_option(options, option_count, "blue")->real;
     *instance = self;
     return ARHOST_OK;
 }
