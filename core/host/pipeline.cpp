@@ -391,15 +391,15 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     frame->record.struct_size = sizeof(arhost_record);
     frame->record.sequence = command.sequence;
     frame->record.overlay = ARHOST_OVERLAY_NONE;
-    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, frame->record)) {
+    const std::int64_t now_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
+    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, now_ns, frame->record)) {
         next_read_ = command.sequence;
         return source_->end_process(std::string("broke the contract: ") + problem);
     }
     last_capture_ns_ = result.frame.capture_ns;
     frame->pixels = std::move(pixels);
     if (configuration_.source->conform) {
-        look_at_capture_time(statistics_.promises, frame->record,
-                             std::chrono::nanoseconds(Clock::now().time_since_epoch()).count());
+        look_at_capture_time(statistics_.promises, frame->record, now_ns);
         frame->pixels_sample = sample_of(frame->pixels.bytes(), frame->record.sequence);
     }
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);

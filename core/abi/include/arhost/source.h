@@ -48,7 +48,8 @@ typedef struct arhost_frame_buffer {
 typedef struct arhost_frame_info {
     uint32_t struct_size;
     arhost_clock clock; /* must be set */
-    int64_t capture_ns; /* never smaller than that of the frame before */
+    int64_t capture_ns; /* never smaller than that of the frame before; on ARHOST_CLOCK_MONOTONIC not of the future:
+                           a frame of more than a second ahead is refused, and the source is started anew */
     uint32_t skipped;   /* frames that the device lost since the one before */
     int32_t has_grey;   /* non-zero: `grey` has been written */
     int32_t has_truth;  /* non-zero: `true_mt` is set */
