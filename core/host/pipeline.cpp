@@ -47,6 +47,8 @@ bool Pipeline::run() {
         SceneLoading::Hooks hooks;
         hooks.loaded = [this](SharedMemory arena) {
             arena_ = std::move(arena);
+            if (configuration_.raytracer->conform)
+                overlay_promises_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
             scene_loading_.reset();
         };
         hooks.failed = [this](const std::string &reason) {
@@ -570,9 +572,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.raytracer = std::chrono::nanoseconds(result.busy_ns);
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
-    if (configuration_.raytracer->conform) {
-        if (!overlay_promises_)
-            overlay_promises_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
+    if (overlay_promises_) {
         overlay_promises_->look(statistics_.promises, command.sequence, command.camera,
                                 region_of(frame.render, format_->width, format_->height), overlay_of(frame));
         frame.overlay_sample = sample_of(frame.overlay.bytes(), command.sequence);
