@@ -139,7 +139,7 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
     for (i = 0; i < option_count; ++i, at += options->struct_size)
         if (!strcmp(((const arhost_option *)at)->key, key))
             return (const arhost_option *)at;
-    return NULL;
+    return NULL; /* NOLINT(modernize-use-nullptr): C has none */
 }
 
 /* What a plugin can do beyond its kind's minimum: descriptor.capabilities. */
