@@ -171,6 +171,14 @@ void create(Context &context) {
     instance.create_or_fail();
 }
 
+void longer_options(Context &context) {
+    if (context.library.descriptor().option_count < 2)
+        throw Skip("it has fewer than two options");
+    constexpr std::size_t unknown_bytes = 16; // who steps too short takes garbage for a key
+    Instance instance(context.library);
+    instance.create_or_fail(unknown_bytes);
+}
+
 void two_instances(Context &context) {
     Instance first(context.library), second(context.library);
     first.create_or_fail();
@@ -237,6 +245,8 @@ constexpr Test tests[] = {
      create},
     {"abi.same-answer", "Asked again, it gives the same plugin with the same descriptor.", 0, "abi.create", 20s,
      same_answer},
+    {"abi.longer-options", "It steps through the options by their struct_size.", 0, "abi.create", 10s,
+     longer_options},
     {"abi.two-instances", "Two instances live at a time, and end in any order.", 0, "abi.create", 20s, two_instances},
     {"abi.create-1000-times",
      "Created and destroyed 1,000 times, or 20 s long, it keeps no descriptor, no thread and no memory.", 0,

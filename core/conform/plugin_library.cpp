@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstring>
 
 namespace arhost::conform {
 
@@ -121,7 +122,7 @@ Instance::Instance(PluginLibrary &library, Settings overrides, std::filesystem::
     settings_.insert(library.settings().begin(), library.settings().end());
 }
 
-arhost_status Instance::create() {
+arhost_status Instance::create(std::size_t unknown_bytes) {
     const arhost_plugin &plugin = library_.plugin();
     std::vector<std::string> texts; // which the values point to
     std::vector<arhost_option> values;
@@ -149,13 +150,20 @@ arhost_status Instance::create() {
     for (const auto &[key, value] : settings_)
         if (!library_.option(key))
             throw std::runtime_error(fmt::format("--set {}={}: the plugin has no such option", key, value));
+    const std::size_t step = sizeof(arhost_option) + unknown_bytes;
+    std::vector<std::byte> passed(values.size() * step, std::byte{0xa5});
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i].struct_size = static_cast<std::uint32_t>(step);
+        std::memcpy(passed.data() + i * step, &values[i], sizeof values[i]);
+    }
     return in_call(library_.calls(), Call::create, [&] {
-        return plugin.create(host_.get(), values.data(), static_cast<std::uint32_t>(values.size()), &instance_);
+        return plugin.create(host_.get(), reinterpret_cast<const arhost_option *>(passed.data()),
+                             static_cast<std::uint32_t>(values.size()), &instance_);
     });
 }
 
-void Instance::create_or_fail() {
-    expect_ok("create", create());
+void Instance::create_or_fail(std::size_t unknown_bytes) {
+    expect_ok("create", create(unknown_bytes));
     if (!instance_)
         throw Failure("create returned OK and left the instance NULL");
 }

@@ -107,8 +107,9 @@ public:
     Instance(const Instance &) = delete;
     Instance &operator=(const Instance &) = delete;
 
-    void create_or_fail();  // throws Failure
-    arhost_status create(); // as it comes
+    // With `unknown_bytes` of a newer ABI, garbage here, behind each option.
+    void create_or_fail(std::size_t unknown_bytes = 0);  // throws Failure
+    arhost_status create(std::size_t unknown_bytes = 0); // as it comes
     void destroy();
 
     arhost_instance *get() const { return instance_; }

@@ -10,6 +10,8 @@
 namespace arhost::host {
 namespace {
 
+constexpr std::int64_t tolerated_ahead_ns = 1'000'000'000; // arhost/source.h
+
 template <class Range> bool all_finite(const Range &values) {
     return std::all_of(std::begin(values), std::end(values), [](double value) { return std::isfinite(value); });
 }
@@ -54,11 +56,14 @@ const char *take_tracker_result(std::span<const std::byte> slot, const std::set<
     return nullptr;
 }
 
-const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, arhost_record &record) {
+const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
+                            arhost_record &record) {
     if (info.clock != ARHOST_CLOCK_MONOTONIC && info.clock != ARHOST_CLOCK_MEDIA)
         return "a frame's clock is not set";
     if (info.capture_ns < previous_capture_ns)
         return "a frame's capture time runs backwards";
+    if (info.clock == ARHOST_CLOCK_MONOTONIC && info.capture_ns > now_ns + tolerated_ahead_ns)
+        return "a frame's capture time is more than a second ahead of the clock";
     record.clock = info.clock;
     record.capture_ns = info.capture_ns;
     record.has_truth = info.has_truth && all_finite(info.true_mt);

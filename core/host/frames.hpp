@@ -56,7 +56,9 @@ using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 const char *take_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
                                 arhost_record &record);
 
-// Likewise what a source tells of a frame.
-const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, arhost_record &record);
+// Likewise what a source tells of a frame that has come at `now_ns` of CLOCK_MONOTONIC. A time of the far future is
+// refused since all the right ones after it would run backwards.
+const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
+                            arhost_record &record);
 
 } // namespace arhost::host

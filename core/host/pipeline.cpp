@@ -47,6 +47,8 @@ bool Pipeline::run() {
         SceneLoading::Hooks hooks;
         hooks.loaded = [this](SharedMemory arena) {
             arena_ = std::move(arena);
+            if (configuration_.raytracer->conform)
+                overlay_promises_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
             scene_loading_.reset();
         };
         hooks.failed = [this](const std::string &reason) {
@@ -391,15 +393,15 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     frame->record.struct_size = sizeof(arhost_record);
     frame->record.sequence = command.sequence;
     frame->record.overlay = ARHOST_OVERLAY_NONE;
-    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, frame->record)) {
+    const std::int64_t now_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
+    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, now_ns, frame->record)) {
         next_read_ = command.sequence;
         return source_->end_process(std::string("broke the contract: ") + problem);
     }
     last_capture_ns_ = result.frame.capture_ns;
     frame->pixels = std::move(pixels);
     if (configuration_.source->conform) {
-        look_at_capture_time(statistics_.promises, frame->record,
-                             std::chrono::nanoseconds(Clock::now().time_since_epoch()).count());
+        look_at_capture_time(statistics_.promises, frame->record, now_ns);
         frame->pixels_sample = sample_of(frame->pixels.bytes(), frame->record.sequence);
     }
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
@@ -570,9 +572,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.raytracer = std::chrono::nanoseconds(result.busy_ns);
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
-    if (configuration_.raytracer->conform) {
-        if (!overlay_promises_)
-            overlay_promises_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
+    if (overlay_promises_) {
         overlay_promises_->look(statistics_.promises, command.sequence, command.camera,
                                 region_of(frame.render, format_->width, format_->height), overlay_of(frame));
         frame.overlay_sample = sample_of(frame.overlay.bytes(), command.sequence);

@@ -72,7 +72,7 @@ std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsi
     const auto off_px = reprojection_px(marker, intrinsics, side_mm);
     if (!off_px)
         return name_of(marker) + " is seen, and its pose is behind the camera";
-    if (std::abs(*off_px - marker.reprojection_px) > 0.05 + 0.02 * *off_px)
+    if (!(std::abs(*off_px - marker.reprojection_px) <= 0.05 + 0.02 * marker.reprojection_px)) // a NaN, too
         return fmt::format("{}: its reprojection is told as {:.3f} px and is {:.3f} px", name_of(marker),
                            marker.reprojection_px, *off_px);
     return {};
@@ -112,7 +112,8 @@ void Promises::look(const std::string &name, std::uint64_t frame, const std::str
 void look_at_capture_time(Promises &promises, const arhost_record &record, std::int64_t now_ns) {
     if (record.clock != ARHOST_CLOCK_MONOTONIC)
         return;
-    const double age_s = 1e-9 * static_cast<double>(now_ns - record.capture_ns);
+    // As numbers that can't overflow: a source may tell any.
+    const double age_s = 1e-9 * (static_cast<double>(now_ns) - static_cast<double>(record.capture_ns));
     promises.look("source.capture-time", record.sequence,
                   age_s < 0 ? fmt::format("was captured {:.3f} s after it came", -age_s) : std::string());
 }

@@ -52,10 +52,8 @@ MarkerReport::MarkerReport(const arhost_tracker_setup &setup, const std::string 
         throw Failure(ARHOST_ERROR_CONFIGURATION, std::to_string(setup.marker_count) +
                                                       " markers are listed; list 1 to " +
                                                       std::to_string(ARHOST_MAX_MARKERS));
-    const auto *bytes = reinterpret_cast<const std::uint8_t *>(setup.markers);
     for (std::uint32_t i = 0; i < setup.marker_count; ++i) {
-        const auto &marker =
-            *reinterpret_cast<const arhost_marker_config *>(bytes + std::size_t{i} * setup.markers[0].struct_size);
+        const arhost_marker_config &marker = listed_marker(setup, i);
         const std::string name = "marker id " + std::to_string(marker.id);
         if (marker.id < 0 || static_cast<std::size_t>(marker.id) >= id_count)
             throw Failure(ARHOST_ERROR_CONFIGURATION,

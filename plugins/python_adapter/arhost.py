@@ -37,7 +37,7 @@ def _struct(*fields):
     return np.dtype(list(fields), align=True)
 
 
-# Structs of the headers, field by field. python_adapter.cpp compares their sizes.
+# Structs of the headers, field by field. A test (tests/plugins/python_adapter) compares them.
 INTRINSICS = _struct(("struct_size", "u4"), ("width", "u4"), ("height", "u4"), ("distortion", "i4"), ("fx", "f8"),
                      ("fy", "f8"), ("cx", "f8"), ("cy", "f8"), ("coefficient_count", "u4"), ("reserved", "u4"),
                      ("coefficients", "f8", 12))

@@ -178,28 +178,6 @@ Object import_arhost(const std::string &interpreter) {
             "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
                 "; install python3-numpy, or name the python of a virtual "
                 "environment that has numpy in the option 'interpreter' (and let it be read: 'reads: [FOLDER]')");
-    // The structs of the headers, which arhost.py writes down once more.
-    const std::pair<const char *, std::size_t> sizes[] = {{"INTRINSICS", sizeof(arhost_intrinsics)},
-                                                          {"CAMERA", sizeof(arhost_camera)},
-                                                          {"FORMAT", sizeof(arhost_frame_format)},
-                                                          {"MARKER_CONFIG", sizeof(arhost_marker_config)},
-                                                          {"MARKER", sizeof(arhost_marker)},
-                                                          {"RECORD", sizeof(arhost_record)},
-                                                          {"MOVED", sizeof(arhost_moved_object)},
-                                                          {"BUFFER", sizeof(arhost_buffer)},
-                                                          {"GEOMETRY", sizeof(arhost_geometry)},
-                                                          {"TEXTURE", sizeof(arhost_texture)},
-                                                          {"MATERIAL", sizeof(arhost_material)},
-                                                          {"OBJECT", sizeof(arhost_object)},
-                                                          {"LIGHT", sizeof(arhost_light)},
-                                                          {"ENVIRONMENT", sizeof(arhost_environment)},
-                                                          {"SCENE", sizeof(arhost_scene)}};
-    for (const auto &[name, size] : sizes) {
-        const Object dtype = checked(PyObject_GetAttrString(module.get(), name));
-        const Object there = checked(PyObject_GetAttrString(dtype.get(), "itemsize"));
-        if (PyLong_AsSize_t(there.get()) != size)
-            throw Failure(ARHOST_ERROR_INTERNAL, std::string("arhost.py: ") + name + " is not as in the C headers");
-    }
     return module;
 }
 
@@ -270,8 +248,11 @@ public:
     // trackers
     void start(const arhost_tracker_setup &setup) {
         const Locked locked;
+        std::vector<arhost_marker_config> markers;
+        for (std::uint32_t i = 0; i < setup.marker_count; ++i)
+            markers.push_back(listed_marker(setup, i));
         call("start_tracker", "NNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
-             view(setup.markers, setup.marker_count * sizeof *setup.markers).release());
+             view(markers.data(), markers.size() * sizeof(arhost_marker_config)).release());
     }
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const Locked locked;

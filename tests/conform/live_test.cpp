@@ -11,18 +11,11 @@ namespace arhost::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
-std::string configuration(const std::string &raytracer, const std::string &more = "") {
-    return R"(version: 1
-source: {plugin: source_synthetic, options: {frames: 40, width: 320, height: 240}, conform: true}
-camera: {width: 320, height: 240, fx: 300}
-tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], conform: true}
-raytracer: {plugin: )" +
-           raytracer + R"(, scene: scene.yaml, conform: true, reads: [)" ARHOST_PLUGIN_DIRECTORY R"(]}
-outputs: [{plugin: sink_null}]
-stats: stats.json
-)" + more;
-}
+constexpr const char *lens =
+    "{width: 320, height: 240, fx: 300, distortion: {model: brown, coefficients: [-0.2, 0.05, "
+    "0.001, -0.002]}}";
 
 constexpr const char *scene = R"(version: 1
 axes: z-up
@@ -32,38 +25,142 @@ objects:
   - {name: paper, plane: {size: 300}, material: grey, role: catcher}
   - {name: ball, sphere: {centre: [0, 0, 10], radius: 10}, material: grey}
 )";
+// Seen from half a metre it is behind every pixel.
+constexpr const char *scene_of_one_big_ball = R"(version: 1
+axes: z-up
+materials: {grey: {model: diffuse, diffuse: 0.5}}
+objects: [{sphere: {centre: [0, 0, 0], radius: 300}, material: grey}]
+)";
 
-// The same wrong ray tracer as the suite's own tests have.
-void expect_broken(const std::string &defect, const std::set<std::string> &promises) {
-    ArhostRun run(configuration("./rt_" + defect + ".so"));
-    run.write("scene.yaml", scene);
-    std::filesystem::create_symlink(ARHOST_WRONG_PLUGIN_DIRECTORY "/wrong.so", run.path("rt_" + defect + ".so"));
-    ASSERT_EQ(run.run(), 0) << run.output(); // it tells, and the video goes on
-    for (const std::string &promise : promises) {
-        EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: breaks the promise " + promise + ": frame "));
-        EXPECT_THAT(run.output(), HasSubstr(promise + ": broken in "));
+// arhost's own, but for what a test puts in their place.
+struct Parts {
+    std::string source = "{plugin: source_synthetic, fps: 30, options: {frames: 40}, conform: true}";
+    std::string camera = "{width: 320, height: 240, fx: 300}";
+    std::string tracker = "{plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], conform: true}";
+    std::string raytracer = "{plugin: rt_embree, scene: scene.yaml, conform: true}"; // "": none
+    std::string output = "{plugin: sink_null}";
+    std::string more = "mode: lockstep\n";
+    std::string scene = test::scene;
+
+    std::string text() const {
+        return "version: 1\nsource: " + source + "\ncamera: " + camera + "\n" +
+               (tracker.empty() ? "" : "tracker: " + tracker + "\n") +
+               (raytracer.empty() ? "" : "raytracer: " + raytracer + "\n") + "outputs: [" + output +
+               "]\nstats: stats.json\n" + more;
     }
-    const auto conformance = run.stats()["conformance"];
-    for (const auto &[name, entry] : conformance.items())
-        EXPECT_EQ(entry["broken"] > 0, promises.contains(name)) << defect << ": " << name;
+};
+
+// The suite's wrong plugin with this defect, which reads arhost's own.
+std::string wrong(const std::string &kind, const std::string &defect, const std::string &more) {
+    return "{plugin: ./" + kind + "_" + defect + ".so, conform: true, reads: [" ARHOST_PLUGIN_DIRECTORY "], " + more +
+           "}";
+}
+Parts with_raytracer(const std::string &defect) {
+    Parts parts;
+    parts.raytracer = wrong("rt", defect, "scene: scene.yaml");
+    return parts;
+}
+Parts with_tracker(const std::string &defect) {
+    Parts parts;
+    parts.tracker = wrong("tracker", defect, "markers: [{id: 0, side_mm: 80}]");
+    parts.raytracer.clear();
+    return parts;
+}
+// The frames' numbers, and a tracker that reads them.
+Parts with_numbers(const std::string &source_options, const std::string &tracker_options,
+                   const std::string &raytracer_options) {
+    Parts parts;
+    parts.source = "{plugin: source_counter, options: {frames: 40, width: 320, height: 240, " + source_options +
+                   "}, conform: true}";
+    parts.tracker = "{plugin: tracker_counter, options: {" + tracker_options +
+                    "}, markers: [{id: 3, side_mm: 80}, {id: 5, "
+                    "side_mm: 40}], conform: true}";
+    parts.raytracer = "{plugin: rt_counter, options: {" + raytracer_options + "}, scene: scene.yaml, conform: true}";
+    parts.scene = scene_of_one_big_ball;
+    return parts;
 }
 
+class LiveRun : public ArhostRun {
+public:
+    explicit LiveRun(const Parts &parts) : ArhostRun(parts.text()) {
+        write("scene.yaml", parts.scene);
+        for (const auto &[kind, file] : {std::pair("rt", "wrong"), std::pair("tracker", "wrong_tracker")}) {
+            const std::string text = parts.text(), begin = std::string("./") + kind + "_";
+            if (const std::size_t at = text.find(begin); at != std::string::npos)
+                std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") + file + ".so",
+                                                path(text.substr(at, text.find(',', at) - at)));
+        }
+    }
+    std::set<std::string> promises(bool broken) const {
+        std::set<std::string> names;
+        const nlohmann::json report = stats();
+        for (const auto &[name, entry] : report.at("conformance").items())
+            if ((entry["broken"] > 0) == broken)
+                names.insert(name);
+        return names;
+    }
+};
+
+void expect_broken(const Parts &parts, const std::set<std::string> &promises) {
+    SCOPED_TRACE(parts.text());
+    LiveRun run(parts);
+    ASSERT_EQ(run.run(), 0) << run.output(); // it tells, and the video goes on
+    EXPECT_EQ(run.promises(true), promises) << run.output();
+    for (const std::string &promise : promises) {
+        const std::string component = promise.substr(0, promise.find('.'));
+        EXPECT_THAT(run.output(),
+                    HasSubstr("warning: " + component + ": breaks the promise " + promise + ": frame "));
+        EXPECT_THAT(run.output(), HasSubstr(promise + ": broken in "));
+    }
+}
+
+const std::set<std::string> all_promises = {"source.frame-stays",   "tracker.order",    "tracker.numbers",
+                                            "tracker.pose",         "raytracer.region", "raytracer.place",
+                                            "raytracer.image-stays"};
+
+void expect_kept(const Parts &parts, const std::set<std::string> &promises = all_promises) {
+    SCOPED_TRACE(parts.text());
+    LiveRun run(parts);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(run.promises(false), promises) << run.output();
+    EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
+}
+
+// ---- in lockstep, where nothing happens --------------------------------------------------------------
+
 TEST(LiveConformance, FindsNothingWrongWithArhostsOwn) {
-    ArhostRun run(configuration("rt_embree"));
-    run.write("scene.yaml", scene);
+    LiveRun run((Parts()));
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("conform: 7 of 7 promises kept"));
     const auto stats = run.stats();
-    for (const char *promise : {"source.frame-stays", "tracker.order", "tracker.numbers", "tracker.pose",
-                                "raytracer.region", "raytracer.place", "raytracer.image-stays"}) {
+    for (const std::string &promise : all_promises) {
         EXPECT_EQ(stats["conformance"][promise]["looked"], 40) << promise;
         EXPECT_EQ(stats["conformance"][promise]["broken"], 0) << promise;
     }
 }
 
+TEST(LiveConformance, TellsOfASourceThatIsWrong) {
+    Parts writes_later = with_numbers("writes_later: true", "", "");
+    writes_later.tracker.clear();
+    writes_later.raytracer.clear();
+    writes_later.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // so that frames wait
+    expect_broken(writes_later, {"source.frame-stays"});
+    expect_broken(with_numbers("ahead_ms: 300", "", ""), {"source.capture-time"});
+}
+
+TEST(LiveConformance, TellsOfATrackerThatIsWrong) {
+    expect_broken(with_tracker("age_counts_frames"), {"tracker.numbers"});
+    expect_broken(with_tracker("metres"), {"tracker.pose"});
+    expect_broken(with_tracker("corners_at_half"), {"tracker.pose"});
+    expect_broken(with_numbers("", "reversed: true", ""), {"tracker.order"});
+}
+
 TEST(LiveConformance, TellsOfARayTracerThatIsWrong) {
-    expect_broken("opaque_background", {"raytracer.place", "raytracer.region"});
-    expect_broken("small_region", {"raytracer.region"});
+    expect_broken(with_raytracer("opaque_background"), {"raytracer.place", "raytracer.region"});
+    expect_broken(with_raytracer("small_region"), {"raytracer.region"});
+    Parts writes_later = with_numbers("", "", "writes_later: true");
+    writes_later.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // so that images wait
+    expect_broken(writes_later, {"raytracer.image-stays"});
 }
 
 TEST(LiveConformance, IsOffUnlessAskedFor) {
@@ -72,8 +169,81 @@ TEST(LiveConformance, IsOffUnlessAskedFor) {
         "stats: stats.json\n");
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_FALSE(run.stats().contains("conformance"));
-    EXPECT_THAT(run.output(), testing::Not(HasSubstr("conform")));
+    EXPECT_THAT(run.output(), Not(HasSubstr("conform")));
 }
+
+// ---- where something happens -------------------------------------------------------------------------
+
+TEST(LiveConformance, OfARayTracerThatTracesTheLensLooksAtNoPlace) {
+    Parts parts;
+    parts.camera = lens;
+    std::set<std::string> promises = all_promises;
+    promises.erase("raytracer.place");
+    expect_kept(parts, promises);
+}
+
+TEST(LiveConformance, LooksAtAPinholesImageBeforeItIsBent) {
+    Parts parts = with_numbers("", "", "");
+    parts.camera = lens;
+    parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // which knows of no lens
+    expect_kept(parts, {"source.frame-stays", "raytracer.region", "raytracer.place", "raytracer.image-stays"});
+    parts.scene = scene; // whose ball is not where the numbers are
+    expect_broken(parts, {"raytracer.place"});
+}
+
+TEST(LiveConformance, InModeLiveIsTheSame) {
+    Parts parts;
+    parts.more = "mode: live\n";
+    expect_kept(parts);
+    parts = with_raytracer("opaque_background");
+    parts.more = "mode: live\n";
+    expect_broken(parts, {"raytracer.place", "raytracer.region"});
+    parts = with_tracker("corners_at_half");
+    parts.more = "mode: live\n";
+    expect_broken(parts, {"tracker.pose"});
+}
+
+TEST(LiveConformance, TakesAPoseThatIsHeldForNoDefect) {
+    Parts parts;
+    parts.source =
+        "{plugin: source_synthetic, options: {frames: 30, occlude_from: 10, occlude_to: 20}, conform: true}";
+    parts.tracker = "{plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], hold_frames: 5, conform: true}";
+    parts.output = "{plugin: sink_poses, path: poses.jsonl}";
+    LiveRun run(parts);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.read("poses.jsonl"), HasSubstr("\"held\""));
+    EXPECT_EQ(run.promises(false), all_promises) << run.output();
+}
+
+class LiveConformanceAfterARestart : public testing::TestWithParam<const char *> {};
+
+TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
+    Parts parts;
+    parts.source = "{plugin: source_synthetic, fps: 30, options: {frames: 90}, conform: true}";
+    parts.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 20}}";
+    parts.more = std::string("mode: ") + GetParam() + "\n";
+    LiveRun run(parts);
+    run.start();
+    std::size_t shown = 0;
+    for (const char *plugin : {"source_synthetic", "tracker_aruco", "rt_embree"}) {
+        for (shown += 12; run.running() && counted(run).size() < shown;)
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        const pid_t worker = run.worker(plugin);
+        ASSERT_GT(worker, 0) << plugin << run.output();
+        ::kill(worker, SIGKILL);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    const nlohmann::json stats = run.stats();
+    for (const char *component : {"source", "tracker", "raytracer"})
+        EXPECT_EQ(stats["restarts"][component], 1) << component;
+    for (const auto &[name, entry] : stats["conformance"].items())
+        EXPECT_GT(entry["looked"], shown) << name;
+    EXPECT_EQ(run.promises(false), all_promises) << run.output();
+    EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, LiveConformanceAfterARestart, testing::Values("lockstep", "live"),
+                         [](const auto &info) { return std::string(info.param); });
 
 } // namespace
 } // namespace arhost::test

@@ -57,6 +57,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"any_extension", "has a pointer for any extension", "fail", {"abi.unknown-extension"}},
     {"no_instance", "create succeeds without an instance", "fail", {"abi.create"}},
     {"create_fails", "create refuses its own defaults", "fail", {"abi.create"}},
+    {"steps_by_its_own_size", "steps through the options by its own struct size", "crashed", {"abi.longer-options"}},
     {"cancelled_create_is_internal", "create returns INTERNAL once cancelled", "fail", {"abi.cancelled-create"}},
     {"one_instance", "has one instance for all", "fail", {"abi.two-instances"}},
     {"leaks_memory", "leaks 256 KiB a create", "fail", {"abi.create-1000-times"}},

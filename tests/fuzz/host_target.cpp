@@ -28,11 +28,11 @@ using namespace ring;
 
 constexpr const char *configuration_text = R"(version: 1
 plugin_path: [plugins]
-source: {plugin: source, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+source: {plugin: source, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
 tracker: {plugin: tracker, fallback: tracker2, markers: [{id: 0, side_mm: 80}, {id: 1, side_mm: 80}], hold_frames: 1,
-          deadline_ms: 3600000,
-          start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
-raytracer: {plugin: rt, scene: scene.yaml, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+          conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+raytracer: {plugin: rt, scene: scene.yaml, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000,
+            stop_deadline_ms: 3600000}
 outputs:
 - {plugin: sink, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
 - {plugin: sink2, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}

@@ -96,7 +96,7 @@ void run_ring(Bytes bytes) {
             // The peer does not write while this test pops: at most what the ring holds comes.
             for (std::uint32_t popped = 0; results.pop(result) == RingResult::done; ++popped) {
                 require(popped < ring_capacity, "more entries than the ring holds");
-                host::take_frame_info(result.frame, record.capture_ns, record);
+                host::take_frame_info(result.frame, record.capture_ns, 0, record);
                 lay_over(result.render);
             }
             break;

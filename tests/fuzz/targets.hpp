@@ -16,6 +16,7 @@ using Bytes = std::span<const std::uint8_t>;
 struct Target {
     std::string_view name; // and of its folder in corpus/
     void (*run)(Bytes);
+    unsigned tries; // by corpus_test.cpp: what takes some seconds
 };
 
 void run_configuration(Bytes); // YAML, and the options of the plugins in it
@@ -31,17 +32,17 @@ void run_ring(Bytes);  // what a worker writes into the memory that it shares wi
 void run_host(Bytes);  // the whole host: all that its workers send, write, and leave undone
 
 inline constexpr Target targets[] = {
-    {"configuration", run_configuration},
-    {"calibration", run_calibration},
-    {"trajectory", run_trajectory},
-    {"pattern", run_pattern},
-    {"scene", run_scene},
-    {"obj", run_obj},
-    {"ply", run_ply},
-    {"gltf", run_gltf},
-    {"arena", run_arena},
-    {"ring", run_ring},
-    {"host", run_host},
+    {"configuration", run_configuration, 8000},
+    {"calibration", run_calibration, 15000},
+    {"trajectory", run_trajectory, 15000},
+    {"pattern", run_pattern, 20000},
+    {"scene", run_scene, 8000},
+    {"obj", run_obj, 15000},
+    {"ply", run_ply, 15000},
+    {"gltf", run_gltf, 8000},
+    {"arena", run_arena, 20000},
+    {"ring", run_ring, 20000},
+    {"host", run_host, 1000},
 };
 
 // A folder of this process's own, in memory where there is such a place.

@@ -337,6 +337,25 @@ TEST(Supervision, AFrameThatTheSourceFailsToGiveIsAskedForAgainAndNeverLeftOut) 
     expect_all_frames_in_order(run, 30);
 }
 
+// Else all the right times that follow would run backwards.
+TEST(Supervision, ACaptureTimeOfTheFarFutureCostsARestartAndNoFrame) {
+    ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000, ahead_at: 15", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 30);
+    EXPECT_THAT(run.output(), HasSubstr("broke the contract: a frame's capture time is more than a second ahead"));
+    EXPECT_EQ(run.stats()["restarts"]["source"], 1);
+}
+
+TEST(Supervision, ASourceWhoseEveryFrameIsOfTheFarFutureIsGivenUp) {
+    ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000", "", "",
+                           "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("a frame's capture time is more than a second ahead of the clock"));
+    EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
+}
+
 TEST(Supervision, ASourceThatDiesAtTheLastFramesThatAreAskedForGivesThemAll) {
     ArhostRun run(counting("lockstep", "frames: 100, delay_ms: 20", "", ""));
     run.write("scene.yaml", small_scene);

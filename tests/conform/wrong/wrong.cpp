@@ -215,9 +215,11 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         embree().create(host, options, count, &made->glass_only);
     made->host = host;
     made->users = 1;
-    for (std::uint32_t i = 0; i < count; ++i)
-        if (options[i].key == std::string_view("threads"))
-            made->threads = options[i].integer;
+    made->threads = arhost_find_option(options, count, "threads")->integer;
+    if (has("steps_by_its_own_size"))
+        for (std::uint32_t i = 0; i < count; ++i)
+            if (options[i].key == std::string_view("threads"))
+                made->threads = options[i].integer;
     only = made;
     *instance = reinterpret_cast<arhost_instance *>(made);
     return status;

@@ -272,12 +272,13 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
                      arhost_instance **instance) {
     auto made = std::make_unique<Wrong>();
     made->host = host;
-    std::vector<arhost_option> spoilt(options, options + count);
-    for (arhost_option &option : spoilt) {
-        if (option.key == std::string_view("threads"))
-            made->threads = option.integer;
-        if (option.key == std::string_view("corner_refinement") && has("trusts_rough_corners"))
-            option.text = "none";
+    made->threads = arhost_find_option(options, count, "threads")->integer;
+    std::vector<arhost_option> spoilt;
+    for (const auto &declared : std::span(real().descriptor->options, real().descriptor->option_count)) {
+        spoilt.push_back(*arhost_find_option(options, count, declared.key));
+        spoilt.back().struct_size = sizeof(arhost_option);
+        if (declared.key == std::string_view("corner_refinement") && has("trusts_rough_corners"))
+            spoilt.back().text = "none";
     }
     const arhost_status status = real().create(host, spoilt.data(), count, &made->real);
     if (status == ARHOST_OK)

@@ -79,3 +79,38 @@ TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {
     EXPECT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_ERROR_UNSUPPORTED);
     EXPECT_EQ(answer.plugin, nullptr);
 }
+
+namespace {
+
+// What a host of a later day passes.
+template <class T> struct Longer {
+    T known;
+    std::uint64_t unknown[2] = {0xa5a5a5a5a5a5a5a5, 0xa5a5a5a5a5a5a5a5};
+};
+
+} // namespace
+
+TEST(CppHelper, StepsThroughOptionsThatAreLongerThanItKnows) {
+    const auto option = [](const char *key, int value) {
+        return Longer<arhost_option>{
+            {sizeof(Longer<arhost_option>), ARHOST_OPTION_INTEGER, key, value, 0.5 * value, key}};
+    };
+    const Longer<arhost_option> passed[] = {option("one", 1), option("two", 2), option("three", 3)};
+    const arhost::Options options(&passed[0].known, 3);
+    EXPECT_EQ(options.integer("one"), 1);
+    EXPECT_TRUE(options.boolean("two"));
+    EXPECT_EQ(options.real("three"), 1.5);
+    EXPECT_EQ(options.text("three"), "three");
+    EXPECT_THROW(options.integer("four"), arhost::Failure);
+    EXPECT_EQ(arhost_find_option(&passed[0].known, 3, "two"), &passed[1].known);
+    EXPECT_EQ(arhost_find_option(&passed[0].known, 2, "three"), nullptr);
+}
+
+TEST(CppHelper, StepsThroughMarkersThatAreLongerThanItKnows) {
+    constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_marker_config>));
+    const Longer<arhost_marker_config> listed[] = {{{size, 4, 80}}, {{size, 7, 40}}};
+    const arhost_tracker_setup setup{sizeof setup, 2, nullptr, nullptr, &listed[0].known};
+    EXPECT_EQ(arhost::listed_marker(setup, 0).id, 4);
+    EXPECT_EQ(arhost::listed_marker(setup, 1).id, 7);
+    EXPECT_EQ(arhost::listed_marker(setup, 1).side_mm, 40);
+}

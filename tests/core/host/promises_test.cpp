@@ -140,6 +140,8 @@ TEST(MarkerPromises, AreBrokenByOneThatIsNot) {
            "tracker.pose: frame 12: marker 4: its reprojection is told as 0.000 px"); // metres
     expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
     expect([](arhost_marker &m) { m.reprojection_px = 1; }, "its reprojection is told as 1.000 px and is 0.000 px");
+    expect([](arhost_marker &m) { m.corners_px[1][0] = 1e200; },
+           "its reprojection is told as 0.000 px and is inf px");
     EXPECT_THAT(broken_by({marker(4, 40)}), HasSubstr("its reprojection is told as 0.000 px and is "))
         << "half the side";
 }
@@ -157,6 +159,7 @@ TEST(CapturePromises, WantATimeBeforeNow) {
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
               "source.capture-time: frame 12: was captured 0.250 s after it came");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "buffers may be long";
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, INT64_MIN), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "a film's times say nothing of now";
 }
 

@@ -355,18 +355,14 @@ static void attack(const tracker *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     tracker *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
-    for (i = 0; i < option_count; ++i) {
-        if (!strcmp(options[i].key, "attack"))
-            snprintf(self->attack, sizeof self->attack, "%s", options[i].text);
-        else if (!strcmp(options[i].key, "target_file")) /* the base name: a whole path would be let through */
-            snprintf(self->target, sizeof self->target, "%s/%s", getenv("HOSTILE_FOLDER"), options[i].text);
-        else if (!strcmp(options[i].key, "at"))
-            self->at = options[i].integer;
-    }
+    snprintf(self->attack, sizeof self->attack, "%s", arhost_find_option(options, option_count, "attack")->text);
+    /* The base name: a whole path would be let through. */
+    snprintf(self->target, sizeof self->target, "%s/%s", getenv("HOSTILE_FOLDER"),
+             arhost_find_option(options, option_count, "target_file")->text);
+    self->at = arhost_find_option(options, option_count, "at")->integer;
     *instance = self;
     return ARHOST_OK;
 }

@@ -2,6 +2,7 @@
 /*
  * A ray tracer in plain C, against the C headers alone: a square of 16 px in the top left corner whose
  * colour is the number of the frame, taken from the camera's distance: R and G the low and high byte.
+ * It may write into the image that it gave before.
  */
 #include "misbehave.h"
 
@@ -17,35 +18,31 @@ struct arhost_instance {
     const arhost_host *host;
     int64_t crash_at, hang_at, error_at, answer;
     double delay_ms;
+    int64_t writes_later;
+    uint8_t *last; /* image */
 };
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
     misbehave_install();
-    for (i = 0; i < option_count; ++i) {
-        if (!strcmp(options[i].key, "crash_at"))
-            self->crash_at = options[i].integer;
-        else if (!strcmp(options[i].key, "hang_at"))
-            self->hang_at = options[i].integer;
-        else if (!strcmp(options[i].key, "error_at"))
-            self->error_at = options[i].integer;
-        else if (!strcmp(options[i].key, "answer"))
-            self->answer = options[i].integer;
-        else if (!strcmp(options[i].key, "delay_ms"))
-            self->delay_ms = options[i].real;
-        else if (!strcmp(options[i].key, "refuse") && options[i].integer) {
-            host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
-            free(self);
-            return ARHOST_ERROR_CONFIGURATION;
-        } else if (!strcmp(options[i].key, "crash_in_create") && options[i].integer) {
-            signal(SIGSEGV, SIG_DFL);
-            raise(SIGSEGV);
-        }
+    self->crash_at = arhost_find_option(options, option_count, "crash_at")->integer;
+    self->hang_at = arhost_find_option(options, option_count, "hang_at")->integer;
+    self->error_at = arhost_find_option(options, option_count, "error_at")->integer;
+    self->answer = arhost_find_option(options, option_count, "answer")->integer;
+    self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
+    self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
+    if (arhost_find_option(options, option_count, "refuse")->integer) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
+        free(self);
+        return ARHOST_ERROR_CONFIGURATION;
+    }
+    if (arhost_find_option(options, option_count, "crash_in_create")->integer) {
+        signal(SIGSEGV, SIG_DFL);
+        raise(SIGSEGV);
     }
     *instance = self;
     return ARHOST_OK;
@@ -89,6 +86,9 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
             pixel[2] = 170;
             pixel[3] = x < 16 && y < 16 ? 255 : 0;
         }
+    if (self->writes_later && self->last)
+        memset(self->last, 0, (size_t)image->stride * image->height);
+    self->last = image->rgba;
     info->has_region = 1;
     info->region_width = info->region_height = 16;
     return (arhost_status)self->answer;
@@ -107,6 +107,8 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "The status of each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL,
      "Sleeps so long in each frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
+     "Writes into the image before, too"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL, "Dies in create"},
 };

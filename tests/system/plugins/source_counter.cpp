@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Frames whose every pixel is its own number: B and G the low and high byte, R 85.
+// Frames whose every pixel is its own number: B and G the low and high byte, R 85. It may write into the frame that
+// it gave before, or tell a capture time of the future.
 #include "faults.hpp"
+
+#include <cstring>
 
 namespace {
 
@@ -12,7 +15,9 @@ public:
     Counter(const Host &host, const Options &options)
         : host_(host), faults_(options), frames_(static_cast<std::uint64_t>(options.integer("frames"))),
           width_(static_cast<std::uint32_t>(options.integer("width"))),
-          height_(static_cast<std::uint32_t>(options.integer("height"))) {}
+          height_(static_cast<std::uint32_t>(options.integer("height"))),
+          writes_later_(options.boolean("writes_later")), ahead_ms_(options.real("ahead_ms")),
+          ahead_at_(options.integer("ahead_at")) {}
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         fps_ = setup.fps > 0 ? setup.fps : 30;
@@ -52,8 +57,18 @@ public:
                 pixel[1] = static_cast<std::uint8_t>(buffer.sequence >> 8);
                 pixel[2] = 85;
             }
+        if (last_ && writes_later_)
+            std::memset(last_, 0, buffer.format->byte_size);
+        last_ = buffer.plane[0];
         info.clock = ARHOST_CLOCK_MEDIA;
         info.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(buffer.sequence) / fps_);
+        if (ahead_ms_ > 0) {
+            const bool now =
+                ahead_at_ < 0 || (first_ == 0 && buffer.sequence == static_cast<std::uint64_t>(ahead_at_));
+            info.clock = ARHOST_CLOCK_MONOTONIC;
+            info.capture_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count() +
+                              (now ? static_cast<std::int64_t>(1e6 * ahead_ms_) : 0);
+        }
         return ARHOST_OK;
     }
 
@@ -62,15 +77,23 @@ private:
     test::Faults faults_;
     std::uint64_t frames_, first_ = 0;
     std::uint32_t width_, height_;
+    bool writes_later_;
+    std::uint8_t *last_ = nullptr; // the frame before
+    double ahead_ms_;
+    std::int64_t ahead_at_;
     double fps_ = 30;
     bool paced_ = false;
     std::chrono::steady_clock::time_point begin_;
 };
 
-constexpr arhost_option_descriptor options[] = {option(ARHOST_OPTION_INTEGER, "frames", "100", "How many frames"),
-                                                option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096),
-                                                option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
-                                                ARHOST_FAULT_OPTIONS};
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INTEGER, "frames", "100", "How many frames"),
+    option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096),
+    option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
+    option(ARHOST_OPTION_BOOL, "writes_later", "false", "Writes into the frame before, too"),
+    option(ARHOST_OPTION_REAL, "ahead_ms", "0", "Captures so far in the future; 0: tells times of the media"),
+    option(ARHOST_OPTION_INTEGER, "ahead_at", "-1", "Only at this frame of its first life; -1: always"),
+    ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),     ARHOST_KIND_SOURCE, "source_counter",   "Counter", "0.1.0", "arhost", "Apache-2.0",
     "Numbered frames, for tests.", ARHOST_CAN_SEEK,    std::size(options), options,   nullptr};

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Reads the number out of the frame, refuses one that is not its own, and reports one marker that lies
-// so many mm away.
+// so many mm away, or all that are listed.
 #include "faults.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fcntl.h>
@@ -11,6 +12,7 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <vector>
 
 namespace {
 
@@ -19,7 +21,7 @@ using namespace arhost;
 class Counter {
 public:
     Counter(const Host &host, const Options &options)
-        : host_(host), faults_(options), seal_(options.text("seal")),
+        : host_(host), faults_(options), seal_(options.text("seal")), reversed_(options.boolean("reversed")),
           crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")),
           lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")),
           start_steps_(options.integer("start_steps")), start_step_ms_(options.real("start_step_ms")) {}
@@ -44,7 +46,13 @@ public:
             host_.progress(static_cast<float>(step) / static_cast<float>(start_steps_), "starting");
             std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(start_step_ms_));
         }
-        id_ = setup.markers[0].id;
+        lens_ = *setup.intrinsics;
+        for (std::uint32_t i = 0; i < setup.marker_count; ++i)
+            listed_.push_back(listed_marker(setup, i));
+        if (reversed_)
+            std::reverse(listed_.begin(), listed_.end());
+        else
+            listed_.resize(1);
         if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // in its first life alone
             seal_output();
     }
@@ -57,20 +65,28 @@ public:
         const auto signed_number = static_cast<std::int64_t>(number);
         if (signed_number >= lost_from_ && signed_number < lost_to_)
             return;
-        result.marker_count = 1;
-        arhost_marker &marker = result.markers[0];
+        for (const arhost_marker_config &listed : listed_)
+            report(listed, 500.0 + static_cast<double>(number), result.markers[result.marker_count++]);
+        if (signed_number == nan_at_)
+            result.markers[0].mt[12] = std::numeric_limits<double>::quiet_NaN();
+    }
+
+private:
+    void report(const arhost_marker_config &listed, double distance_mm, arhost_marker &marker) const {
         marker.struct_size = sizeof marker;
-        marker.id = id_;
+        marker.id = listed.id;
         std::strcpy(marker.family, "counter");
         marker.state = ARHOST_MARKER_DETECTED;
         for (int i : {0, 5, 10, 15})
             marker.mt[i] = 1;
-        marker.mt[14] = -500.0 - static_cast<double>(number);
-        if (signed_number == nan_at_)
-            marker.mt[12] = std::numeric_limits<double>::quiet_NaN();
+        marker.mt[14] = -distance_mm;
+        const double x_px = lens_.fx * listed.side_mm / 2 / distance_mm, y_px = x_px * lens_.fy / lens_.fx;
+        for (int i = 0; i < 4; ++i) {
+            marker.corners_px[i][0] = lens_.cx + (i == 1 || i == 2 ? x_px : -x_px);
+            marker.corners_px[i][1] = lens_.cy + (i >= 2 ? y_px : -y_px);
+        }
     }
 
-private:
     // Plays the worker's part until it has the memory for its results, and seals that before the host does.
     void seal_output() const {
         constexpr int control = 3;
@@ -95,15 +111,17 @@ private:
     Host host_;
     test::Faults faults_;
     std::string seal_;
-    bool crash_in_destroy_;
+    bool reversed_, crash_in_destroy_;
     std::int64_t lost_from_, lost_to_, nan_at_, start_steps_;
     double start_step_ms_;
-    std::int32_t id_ = 0;
+    arhost_intrinsics lens_{};
+    std::vector<arhost_marker_config> listed_;
 };
 
 constexpr const char *seals[] = {"no", "seal", "write", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "seal", "no", "The seal that it puts on the memory it is given", 0, 0, seals),
+    option(ARHOST_OPTION_BOOL, "reversed", "false", "Reports all markers, the last of the list first"),
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),

@@ -20,10 +20,8 @@
 #include <algorithm>
 #include <chrono>
 #include <new>
-#include <span>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <thread>
 
 namespace arhost {
@@ -68,21 +66,27 @@ private:
 // The option values handed to `create`. A key that the descriptor does not declare is a defect.
 class Options {
 public:
-    explicit Options(std::span<const arhost_option> options) : options_(options) {}
-    bool boolean(std::string_view key) const { return find(key).integer != 0; }
-    std::int64_t integer(std::string_view key) const { return find(key).integer; }
-    double real(std::string_view key) const { return find(key).real; }
-    std::string text(std::string_view key) const { return find(key).text; }
+    Options(const arhost_option *first, std::uint32_t count) : first_(first), count_(count) {}
+    bool boolean(const std::string &key) const { return find(key).integer != 0; }
+    std::int64_t integer(const std::string &key) const { return find(key).integer; }
+    double real(const std::string &key) const { return find(key).real; }
+    std::string text(const std::string &key) const { return find(key).text; }
 
 private:
-    const arhost_option &find(std::string_view key) const {
-        for (const arhost_option &option : options_)
-            if (key == option.key)
-                return option;
-        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the option '" + std::string(key) + "' was not passed");
+    const arhost_option &find(const std::string &key) const {
+        if (const arhost_option *option = arhost_find_option(first_, count_, key.c_str()))
+            return *option;
+        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the option '" + key + "' was not passed");
     }
-    std::span<const arhost_option> options_;
+    const arhost_option *first_;
+    std::uint32_t count_;
 };
+
+// A marker of the list in a tracker's setup, whose elements may be longer than is known here.
+inline const arhost_marker_config &listed_marker(const arhost_tracker_setup &setup, std::size_t i) {
+    return *reinterpret_cast<const arhost_marker_config *>(reinterpret_cast<const char *>(setup.markers) +
+                                                           i * setup.markers->struct_size);
+}
 
 // A descriptor's option, with the fields in the order that they are read in.
 constexpr arhost_option_descriptor option(arhost_option_type type, const char *key, const char *default_value,
@@ -132,7 +136,7 @@ template <class T>
 arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
                      arhost_instance **instance) {
     return guarded(Host(host), [&] {
-        *instance = reinterpret_cast<arhost_instance *>(new Instance<T>(host, Options({options, count})));
+        *instance = reinterpret_cast<arhost_instance *>(new Instance<T>(host, Options(options, count)));
         return ARHOST_OK;
     });
 }

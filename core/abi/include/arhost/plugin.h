@@ -16,7 +16,7 @@
  * - Ownership: a pointer passed in a call belongs to the caller and is valid until that call returns.
  *   Nothing is allocated on one side and freed on the other.
  * - Structs begin with `struct_size`, the size in bytes that their writer knew. A reader never touches
- *   a field that lies past it. In an array, step by the first element's `struct_size`.
+ *   a field that lies past it. In an array behind a pointer, step by the first element's `struct_size`.
  * - Strings are UTF-8 and end with NUL. A pointer that may be NULL says so.
  * - No exception and no longjmp leaves a function.
  */
@@ -25,6 +25,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -130,6 +131,17 @@ typedef struct arhost_option {
     double real;
     const char *text; /* never NULL */
 } arhost_option;
+
+/* The value of an option among those that `create` is given; NULL where none has this key. */
+static inline const arhost_option *arhost_find_option(const arhost_option *options, uint32_t option_count,
+                                                      const char *key) {
+    const char *at = (const char *)options;
+    uint32_t i;
+    for (i = 0; i < option_count; ++i, at += options->struct_size)
+        if (!strcmp(((const arhost_option *)at)->key, key))
+            return (const arhost_option *)at;
+    return NULL; /* NOLINT(modernize-use-nullptr): C has none */
+}
 
 /* What a plugin can do beyond its kind's minimum: descriptor.capabilities. */
 enum {

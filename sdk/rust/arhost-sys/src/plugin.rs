@@ -6,7 +6,6 @@ use crate::views::*;
 use std::ffi::{CStr, CString};
 use std::os::raw::{c_char, c_void};
 use std::panic::{catch_unwind, AssertUnwindSafe};
-use std::slice;
 
 /// An error for the user: which `ARHOST_ERROR_…`, and a sentence that names what to mend.
 #[derive(Debug)]
@@ -63,7 +62,7 @@ impl Host {
 }
 
 /// The option values. A key that the plugin does not declare is a defect, and panics.
-pub struct Options<'a>(&'a [arhost_option]);
+pub struct Options<'a>(Vec<&'a arhost_option>);
 
 impl Options<'_> {
     fn find(&self, key: &str) -> &arhost_option {
@@ -283,8 +282,7 @@ unsafe extern "C" fn create<T: Plugin>(
     instance: *mut *mut arhost_instance,
 ) -> arhost_status {
     guarded(Host(host), || {
-        let values = if option_count == 0 { &[] } else { slice::from_raw_parts(options, option_count as usize) };
-        let plugin = T::new(Host(host), &Options(values))?;
+        let plugin = T::new(Host(host), &Options(elements(options, option_count)))?;
         *instance = Box::into_raw(Box::new(Instance { host: Host(host), plugin })).cast();
         Ok(ARHOST_OK)
     })
@@ -424,5 +422,43 @@ pub const fn sink<T: Sink>() -> arhost_sink {
         write: Some(write::<T>),
         idle: None,
         stop: Some(stop_sink::<T>),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::size_of;
+
+    /// What a host of a later day passes.
+    #[repr(C)]
+    struct Longer<T>(T, [u64; 2]);
+
+    #[test]
+    fn elements_may_be_longer_than_known() {
+        let option = |key: &'static [u8], integer| {
+            let struct_size = size_of::<Longer<arhost_option>>() as u32;
+            let (key, text) = (key.as_ptr().cast(), b"\0".as_ptr().cast());
+            Longer(arhost_option { struct_size, type_: ARHOST_OPTION_INTEGER, key, integer, real: 0.0, text }, [!0; 2])
+        };
+        let passed = [option(b"a\0", 1), option(b"b\0", 2), option(b"c\0", 3)];
+        let options = Options(unsafe { elements(passed.as_ptr().cast(), 3) });
+        assert_eq!((options.integer("a"), options.integer("b"), options.integer("c")), (1, 2, 3));
+
+        let marker = |id, side_mm| {
+            let struct_size = size_of::<Longer<arhost_marker_config>>() as u32;
+            Longer(arhost_marker_config { struct_size, id, side_mm }, [!0; 2])
+        };
+        let listed = [marker(4, 80.0), marker(7, 40.0)];
+        let mut setup: arhost_tracker_setup = unsafe { std::mem::zeroed() };
+        setup.marker_count = 2;
+        setup.markers = listed.as_ptr().cast();
+        let read: Vec<_> = setup.markers().iter().map(|marker| (marker.id, marker.side_mm)).collect();
+        assert_eq!(read, [(4, 80.0), (7, 40.0)]);
+    }
+
+    #[test]
+    fn there_may_be_no_elements() {
+        assert!(unsafe { elements::<arhost_option>(std::ptr::null(), 0) }.is_empty());
     }
 }

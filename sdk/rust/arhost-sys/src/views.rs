@@ -100,6 +100,13 @@ impl Deref for Output<'_> {
     }
 }
 
+/// The elements of an array behind a pointer, which may be longer than is known here: their first field, a u32, is
+/// their size.
+pub(crate) unsafe fn elements<'a, T>(first: *const T, count: u32) -> Vec<&'a T> {
+    let element = |i| &*first.cast::<u8>().add(i as usize * *first.cast::<u32>() as usize).cast();
+    (0..count).map(element).collect()
+}
+
 /// The scene's arena, valid until `stop`.
 #[derive(Clone, Copy)]
 pub struct Scene(pub(crate) *const arhost_scene);
@@ -127,8 +134,8 @@ impl Deref for Scene {
 
 impl arhost_tracker_setup {
     /// The markers to look for.
-    pub fn markers(&self) -> &[arhost_marker_config] {
-        unsafe { slice::from_raw_parts(self.markers, self.marker_count as usize) }
+    pub fn markers(&self) -> Vec<&arhost_marker_config> {
+        unsafe { elements(self.markers, self.marker_count) }
     }
     pub fn intrinsics(&self) -> &arhost_intrinsics {
         unsafe { &*self.intrinsics }

@@ -79,13 +79,11 @@ static arhost_status stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
-    for (i = 0; i < option_count; ++i)
-        if (!strcmp(options[i].key, "path"))
-            snprintf(self->path, sizeof self->path, "%s", options[i].text);
+    /* Every option that is declared below is there. */
+    snprintf(self->path, sizeof self->path, "%s", arhost_find_option(options, option_count, "path")->text);
     *instance = self;
     return ARHOST_OK;
 }

@@ -3,7 +3,6 @@
 #include <arhost/arhost.h>
 
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 
 struct arhost_instance {
@@ -70,18 +69,13 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
-    for (i = 0; i < option_count; ++i) {
-        if (!strcmp(options[i].key, "width"))
-            self->width = (uint32_t)options[i].integer;
-        else if (!strcmp(options[i].key, "height"))
-            self->height = (uint32_t)options[i].integer;
-        else if (!strcmp(options[i].key, "frames"))
-            self->frames = (uint64_t)options[i].integer;
-    }
+    /* Every option that is declared below is there. */
+    self->width = (uint32_t)arhost_find_option(options, option_count, "width")->integer;
+    self->height = (uint32_t)arhost_find_option(options, option_count, "height")->integer;
+    self->frames = (uint64_t)arhost_find_option(options, option_count, "frames")->integer;
     *instance = self;
     return ARHOST_OK;
 }

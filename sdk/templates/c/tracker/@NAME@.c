@@ -68,13 +68,11 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    uint32_t i;
     if (!self)
         return ARHOST_ERROR_OUT_OF_MEMORY;
     self->host = host;
-    for (i = 0; i < option_count; ++i)
-        if (!strcmp(options[i].key, "threshold"))
-            self->threshold = options[i].integer;
+    /* Every option that is declared below is there. */
+    self->threshold = arhost_find_option(options, option_count, "threshold")->integer;
     *instance = self;
     return ARHOST_OK;
 }

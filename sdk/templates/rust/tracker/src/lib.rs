@@ -45,7 +45,7 @@ impl Plugin for @CLASS@ {
 
 impl Tracker for @CLASS@ {
     fn start(&mut self, setup: &arhost_tracker_setup) -> Result<(), Failure> {
-        self.setup = Some((*setup.intrinsics(), setup.markers()[0]));
+        self.setup = Some((*setup.intrinsics(), *setup.markers()[0]));
         Ok(())
     }
 

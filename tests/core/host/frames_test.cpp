@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/frames.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::host;
+
+namespace {
+
+constexpr std::int64_t now_ns = 100'000'000'000;
+
+const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64_t previous_capture_ns = INT64_MIN) {
+    arhost_frame_info info{};
+    info.clock = clock;
+    info.capture_ns = capture_ns;
+    arhost_record record{};
+    const char *problem = take_frame_info(info, previous_capture_ns, now_ns, record);
+    if (!problem) {
+        EXPECT_EQ(record.clock, clock);
+        EXPECT_EQ(record.capture_ns, capture_ns);
+    }
+    return problem;
+}
+
+} // namespace
+
+TEST(FrameInfo, IsRefusedWithoutAClock) {
+    EXPECT_STREQ(problem_with(0, now_ns), "a frame's clock is not set");
+    EXPECT_STREQ(problem_with(3, now_ns), "a frame's clock is not set");
+}
+
+TEST(FrameInfo, IsRefusedWhereItsTimeRunsBackwards) {
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 5, now_ns - 5), nullptr);
+    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 6, now_ns - 5),
+                 "a frame's capture time runs backwards");
+}
+
+TEST(FrameInfo, IsRefusedWhereACameraTellsOfTheFarFuture) {
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MIN), nullptr) << "how old it is does no harm";
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns + 1'000'000'000), nullptr);
+    const char *refused = "a frame's capture time is more than a second ahead of the clock";
+    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns + 1'000'000'001), refused);
+    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MAX), refused);
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MEDIA, INT64_MAX), nullptr) << "a film's times say nothing of now";
+}

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// New inputs out of those that are kept, by a few random changes to one of them. The same seed gives the same inputs.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace arhost::fuzz {
+
+class Mutator {
+public:
+    using Content = std::vector<std::uint8_t>;
+
+    Mutator(std::vector<Content> kept, std::uint32_t seed) : kept_(std::move(kept)), random_(seed) {}
+
+    Content next() {
+        Content content = any();
+        for (std::size_t changes = 1 + below(5); changes > 0; --changes)
+            change(content);
+        constexpr std::size_t longest = 1 << 16;
+        content.resize(std::min(content.size(), longest));
+        return content;
+    }
+
+private:
+    std::size_t below(std::size_t end) { return random_() % end; } // distributions differ between libraries
+    const Content &any() { return kept_[below(kept_.size())]; }
+
+    void change(Content &content) {
+        // Some bytes of it; none, too.
+        const auto at = static_cast<std::ptrdiff_t>(below(content.size() + 1));
+        const auto begin = content.begin() + at;
+        const auto length = static_cast<std::ptrdiff_t>(
+            std::min<std::size_t>(content.size() - static_cast<std::size_t>(at), below(below(4) == 0 ? 256 : 9)));
+        const Content range(begin, begin + length);
+        switch (below(8)) {
+        case 0:
+            if (length > 0)
+                *begin ^= static_cast<std::uint8_t>(1u << below(8));
+            break;
+        case 1:
+            std::generate_n(begin, length, [&] { return static_cast<std::uint8_t>(random_()); });
+            break;
+        case 2:
+            content.erase(begin, begin + length);
+            break;
+        case 3: // once more, there or elsewhere
+            content.insert(content.begin() + static_cast<std::ptrdiff_t>(below(content.size() + 1)), range.begin(),
+                           range.end());
+            break;
+        case 4:
+            std::fill_n(begin, length, static_cast<std::uint8_t>(random_()));
+            break;
+        case 5: { // goes on as another one does
+            const Content &other = any();
+            content.erase(begin, content.end());
+            content.insert(content.end(),
+                           other.begin() + static_cast<std::ptrdiff_t>(
+                                               std::min(other.size(), static_cast<std::size_t>(at) + below(9))),
+                           other.end());
+            break;
+        }
+        case 6: { // a number at the end of some type's range, in its place or in a smaller one's
+            const std::uint64_t number = (std::uint64_t{1} << below(64)) - below(2);
+            for (std::ptrdiff_t i = 0; i < std::min<std::ptrdiff_t>(length, 8); ++i)
+                begin[i] = static_cast<std::uint8_t>(number >> (8 * i));
+            break;
+        }
+        case 7: {
+            constexpr std::array<std::string_view, 10> words = {
+                "-1", "0", "1e999", "nan", "4294967295", "\\n", "\"", ": ", "2147483648", "18446744073709551616"};
+            const std::string_view word = words[below(words.size())];
+            content.insert(content.erase(begin, begin + length), word.begin(), word.end());
+        }
+        }
+    }
+
+    std::vector<Content> kept_;
+    std::mt19937 random_;
+};
+
+} // namespace arhost::fuzz
