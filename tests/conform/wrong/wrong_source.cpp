@@ -4,9 +4,11 @@
 // this library's file name tells.
 #include "defect.hpp"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <sys/socket.h>
 #include <thread>
 
 namespace {
@@ -33,6 +35,12 @@ public:
             throw Failure(ARHOST_ERROR_IO, "the device is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
             throw Failure(ARHOST_ERROR_INTERNAL, "what now?");
+        if (has("opens_a_socket")) {
+            const int fd = ::socket(AF_INET, SOCK_DGRAM, 0);
+            if (fd < 0)
+                throw Failure(ARHOST_ERROR_IO, std::string("no socket: ") + std::strerror(errno));
+            ::close(fd);
+        }
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
         given_ = 0;
