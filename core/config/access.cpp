@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/access.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace arhost::config {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Devices are for `allow` to give, everything or a whole home for `reads`.
-bool may_be_given(const fs::path &path) {
-    std::error_code ignored;
-    const auto type = fs::status(path, ignored).type();
-    const char *home = std::getenv("HOME");
-    const fs::path real = real_path(path);
-    return (type == fs::file_type::regular || type == fs::file_type::directory || type == fs::file_type::fifo) &&
-           real != "/" && !(home && real == real_path(home));
-}
 
 // Outputs are written beside their place and then renamed, so their folder it is; a link's target's too.
 void let_write(sandbox::Policy &policy, const fs::path &file) {
@@ -44,24 +35,36 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
     if (const auto writes = node.find("writes"))
         for (const yaml::Node &folder : writes->items())
             policy.writable.push_back(fs::absolute(folder.text()).lexically_normal());
+    if (const auto environment = node.find("environment"))
+        for (const yaml::Node &variable : environment->items()) {
+            policy.environment.insert(variable.text());
+            if (variable.text().find('=') != std::string::npos)
+                variable.fail("must be a variable's name alone; its value is the one that arhost is started with");
+        }
     const auto options = node.find("options");
     auto path = node.find("path");
     if (!path && options && options->is_map())
         path = options->find("path");
     if (path && is_output)
         let_write(policy, path->text());
-    else if (path) {
-        const fs::path file = fs::absolute(path->input_path()), folder = file.parent_path();
-        if (may_be_given(file))
-            policy.readable.push_back(file);
-        else if (file.filename().string().find('%') != std::string::npos && may_be_given(folder)) // frame-%04d.png
-            policy.readable.push_back(folder);
-    }
+    else if (path)
+        sandbox::let_read_files(policy, fs::absolute(path->input_path()));
     if (options && options->is_map())
         for (const auto &[key, value] : options->entries())
-            if (value.is_scalar() && key != "path" && may_be_given(value.input_path()))
-                policy.readable.push_back(fs::absolute(value.input_path()));
+            if (value.is_scalar() && key != "path")
+                sandbox::let_read(policy, fs::absolute(value.input_path()));
     return policy;
+}
+
+std::string warning_of_output(const yaml::Node &path, const std::string &plugin) {
+    const fs::path file = path.text(), folder = real_path(file).parent_path();
+    const char *home = std::getenv("HOME");
+    for (const fs::path &precious : {real_path(home ? home : "/"), real_path(".")})
+        if (std::mismatch(folder.begin(), folder.end(), precious.begin(), precious.end()).first == folder.end())
+            return path.where() + ": " + path.path() + ": '" + plugin + "' can write all of '" + folder.string() +
+                   "' and what is below; give it a folder of its own, as in 'path: output/" +
+                   file.filename().string() + "'";
+    return "";
 }
 
 } // namespace arhost::config

@@ -105,6 +105,11 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared)
 class FilesInUse {
 public:
     void read(const std::filesystem::path &file) { files_.try_emplace(real_path(file), false); }
+    template <class Configured> void read_all_of(const std::optional<Configured> &component) {
+        if (component)
+            for (const std::filesystem::path &path : component->policy.readable)
+                read(path); // folders too, which no output replaces
+    }
     void write(const yaml::Node &path) {
         const auto [found, fresh] = files_.try_emplace(real_path(path.text()), true);
         if (!fresh && found->second)
@@ -143,12 +148,8 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         for (const yaml::Node &folder : node->items())
             folders.push_back(folder.input_path());
     Configuration configuration{.node = root};
-    if (const auto node = root.find("sandbox")) {
-        const std::string mode = node->choice(key_at("sandbox").choices);
-        configuration.sandbox = mode == "strict" ? sandbox::Mode::strict
-                                : mode == "none" ? sandbox::Mode::none
-                                                 : sandbox::Mode::permissive;
-    }
+    if (const auto node = root.find("sandbox"))
+        configuration.sandbox = sandbox::mode_of(node->choice(sandbox::modes));
     const Shared shared{PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
                         configuration.sandbox};
 
@@ -208,9 +209,18 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
                              root.find("camera") ? root.find("camera")->find("file") : std::nullopt, trajectory_node})
         if (node)
             files.read(node->input_path());
+    files.read_all_of(configuration.source);
+    files.read_all_of(configuration.tracker);
+    files.read_all_of(configuration.raytracer);
     for (const ComponentConfiguration &output : configuration.outputs)
-        if (const auto path = output.path || !output.options ? output.path : output.options->find("path"))
+        if (const auto path = output.path || !output.options ? output.path : output.options->find("path")) {
             files.write(*path);
+            const std::filesystem::path &plugin = output.plugins.front();
+            if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
+                continue; // arhost's own are trusted that far
+            if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
+                configuration.warnings.push_back(warning);
+        }
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =

@@ -60,6 +60,7 @@ struct Configuration {
     std::optional<camera::Coordinates> coordinates{};
     std::vector<ComponentConfiguration> outputs{};
     std::chrono::milliseconds max_latency{500};
+    std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
 };
 

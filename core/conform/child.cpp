@@ -19,11 +19,25 @@ CallPage map_call_page() {
     return CallPage(ring::Mapping(static_cast<std::byte *>(address), sizeof(ring::Call)));
 }
 
-Result run(const Test &test, Context &context) {
+// As arhost-worker does before it opens a plugin. What a sink writes goes to the scratch folder.
+sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
+    sandbox::Policy policy = subject.policy;
+    policy.writable.push_back(subject.scratch);
+    if (test.forks) {
+        policy.allow.insert("processes");
+        policy.readable.push_back(std::filesystem::read_symlink("/proc/self/exe")); // it becomes this anew
+    }
+    return sandbox::enter_for(subject.plugin, policy);
+}
+
+Result run(const Test &test, const Subject &subject, Context &context) {
     Result result;
     result.test = test.name;
     try {
+        const sandbox::Level level = enter_sandbox(test, subject);
         test.run(context);
+        if (!context.facts.empty())
+            context.facts["sandbox"] = sandbox::to_text(level);
         result.verdict = Verdict::pass;
         result.message = context.note;
     } catch (const Failure &failure) {
@@ -56,7 +70,7 @@ int run_child(const std::string &name, const Subject &subject) {
         PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         context.prints = subject.prints;
-        Result result = run(test, context);
+        Result result = run(test, subject, context);
         result.facts = context.facts;
         const std::string line = to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";
         std::FILE *pipe = ::fdopen(result_fd, "w");

@@ -6,10 +6,12 @@
 #include "conform/plugin_library.hpp"
 #include "conform/prints.hpp"
 #include "conform/verdict.hpp"
+#include "sandbox/sandbox.hpp"
 
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace arhost::conform {
 
@@ -20,6 +22,8 @@ struct Subject {
     std::uint64_t seed = 1;
     std::filesystem::path scratch{}; // of one test; gone after it
     PrintFiles prints{};
+    sandbox::Policy policy{};                  // but for the scratch folder
+    std::vector<std::string> policy_options{}; // which it came of, as on the command line
 };
 
 // The descriptors that a child finds.

@@ -16,6 +16,7 @@
 namespace {
 
 using namespace arhost::conform;
+namespace sandbox = arhost::sandbox;
 namespace fs = std::filesystem;
 
 enum ExitStatus { usage_or_suite_failed = 2 };
@@ -44,6 +45,55 @@ PrintFiles parse_prints(const std::vector<std::string> &texts) {
     return prints;
 }
 
+// What the configuration's keys of the same names would say.
+struct PolicyOptions {
+    std::vector<std::string> allow, reads, environment;
+    std::string sandbox{sandbox::modes.front()};
+
+    void add_to(CLI::App &app) {
+        const auto add = [&](const char *name, std::vector<std::string> &values, const char *what) {
+            return app.add_option(name, values, what)->delimiter(',')->allow_extra_args(false);
+        };
+        const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
+        add("--allow", allow, "What the sandbox gives it, as a configuration's 'allow' (docs/security.md)")
+            ->type_name("WHAT")
+            ->check(CLI::IsMember(known));
+        add("--reads", reads, "A further file or folder that it may read (again for more)")->type_name("PATH");
+        add("--environment", environment, "A further variable that it gets (again for more)")->type_name("NAME");
+        app.add_option("--sandbox", sandbox, "permissive, strict or none, as the configuration's 'sandbox'")
+            ->type_name("MODE")
+            ->check(CLI::IsMember(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end())));
+    }
+    std::vector<std::string> texts() const {
+        std::vector<std::string> all;
+        for (const auto &[option, values] :
+             {std::pair{"--allow", &allow}, {"--reads", &reads}, {"--environment", &environment}})
+            for (const std::string &value : *values)
+                all.insert(all.end(), {option, value});
+        if (sandbox != sandbox::modes.front())
+            all.insert(all.end(), {"--sandbox", sandbox});
+        return all;
+    }
+    // With the files that the suite itself, or the plugin by its options, is told to read.
+    sandbox::Policy policy(const Subject &subject) const {
+        sandbox::Policy policy;
+        policy.mode = sandbox::mode_of(sandbox);
+        policy.allow.insert(allow.begin(), allow.end());
+        policy.environment.insert(environment.begin(), environment.end());
+        for (const std::string &path : reads)
+            policy.readable.push_back(fs::absolute(path));
+        policy.readable.push_back(subject.reference.parent_path());
+        for (const auto &[id, file] : subject.prints)
+            policy.readable.push_back(file);
+        for (const auto &[key, value] : subject.settings)
+            if (key == "path" && !value.empty())
+                sandbox::let_read_files(policy, fs::absolute(value));
+            else if (!value.empty())
+                sandbox::let_read(policy, fs::absolute(value));
+        return policy;
+    }
+};
+
 void write(const std::string &file, const std::string &text) {
     if (file.empty())
         return;
@@ -57,6 +107,22 @@ void list(const std::string &pattern) {
     for (const Test &test : all_tests())
         if (::fnmatch(pattern.c_str(), test.name, 0) == 0)
             fmt::print("{:<34} {}\n", test.name, test.promise);
+}
+
+// What the plugin needs and is not given: without it the host would make no instance.
+std::string lacking(const Result &loaded, const sandbox::Policy &policy) {
+    if (policy.mode != sandbox::Mode::none)
+        for (const std::string &need : loaded.facts.value("needs", std::vector<std::string>()))
+            if (!policy.allows(need))
+                return fmt::format("it needs '{0}', which the sandbox keeps from it: give --allow {0}", need);
+    return {};
+}
+
+bool makes_instances(std::span<const Test> tests, std::string_view name) {
+    if (name == "abi.create")
+        return true;
+    const auto test = std::find_if(tests.begin(), tests.end(), [&](const Test &t) { return name == t.name; });
+    return test != tests.end() && makes_instances(tests, test->needs);
 }
 
 Report run(const RunSettings &settings, const std::string &pattern, bool quiet) {
@@ -73,14 +139,21 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
     report.plugin = loaded.facts;
     const arhost_kind kind = loaded.facts.value("kind", 0);
     const bool passed = loaded.verdict == Verdict::pass;
+    const std::string lacks = lacking(loaded, settings.subject.policy);
     if (!passed || wanted(load)) {
         tell(loaded);
         report.results.push_back(std::move(loaded));
     }
     std::vector<Test> selected;
-    for (const Test &test : report.tests)
-        if (&test != &load && wanted(test) && (test.kind == 0 || test.kind == kind))
-            selected.push_back(test);
+    for (const Test &test : report.tests) {
+        if (&test == &load || !wanted(test) || (test.kind != 0 && test.kind != kind))
+            continue;
+        selected.push_back(test);
+        if (!lacks.empty() && makes_instances(report.tests, test.name)) {
+            report.results.push_back({test.name, Verdict::skip, lacks});
+            tell(report.results.back());
+        }
+    }
     run_all(selected, settings, report.results, tell);
     std::sort(report.results.begin(), report.results.end(),
               [&](const Result &a, const Result &b) { return &report.test_of(a) < &report.test_of(b); });
@@ -111,6 +184,8 @@ int main(int argc, char **argv) {
                    "The PNG of a marker that the tracker finds (again for more), instead of tag36h11's")
         ->type_name("ID=FILE")
         ->allow_extra_args(false);
+    PolicyOptions policy_options;
+    policy_options.add_to(app);
     app.add_option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")->type_name("N");
     app.add_option("--jobs", settings.jobs, "Tests at a time")->type_name("N")->check(CLI::Range(1, 256));
     app.add_option("--patience", settings.patience, "Times each deadline, on slow machines (1)")
@@ -140,6 +215,8 @@ int main(int argc, char **argv) {
         settings.subject.reference = fs::absolute(reference);
         settings.subject.settings = parse_settings(option_texts);
         settings.subject.prints = parse_prints(print_texts);
+        settings.subject.policy = policy_options.policy(settings.subject);
+        settings.subject.policy_options = policy_options.texts();
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
         const Report report = run(settings, pattern, quiet);

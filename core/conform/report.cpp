@@ -50,6 +50,8 @@ std::string Report::command(const Result &result) const {
         text += " --set " + quoted(key + "=" + value);
     for (const auto &[id, file] : subject.prints)
         text += fmt::format(" --print {}={}", id, quoted(file.string()));
+    for (const std::string &option : subject.policy_options)
+        text += " " + quoted(option);
     return text;
 }
 

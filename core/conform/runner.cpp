@@ -111,6 +111,7 @@ public:
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
         for (const auto &[id, file] : subject.prints)
             arguments.insert(arguments.end(), {"--print", std::to_string(id) + "=" + file.string()});
+        arguments.insert(arguments.end(), subject.policy_options.begin(), subject.policy_options.end());
         const pid_t parent = ::getpid();
         pid_ = ::fork();
         if (pid_ == 0)

@@ -65,6 +65,7 @@ struct Test {
     const char *needs;   // the test without whose passing this one would say nothing; "": none
     std::chrono::milliseconds deadline;
     void (*run)(Context &);
+    bool forks = false; // the suite itself, so the sandbox lets the plugin too
 };
 
 using namespace std::chrono_literals;

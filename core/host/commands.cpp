@@ -162,7 +162,9 @@ config::Configuration replay_configuration(const Arguments &arguments, const Rep
     return configuration;
 }
 
-void warn_of_trajectory(const config::Configuration &configuration, Console &console) {
+void show_warnings(const config::Configuration &configuration, Console &console) {
+    for (const std::string &warning : configuration.warnings)
+        console.log(ARHOST_SEVERITY_WARNING, "arhost", warning);
     if (configuration.trajectory && !configuration.trajectory->warning.empty())
         console.log(ARHOST_SEVERITY_WARNING, "trajectory", configuration.trajectory->warning);
 }
@@ -220,7 +222,7 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
     const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
     Console console(verbose);
-    warn_of_trajectory(configuration, console);
+    show_warnings(configuration, console);
     ring::Reactor reactor;
     Pipeline *running = nullptr;
     Pipeline pipeline(configuration, make_context(reactor, launcher, console),
@@ -287,7 +289,7 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 int check(const Arguments &arguments, supervise::Starter &launcher) {
     Console console(arguments.verbose);
     const config::Configuration configuration = read_configuration(arguments);
-    warn_of_trajectory(configuration, console);
+    show_warnings(configuration, console);
     ring::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
 
@@ -323,15 +325,18 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
     return success;
 }
 
-int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher) {
+int list_plugins(bool with_options, const std::vector<fs::path> &reads, bool verbose, supervise::Starter &launcher) {
     Console console(verbose);
     ring::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
     const std::vector<fs::path> files = config::PluginPath({}, built_in_plugins()).all();
+    sandbox::Policy policy;
+    for (const fs::path &path : reads)
+        policy.readable.push_back(fs::absolute(path));
     int status = success;
     std::string level;
     for (const fs::path &file : files) {
-        const ProbeResult result = probe(context, file, {}, &level);
+        const ProbeResult result = probe(context, file, policy, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
             std::printf("%-18s can't be used: %s\n", file.stem().c_str(), reason->c_str());
             status = run_failed;

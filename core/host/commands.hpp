@@ -38,7 +38,8 @@ struct ReplayArguments {
 int run(const Arguments &arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
 int check(const Arguments &arguments, supervise::Starter &launcher);
-int list_plugins(bool with_options, bool verbose, supervise::Starter &launcher);
+int list_plugins(bool with_options, const std::vector<std::filesystem::path> &reads, bool verbose,
+                 supervise::Starter &launcher);
 int print_schema(bool markdown);
 // Becomes arhost-conform, which lies beside this program: the host itself opens no plugin.
 int conform(std::vector<std::string> arguments);

@@ -100,6 +100,10 @@ int main(int argc, char **argv) {
     bool with_options = false;
     CLI::App *plugins_command = app.add_subcommand("plugins", "List the plugins, or why one can't be used");
     plugins_command->add_flag("--options", with_options, "With their options");
+    std::vector<std::filesystem::path> reads;
+    plugins_command->add_option("--reads", reads, "A folder where libraries of theirs lie (again for more)")
+        ->type_name("FOLDER")
+        ->allow_extra_args(false);
 
     bool markdown = false;
     CLI::App *schema_command = app.add_subcommand("schema", "Print the JSON Schema of configurations, for editors");
@@ -139,7 +143,7 @@ int main(int argc, char **argv) {
         if (*check_command)
             return check(arguments, launcher);
         if (*plugins_command)
-            return list_plugins(with_options, arguments.verbose, launcher);
+            return list_plugins(with_options, reads, arguments.verbose, launcher);
         if (arguments.file.empty()) {
             std::fputs(app.help().c_str(), stderr);
             return bad_configuration;

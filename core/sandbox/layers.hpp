@@ -49,7 +49,8 @@ inline bool has_memory_limit(const Policy &policy) {
 }
 
 // Where the machine runs out of memory all the same, the kernel ends a worker and never the host.
-Layer go_first_out_of_memory(); // before the namespaces, which make /proc read-only
+void drop_environment(const Policy &policy); // any machine can
+Layer go_first_out_of_memory();              // before the namespaces, which make /proc read-only
 Layer enter_namespaces(const Policy &policy);
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();

@@ -50,6 +50,8 @@ Layer set_limits(const Policy &policy) {
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
+    lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread keeps a processor from all others
+    lower(layer, "nice", RLIMIT_NICE, 0);
     lower(layer, "threads", RLIMIT_NPROC, 8192); // in its user namespace; none for root
     return layer;
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Namespaces: a view of the machine without network, in which all but a few folders is read-only. That also
-// stops what Landlock knows nothing of: owners, modes, times and attributes of files.
+// Namespaces: a view of the machine without network, in which all but a few folders is read-only, and only a few
+// devices can be opened. That also stops what Landlock knows nothing of: owners, modes, times and attributes of
+// files.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -48,21 +49,30 @@ int set_attributes(const std::filesystem::path &path, unsigned flags, std::uint6
         ::syscall(SYS_mount_setattr, AT_FDCWD, path.c_str(), flags, &attributes, sizeof attributes));
 }
 
+bool mount_anew(const std::filesystem::path &path) {
+    return ::mount(path.c_str(), path.c_str(), nullptr, MS_BIND | MS_REC, nullptr) == 0;
+}
+
 // False with errno where it can't be had.
-bool make_mounts_read_only(const Policy &policy) {
-    if (::mount("", "/", nullptr, MS_REC | MS_SLAVE, nullptr) != 0)
+bool narrow_mounts(const Policy &policy) {
+    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // what is mounted later is not seen in it
         return false;
-    std::vector<std::filesystem::path> writable; // but for those that are on a read-only mount already
+    // Mounts of their own for what stays as it is; what is on a read-only mount already is left out.
+    std::vector<std::filesystem::path> writable;
     for (const std::filesystem::path &folder : policy.writable) {
         struct statvfs found {};
-        if (::statvfs(folder.c_str(), &found) == 0 && !(found.f_flag & ST_RDONLY) &&
-            ::mount(folder.c_str(), folder.c_str(), nullptr, MS_BIND | MS_REC, nullptr) == 0)
+        if (::statvfs(folder.c_str(), &found) == 0 && !(found.f_flag & ST_RDONLY) && mount_anew(folder))
             writable.push_back(folder);
     }
-    if (set_attributes("/", AT_RECURSIVE, MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID, 0) != 0)
+    std::vector<std::filesystem::path> devices = paths_of(policy).devices;
+    devices.emplace_back("/dev/zero");
+    std::erase_if(devices, [](const std::filesystem::path &device) { return !mount_anew(device); });
+    if (set_attributes("/", AT_RECURSIVE, MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID | MOUNT_ATTR_NODEV, 0) != 0)
         return false;
     for (const std::filesystem::path &folder : writable)
         (void)set_attributes(folder, 0, 0, MOUNT_ATTR_RDONLY);
+    for (const std::filesystem::path &device : devices)
+        (void)set_attributes(device, 0, 0, MOUNT_ATTR_NODEV);
     std::error_code error; // the working directory still is the old mount's
     if (const auto here = std::filesystem::current_path(error); !error)
         (void)!::chdir(here.c_str());
@@ -85,7 +95,7 @@ Layer enter_namespaces(const Policy &policy) {
         }
         reached("user");
     }
-    ::unshare(CLONE_NEWNS) == 0 && make_mounts_read_only(policy) ? reached("mount") : lacks("mount");
+    ::unshare(CLONE_NEWNS) == 0 && narrow_mounts(policy) ? reached("mount") : lacks("mount");
     if (!policy.allows("network"))
         ::unshare(CLONE_NEWNET) == 0 ? reached("net") : lacks("net");
     if (!policy.allows("display")) // X takes pictures through shared memory

@@ -112,13 +112,38 @@ Paths paths_of(const Policy &policy) {
     return paths;
 }
 
+bool let_read(Policy &policy, const fs::path &file) {
+    std::error_code ignored;
+    const auto type = fs::status(file, ignored).type();
+    const char *home = std::getenv("HOME");
+    const fs::path real = fs::weakly_canonical(file, ignored);
+    if ((type != fs::file_type::regular && type != fs::file_type::directory && type != fs::file_type::fifo) ||
+        real == "/" || (home && real == fs::weakly_canonical(home, ignored)))
+        return false;
+    policy.readable.push_back(file);
+    return true;
+}
+
+void let_read_files(Policy &policy, const fs::path &file_or_pattern) {
+    if (!let_read(policy, file_or_pattern) && file_or_pattern.filename().string().find('%') != std::string::npos)
+        let_read(policy, file_or_pattern.parent_path());
+}
+
+Mode mode_of(std::string_view text) {
+    return text == "strict" ? Mode::strict : text == "none" ? Mode::none : Mode::permissive;
+}
+
 nlohmann::json to_json(const Policy &policy) {
     const auto texts = [](const std::vector<fs::path> &paths) {
         return std::vector<std::string>(paths.begin(), paths.end());
     };
-    return {{"mode", static_cast<int>(policy.mode)}, {"allow", policy.allow},
-            {"readable", texts(policy.readable)},    {"writable", texts(policy.writable)},
-            {"memory_bytes", policy.memory_bytes},   {"makes_shared_memory", policy.makes_shared_memory}};
+    return {{"mode", static_cast<int>(policy.mode)},
+            {"allow", policy.allow},
+            {"readable", texts(policy.readable)},
+            {"writable", texts(policy.writable)},
+            {"environment", policy.environment},
+            {"memory_bytes", policy.memory_bytes},
+            {"makes_shared_memory", policy.makes_shared_memory}};
 }
 
 Policy policy_from_json(const nlohmann::json &json) {
@@ -130,6 +155,8 @@ Policy policy_from_json(const nlohmann::json &json) {
     policy.mode = static_cast<Mode>(json.at("mode").get<int>());
     for (const auto &what : json.at("allow"))
         policy.allow.insert(what.get<std::string>());
+    for (const auto &variable : json.at("environment"))
+        policy.environment.insert(variable.get<std::string>());
     policy.readable = paths("readable");
     policy.writable = paths("writable");
     policy.memory_bytes = json.at("memory_bytes").get<std::uint64_t>();

@@ -2,6 +2,8 @@
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
 #include <sys/prctl.h>
 
 namespace arhost::sandbox {
@@ -11,6 +13,19 @@ Layer give_up_new_privileges() {
     if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0)
         return {"no_new_privs", "", error_text("prctl")};
     return {"no_new_privs", "yes", ""};
+}
+
+// A GPU's driver keeps the shaders that it has compiled: where each plugin has a place of its own.
+void give_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
+    const char *caches = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
+    if (policy.mode == Mode::none || !policy.allows("gpu") || (!caches && !home))
+        return;
+    const auto folder =
+        (caches ? std::filesystem::path(caches) : std::filesystem::path(home) / ".cache") / "arhost" / plugin.stem();
+    policy.writable.push_back(folder);
+    for (const char *variable : {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH",
+                                 "CUDA_CACHE_PATH", "OPTIX_CACHE_PATH"})
+        ::setenv(variable, folder.c_str(), 1);
 }
 
 } // namespace
@@ -40,6 +55,7 @@ Level enter(const Policy &policy) {
         std::error_code ignored; // who wants to write there says what is wrong with it
         std::filesystem::create_directories(folder, ignored);
     }
+    drop_environment(policy);
     level.push_back(go_first_out_of_memory());
     level.push_back(enter_namespaces(policy));
     level.push_back(set_limits(policy));
@@ -47,7 +63,18 @@ Level enter(const Policy &policy) {
     level.push_back(give_up_new_privileges());
     level.push_back(enter_landlock(policy));
     level.push_back(filter_system_calls(policy));
+    if (policy.mode == Mode::strict && !whole(level))
+        throw std::runtime_error("sandbox: " + to_text(level) +
+                                 "; 'sandbox: strict' asks for all of it: mend that, or set 'permissive'");
     return level;
+}
+
+Level enter_for(const std::filesystem::path &plugin, Policy policy) {
+    std::error_code ignored;
+    policy.readable.push_back(plugin.parent_path());
+    policy.readable.push_back(std::filesystem::weakly_canonical(plugin, ignored).parent_path());
+    give_shader_cache(policy, plugin);
+    return enter(policy);
 }
 
 } // namespace arhost::sandbox

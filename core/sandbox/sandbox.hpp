@@ -30,12 +30,23 @@ struct Policy {
     std::set<std::string, std::less<>> allow{}; // of `allowances`
     // Absolute; a folder stands for all below it. The system's libraries and settings are readable anyway.
     std::vector<std::filesystem::path> readable{};
-    std::vector<std::filesystem::path> writable{}; // folders; made where they are missing
-    std::uint64_t memory_bytes = 0;                // of its own; 0: three quarters of the machine's
-    bool makes_shared_memory = false;              // what arhost's scene loader does; evades the limit
+    std::vector<std::filesystem::path> writable{};    // folders; made where they are missing
+    std::set<std::string, std::less<>> environment{}; // variables to keep besides the usual ones
+    std::uint64_t memory_bytes = 0;                   // of its own; 0: three quarters of the machine's
+    bool makes_shared_memory = false;                 // what arhost's scene loader does; evades the limit
 
     bool allows(std::string_view what) const { return allow.contains(what); }
 };
+
+// Lets a file or folder be read that stands as a value somewhere: not one that is not there, a device, everything
+// or a whole home, which are for other keys to give. False: it does not. Absolute.
+bool let_read(Policy &policy, const std::filesystem::path &file);
+// The same, and of a printf pattern (frame-%04d.png) the folder.
+void let_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);
+
+// "permissive", "strict", "none", as the configuration has them.
+constexpr std::array<std::string_view, 3> modes = {"permissive", "strict", "none"};
+Mode mode_of(std::string_view text);
 
 nlohmann::json to_json(const Policy &policy);
 Policy policy_from_json(const nlohmann::json &json); // throws nlohmann::json::exception
@@ -53,7 +64,10 @@ bool whole(const Level &level);
 std::string to_text(const Level &level);
 
 // Puts the calling process, which must have one thread, into the sandbox for good. A layer that the machine
-// lacks is told in the result and is no error: who wants Mode::strict looks at it. Mode::none does nothing.
+// lacks is told in the result; with Mode::strict it is a std::runtime_error. Mode::none does nothing.
 Level enter(const Policy &policy);
+
+// The same for a process that is to open `plugin`: it may read what lies beside it, and beside a link's target.
+Level enter_for(const std::filesystem::path &plugin, Policy policy);
 
 } // namespace arhost::sandbox

@@ -47,8 +47,10 @@ constexpr const char *never[] = {
 class Filter {
 public:
     Filter() : context_(seccomp_init(SCMP_ACT_ALLOW)) {
-        if (context_)
-            (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // a binary tree: cost log n
+        if (!context_)
+            return;
+        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // a binary tree: cost log n
+        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1); // of threads as well, should there be any
     }
     bool made() const { return context_ && !failed_; }
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
+#include <optional>
 #include <poll.h>
 #include <set>
 #include <sys/prctl.h>
@@ -180,8 +181,9 @@ void reap(int socket, std::set<pid_t> &spawned) {
     }
 }
 
-// The launcher's next word. One that somebody has stopped is made to go on: the host must not stand still.
-Reply receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
+// The launcher's next word; none: it is gone. One that somebody has stopped is made to go on: the host must not
+// stand still.
+std::optional<Reply> receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
     pollfd ready{socket, POLLIN, 0};
     for (int count; (count = ::poll(&ready, 1, 50)) <= 0;) {
         if (count < 0 && errno != EINTR)
@@ -190,7 +192,7 @@ Reply receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
     }
     Reply reply;
     if (!receive_struct(socket, reply, fds))
-        throw std::runtime_error("the launcher is gone");
+        return std::nullopt;
     return reply;
 }
 
@@ -204,25 +206,44 @@ double cpu_seconds(const rusage &usage) {
 }
 
 Launcher::Launcher() {
+    for (int i = 0; i < 2; ++i)
+        sides_.push_back(fork_one());
+}
+
+Launcher::Side Launcher::fork_one() const {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
         ring::throw_errno("socketpair for the launcher");
     UniqueFd host_end(ends[0]), launcher_end(ends[1]);
-    pid_ = ::fork();
-    if (pid_ < 0)
+    const pid_t pid = ::fork();
+    if (pid < 0)
         ring::throw_errno("fork of the launcher");
-    if (pid_ == 0) {
+    if (pid == 0) {
         host_end.reset();
+        for (const Side &other : sides_) // whose launcher is to see when the host is gone
+            ::close(other.socket.get());
         launcher_main(launcher_end.get());
     }
-    socket_ = std::move(host_end);
+    return {std::move(host_end), pid};
+}
+
+bool Launcher::go_on_with_the_next() {
+    if (sides_.size() < 2)
+        return false;
+    ::kill(sides_.front().pid, SIGKILL); // should only its socket be shut; its workers die with it
+    ::waitpid(sides_.front().pid, nullptr, 0);
+    sides_.pop_front();
+    alive_.clear();
+    return true;
 }
 
 Launcher::~Launcher() {
-    socket_.reset();
-    while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
-        ::kill(pid_, SIGCONT); // should somebody have stopped it
-        ::usleep(1000);
+    for (Side &side : sides_) {
+        side.socket.reset();
+        while (::waitpid(side.pid, nullptr, WNOHANG) == 0) {
+            ::kill(side.pid, SIGCONT); // should somebody have stopped it
+            ::usleep(1000);
+        }
     }
 }
 
@@ -243,23 +264,32 @@ Spawned Launcher::spawn(const std::filesystem::path &program) {
     const UniqueFd output_end(pipe_ends[1]);
     ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
 
-    if (!send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()}))
-        throw std::runtime_error("the launcher is gone");
     for (;;) {
         std::vector<UniqueFd> fds;
-        const Reply reply = receive_reply(socket_.get(), pid_, fds);
-        if (reply.kind == Reply::exited) {
-            exits_.push_back(reply.exit);
+        const Side &side = sides_.front();
+        const bool sent =
+            send_struct(side.socket.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()});
+        std::optional<Reply> reply;
+        while (sent && (reply = receive_reply(side.socket.get(), side.pid, fds)) && reply->kind == Reply::exited)
+            note(reply->exit);
+        if (!reply && go_on_with_the_next())
             continue;
-        }
-        if (reply.kind == Reply::failed || fds.size() != 1 || !fds[0])
-            throw std::runtime_error(std::string("no process can be started: ") + std::strerror(reply.error));
-        spawned.pid = reply.exit.pid;
+        if (!reply)
+            throw std::runtime_error("the launcher is gone");
+        if (reply->kind == Reply::failed || fds.size() != 1 || !fds[0])
+            throw std::runtime_error(std::string("no process can be started: ") + std::strerror(reply->error));
+        alive_.insert(reply->exit.pid);
+        spawned.pid = reply->exit.pid;
         spawned.pidfd = std::move(fds[0]);
         spawned.channel = std::move(mine);
         spawned.doorbell = std::move(doorbell.host);
         return spawned;
     }
+}
+
+void Launcher::note(const Exit &exit) {
+    alive_.erase(exit.pid);
+    exits_.push_back(exit);
 }
 
 Exit Launcher::wait_exit(pid_t pid) {
@@ -270,9 +300,13 @@ Exit Launcher::wait_exit(pid_t pid) {
                 exits_.erase(it);
                 return found;
             }
+        if (!alive_.contains(pid)) // it died with its launcher
+            return {pid, SIGKILL, 0};
         std::vector<UniqueFd> fds;
-        const Reply reply = receive_reply(socket_.get(), pid_, fds);
-        exits_.push_back(reply.exit);
+        if (const auto reply = receive_reply(sides_.front().socket.get(), sides_.front().pid, fds))
+            note(reply->exit);
+        else if (!go_on_with_the_next())
+            throw std::runtime_error("the launcher is gone");
     }
 }
 

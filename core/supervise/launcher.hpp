@@ -3,7 +3,8 @@
 // The launcher: a small single-threaded process, forked from the host before it has any thread, that is
 // the parent of all workers. It starts them on request and reports how they ended. Workers die with it
 // (PR_SET_PDEATHSIG follows the thread that forked), and it ends with the host, so a host that is killed
-// leaves nothing behind.
+// leaves nothing behind. A second one stands by, since once the host has threads it can fork no other: should
+// somebody kill the first, its workers, which die with it, are started again by the second.
 #pragma once
 
 #include "ring/channel.hpp"
@@ -11,6 +12,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <set>
 #include <sys/resource.h>
 #include <sys/types.h>
 
@@ -57,8 +59,17 @@ public:
     Exit wait_exit(pid_t pid) override;
 
 private:
-    ring::UniqueFd socket_;
-    pid_t pid_ = 0;
+    struct Side {
+        ring::UniqueFd socket;
+        pid_t pid = 0;
+    };
+    Side fork_one() const;
+    // False: there is no other.
+    bool go_on_with_the_next();
+    void note(const Exit &exit);
+
+    std::deque<Side> sides_; // the first is at work
+    std::set<pid_t> alive_;  // its children
     std::deque<Exit> exits_;
 };
 

@@ -1,14 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/library.hpp"
 
+#include "sandbox/sandbox.hpp"
+
+#include <algorithm>
 #include <dlfcn.h>
 #include <initializer_list>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 namespace arhost::worker {
 namespace {
+
+std::string words(std::span<const std::string_view> list) {
+    std::string text;
+    for (const std::string_view word : list)
+        text.append(text.empty() ? "" : ", ").append(word);
+    return text;
+}
 
 [[noreturn]] void refuse(const std::filesystem::path &file, const std::string &why) {
     throw std::runtime_error(file.string() + ": " + why);
@@ -54,8 +65,14 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
 
 const arhost_entry_point &open_library(const std::filesystem::path &file) {
     void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (!library)
-        refuse(file, std::string("can't be loaded: ") + ::dlerror());
+    if (!library) {
+        const std::string reason = ::dlerror();
+        const bool of_another = reason.find("cannot open shared object file") != std::string::npos;
+        refuse(file, "can't be loaded: " + reason +
+                         (of_another ? " (if it lies where the sandbox may not look: 'reads: [FOLDER]' in the "
+                                       "configuration, '--reads FOLDER' of plugins and conform)"
+                                     : ""));
+    }
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
         refuse(file, "is no arhost plugin: it exports no symbol 'arhost_entry'");
@@ -83,6 +100,10 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
         refuse(file, "its id is '" + id + "'; the file must bear that name");
+    for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
+        if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
+            refuse(file, std::string("it needs '") + *need + "', which this arhost can't allow; what a plugin may " +
+                             "need is " + words(sandbox::allowances));
     check_functions(
         file, {{"create", plugin->create}, {"destroy", plugin->destroy}, {"get_extension", plugin->get_extension}},
         "every plugin");

@@ -170,47 +170,27 @@ private:
     bool stopped_ = false;
 };
 
-// A GPU's driver keeps the shaders that it has compiled: where each plugin has a place of its own.
-void give_shader_cache(sandbox::Policy &policy, const std::filesystem::path &plugin) {
-    const char *caches = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
-    if (policy.mode == sandbox::Mode::none || !policy.allows("gpu") || (!caches && !home))
-        return;
-    const auto folder =
-        (caches ? std::filesystem::path(caches) : std::filesystem::path(home) / ".cache") / "arhost" / plugin.stem();
-    policy.writable.push_back(folder);
-    for (const char *variable : {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH",
-                                 "CUDA_CACHE_PATH", "OPTIX_CACHE_PATH"})
-        ::setenv(variable, folder.c_str(), 1);
-}
-
-// Before anything is opened that nobody vouches for: a library's constructors run when it is loaded.
-sandbox::Level enter_sandbox(const Link &link, const sandbox::Policy &policy) {
-    sandbox::Level level = sandbox::enter(policy);
-    const std::string text = "sandbox: " + sandbox::to_text(level);
-    if (policy.mode == sandbox::Mode::strict && !sandbox::whole(level))
-        throw std::runtime_error(text + "; 'sandbox: strict' asks for all of it: mend that, or set 'permissive'");
-    link.log(sandbox::whole(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO, text);
+// Whoever reads the log sees what this machine lacks.
+sandbox::Level tell(const Link &link, sandbox::Level level) {
+    link.log(sandbox::whole(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO,
+             "sandbox: " + sandbox::to_text(level));
     return level;
 }
 
 int serve(Link &link) {
     Message open = link.receive();
     const std::string type = open.body.at("type").get<std::string>();
-    sandbox::Policy policy = sandbox::policy_from_json(open.body.at("sandbox"));
+    const sandbox::Policy policy = sandbox::policy_from_json(open.body.at("sandbox"));
     if (type == "load") {
-        enter_sandbox(link, policy);
+        tell(link, sandbox::enter(policy));
         return load_scene_for(link, open);
     }
     if (type != "open")
         throw HostGone("the host's first message is not 'open'");
     link.map_pages(open);
     const std::string file = open.body.at("plugin").get<std::string>();
-    // With what lies beside it; a link's target too.
-    std::error_code ignored;
-    policy.readable.push_back(std::filesystem::path(file).parent_path());
-    policy.readable.push_back(std::filesystem::weakly_canonical(file, ignored).parent_path());
-    give_shader_cache(policy, file);
-    const sandbox::Level level = enter_sandbox(link, policy);
+    // Before anything is opened that nobody vouches for: a library's constructors run when it is loaded.
+    const sandbox::Level level = tell(link, sandbox::enter_for(file, policy));
     const arhost_entry_point *entry = nullptr;
     {
         Link::InCall call(link, Call::load);

@@ -10,8 +10,8 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <cstdio>
 #include <dlfcn.h>
-#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -142,9 +142,18 @@ PyMethodDef callbacks[] = {{"log", py_log, METH_VARARGS, "log(severity, text)"},
 
 // ---- the interpreter ----
 
+// Held while the interpreter starts. In arhost-inprocess another kind's adapter may be at it too: a library of its
+// own, with which this one shares no mutex but those of the C library.
+class ProcessLock {
+public:
+    ProcessLock() { ::flockfile(stderr); }
+    ~ProcessLock() { ::funlockfile(stderr); }
+    ProcessLock(const ProcessLock &) = delete;
+    ProcessLock &operator=(const ProcessLock &) = delete;
+};
+
 void initialise(const std::string &interpreter) {
-    static std::mutex mutex;
-    const std::lock_guard lock(mutex);
+    const ProcessLock lock;
     if (Py_IsInitialized())
         return;
     // Modules in C look for Python's symbols among the global ones, and this plugin was opened with RTLD_LOCAL.

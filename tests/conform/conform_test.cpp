@@ -162,9 +162,56 @@ TEST(Conform, ErrsOnAMarkerThatCantBeRead) {
 
 TEST(Conform, SkipsWhatNeedsADeviceThatIsNotThere) {
     ConformRun run;
-    EXPECT_EQ(run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--set", "device=/dev/arhost-none"}), 0);
+    EXPECT_EQ(
+        run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--allow", "video", "--set", "device=/dev/arhost-none"}),
+        0);
     EXPECT_THAT(run.output(), HasSubstr("skip     source.start\n         it needs 'video', and start returned "));
     EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
+}
+
+TEST(Conform, SkipsWhatMakesAnInstanceWhereANeedIsNotAllowed) {
+    ConformRun run;
+    const std::string camera = ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so";
+    EXPECT_EQ(run.run({camera}), 0);
+    const std::string why = "it needs 'video', which the sandbox keeps from it: give --allow video";
+    EXPECT_THAT(run.output(), HasSubstr("pass     abi.descriptor"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.create\n         " + why));
+    EXPECT_THAT(run.output(), HasSubstr("skip     source.seek\n         " + why));
+    EXPECT_EQ(run.run({camera, "--only", "abi.create", "--sandbox", "none"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("pass     abi.create"));
+    EXPECT_EQ(run.run({camera, "--allow", "vidoe"}), 2);
+}
+
+TEST(Conform, PutsThePluginIntoTheSandboxOfARun) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("opens_a_socket", "source").string();
+    EXPECT_EQ(run.run({plugin, "--only", "source.start", "--reads", "/srv"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("no socket: Operation not permitted"));
+    EXPECT_THAT(run.output(), HasSubstr("--only source.start --seed 1 --reads /srv\n"));
+    for (const std::vector<std::string> &options :
+         {std::vector<std::string>{"--allow", "network"}, {"--sandbox", "none"}}) {
+        std::vector<std::string> arguments = {plugin, "--only", "source.start"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        EXPECT_EQ(run.run(arguments), 0) << run.output();
+    }
+}
+
+TEST(Conform, LetsAPluginWriteIntoItsTestsFolderAlone) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("caches_beside_its_library", "sink").string();
+    const std::filesystem::path cache = run.path("sink_caches_beside_its_library.cache");
+    EXPECT_EQ(run.run({plugin, "--only", "sink.start"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("can't write " + cache.string()));
+    EXPECT_FALSE(std::filesystem::exists(cache));
+    EXPECT_EQ(run.run({plugin, "--only", "sink.start", "--sandbox", "none"}), 0);
+    EXPECT_TRUE(std::filesystem::exists(cache));
+}
+
+TEST(Conform, NamesTheNeedThatIsUnknown) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost can't allow; what a plugin may need "
+                                        "is video, usb, gpu, display, network, processes"));
 }
 
 TEST(Conform, LeavesNothingOfASinksFilesBehind) {

@@ -44,6 +44,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"hang_in_render", "never returns from render", "timeout", {"raytracer.render"}},
     {"exports_more", "exports a symbol of its own", "fail", {"abi.exports"}},
     {"id_unlike_file", "has another id than its file's name", "fail", {"abi.load"}},
+    {"needs_what_is_unknown", "needs what no sandbox can allow", "fail", {"abi.load"}},
     {"accepts_any_version", "accepts any ABI version", "fail", {"abi.negotiation"}},
     {"writes_past_short_answer", "writes past the end of a short answer", "fail", {"abi.negotiation"}},
     {"no_get_extension", "has no get_extension", "fail", {"abi.load"}},

@@ -30,6 +30,7 @@ inline const std::vector<WrongPlugin> wrong_sinks = of_kind(
         {"status_0", "returns 0 from write", "fail", {"sink.write"}},
         {"stop_fails", "stop fails for no reason", "fail", {"sink.start"}},
         {"idle_fails", "idle fails for no reason", "fail", {"sink.idle"}},
+        {"caches_beside_its_library", "writes a file beside its library", "fail", {"sink.start"}},
         {"refuses_odd_sizes_without_a_word", "refuses odd sizes without a word", "fail", {"sink.sizes"}},
         {"wants_every_number", "refuses gaps in the frames' numbers", "fail", {"sink.gaps"}},
         {"cancelled_is_internal", "write returns INTERNAL once cancelled", "fail", {"sink.cancelled"}},

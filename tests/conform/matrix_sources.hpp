@@ -31,6 +31,7 @@ inline const std::vector<WrongPlugin> wrong_sources = of_kind(
         {"no_yuv_matrix", "I420 without a matrix", "fail", {"source.start"}},
         {"own_stride", "rows without the ABI's stride", "fail", {"source.start"}},
         {"small_slot", "slots a line too small", "fail", {"source.start"}},
+        {"opens_a_socket", "opens a socket in start", "fail", {"source.start"}},
         {"starts_once",
          "can't be started a second time",
          "fail",

@@ -11,6 +11,7 @@ namespace {
 struct Own {
     std::string name, plugin;
     std::vector<std::string> settings;
+    std::string allow = "";
 };
 std::ostream &operator<<(std::ostream &stream, const Own &own) {
     return stream << own.name;
@@ -35,6 +36,8 @@ TEST_P(OwnPlugin, KeepsItsPromises) {
                                           "--json",     "results.json"};
     for (const std::string &setting : GetParam().settings)
         arguments.insert(arguments.end(), {"--set", setting});
+    if (!GetParam().allow.empty())
+        arguments.insert(arguments.end(), {"--allow", GetParam().allow});
     run.start(arguments);
     EXPECT_EQ(run.wait(std::chrono::minutes(3)), 0) << run.output();
     const nlohmann::json report = nlohmann::json::parse(run.read("results.json"));
@@ -50,13 +53,13 @@ INSTANTIATE_TEST_SUITE_P(
                     Own{"FilePicture", "source_file", {"path=in/00.png"}},
                     Own{"FileFilm", "source_file", {"path=in/a.mp4"}},
                     Own{"FileLoop", "source_file", {"path=in/a.mp4", "loop=true", "frames=30"}},
-                    Own{"Camera", "source_v4l2", {}}, Own{"Images", "sink_images", {"path=%03d.png"}},
+                    Own{"Camera", "source_v4l2", {}, "video"}, Own{"Images", "sink_images", {"path=%03d.png"}},
                     Own{"LastImage", "sink_images", {"path=last.jpg"}}, Own{"Film", "sink_video", {"path=film.mp4"}},
                     Own{"Mpeg4", "sink_video", {"path=film.mkv", "codec=mpeg4"}},
                     Own{"Poses", "sink_poses", {"path=poses.jsonl"}},
                     Own{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}},
                     Own{"Dissertation", "sink_trajectory", {"path=run.txt", "format=dissertation"}},
-                    Own{"Null", "sink_null", {}}, Own{"Window", "sink_window", {}}),
+                    Own{"Null", "sink_null", {}}, Own{"Window", "sink_window", {}, "display"}),
     [](const auto &info) { return info.param.name; });
 
 } // namespace

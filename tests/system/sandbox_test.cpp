@@ -5,11 +5,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 
 using namespace arhost::test;
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 namespace fs = std::filesystem;
@@ -21,22 +24,34 @@ constexpr std::uint64_t frames = 60, attacked = 20;
 class HostileRun : public ArhostRun {
 public:
     explicit HostileRun(const std::string &attack, const std::string &more = "", const std::string &settings = "")
-        : ArhostRun(
-              "version: 1\nsource: {plugin: source_counter, options: {frames: 60, delay_ms: 1}}\n"
-              "tracker: {plugin: hostile, markers: [{id: 3, side_mm: 80}], deadline_ms: 2000, options: {attack: " +
-              attack + "}" + more +
-              "}\nraytracer: {plugin: rt_counter, scene: scene.yaml}\n"
-              "outputs: [{plugin: sink_counter, path: out/counted.txt}]\nstats: stats.json\n" +
-              settings) {
+        : ArhostRun("version: 1\nsource: {plugin: source_counter, options: {frames: 60, delay_ms: 1}}\n"
+                    "tracker: {plugin: hostile, markers: [{id: 3, side_mm: 80}], deadline_ms: 2000, environment: "
+                    "[HOSTILE_HOST, HOSTILE_FOLDER], "
+                    "options: {attack: " +
+                    attack + "}" + more +
+                    "}\nraytracer: {plugin: rt_counter, scene: scene.yaml}\n"
+                    "outputs: [{plugin: sink_counter, path: out/counted.txt}]\nstats: stats.json\n" +
+                    settings) {
         write("scene.yaml", small_scene);
         fs::create_directories(path("out"));
         std::ofstream(target()) << "secret";
+        std::ofstream(target().string() + ".other") << "other";
+        listen(target().string() + ".socket", false);
+        listen(target().string() + ".socket", true);
     }
+    ~HostileRun() {
+        for (const int fd : listening_)
+            ::close(fd);
+    }
+    HostileRun(const HostileRun &) = delete;
+    HostileRun &operator=(const HostileRun &) = delete;
     fs::path target() const { return elsewhere_.path() / "target"; }
     std::string target_text() const { return read_file(target()); }
-    void start_it() {
-        start({"--config", "run.yaml"}, [this] {
-            ::setenv("HOSTILE_HOST", std::to_string(::getpid()).c_str(), 1);
+    // `victim` takes the place of the host, which could not tell how it was killed.
+    void start_it(pid_t victim = 0) {
+        start({"--config", "run.yaml"}, [this, victim] {
+            ::setenv("HOSTILE_HOST", std::to_string(victim ? victim : ::getpid()).c_str(), 1);
+            ::setenv("HOSTILE_SECRET", "sesame", 1);
             ::setenv("HOSTILE_FOLDER", elsewhere_.path().c_str(), 1);
         });
     }
@@ -46,7 +61,40 @@ public:
     }
 
 private:
+    void listen(const std::string &name, bool is_abstract) {
+        sockaddr_un address{AF_UNIX, {}};
+        std::copy(name.begin(), name.end(), address.sun_path + is_abstract);
+        const int fd = listening_.emplace_back(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+        EXPECT_EQ(::bind(fd, reinterpret_cast<sockaddr *>(&address),
+                         static_cast<socklen_t>(sizeof address.sun_family + name.size() + 1)),
+                  0);
+        ::listen(fd, 1);
+    }
+
     ScratchFolder elsewhere_;
+    std::vector<int> listening_;
+};
+
+// A process that only waits; whatever becomes of it.
+class Victim {
+public:
+    Victim() : pid_(::fork()) {
+        if (pid_ != 0)
+            return;
+        ::prctl(PR_SET_PTRACER, PR_SET_PTRACER_ANY, 0, 0, 0); // whatever Yama says
+        for (;;)
+            ::pause();
+    }
+    ~Victim() {
+        ::kill(pid_, SIGKILL);
+        ::waitpid(pid_, nullptr, 0);
+    }
+    Victim(const Victim &) = delete;
+    Victim &operator=(const Victim &) = delete;
+    pid_t pid() const { return pid_; }
+
+private:
+    pid_t pid_;
 };
 
 // Every frame is there once and in order, and each overlay is its own; only that of the attack may lack.
@@ -106,14 +154,32 @@ void expect_ended(HostileRun &run, const std::string &reason) {
 
 } // namespace
 
-// Without this, the tests below could pass because their plugin tries nothing.
-TEST(Sandbox, WithoutItTheSameAttacksSucceed) {
-    for (const char *attack : {"read", "write", "sockets", "processes"}) {
-        HostileRun run(attack, "", "sandbox: none\n");
-        run.attack();
-        EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED")) << attack;
-    }
+// Without this, the tests below could pass because their plugin tries nothing, or what can't succeed anyway.
+class WithoutSandbox : public testing::TestWithParam<std::string> {};
+
+TEST_P(WithoutSandbox, TheSameAttackSucceeds) {
+    HostileRun run(GetParam(), "", "sandbox: none\n");
+    const Victim victim;
+    run.start_it(victim.pid());
+    run.wait();
+    EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
+    // What takes more than an ordinary user's rights, or a kernel that has it.
+    const auto is_rare = [](const std::string &line) {
+        const std::initializer_list<const char *> rare = {
+            "the passwords", "packets", "virtual machines", "launcher", "/dev/", "/run: ", "/: "};
+        return ::geteuid() != 0 && std::any_of(rare.begin(), rare.end(), [&](const char *what) {
+                   return line.find(what) != std::string::npos;
+               });
+    };
+    std::istringstream lines(run.output());
+    for (std::string line; std::getline(lines, line);)
+        EXPECT_TRUE(line.find(": stopped") == std::string::npos || is_rare(line)) << line;
 }
+
+INSTANTIATE_TEST_SUITE_P(Sandbox, WithoutSandbox,
+                         testing::Values("read", "write", "devices", "environment", "sockets", "processes", "trace",
+                                         "signal", "memory", "disk", "descriptors"),
+                         [](const auto &info) { return info.param; });
 
 TEST(Sandbox, NoFileOutsideTheListIsRead) {
     REQUIRE_LAYER("landlock");
@@ -128,6 +194,19 @@ TEST(Sandbox, NothingIsWritten) {
     expect_stopped(run);
     HostileRun disk("disk");
     expect_stopped(disk);
+}
+
+TEST(Sandbox, NoDeviceIsOpened) {
+    if (!has("landlock"))
+        REQUIRE_LAYER("mount");
+    HostileRun run("devices");
+    expect_stopped(run);
+}
+
+TEST(Sandbox, NoSecretOfTheEnvironmentIsRead) {
+    REQUIRE_LAYER("landlock"); // the launcher's is in /proc
+    HostileRun run("environment");
+    expect_stopped(run);
 }
 
 TEST(Sandbox, NoSocketIsOpened) {
@@ -162,7 +241,7 @@ TEST(Sandbox, MemoryEndsAtItsLimit) {
     REQUIRE_NO_SANITIZER();
     HostileRun run("memory", ", memory_mb: 300");
     ASSERT_EQ(run.attack(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("a GiB: stopped"));
+    EXPECT_THAT(run.output(), HasSubstr("half a GiB: stopped"));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
     expect_whole_video(run);
 }
@@ -267,6 +346,25 @@ TEST(Sandbox, WhatAPluginNeedsMustBeAllowed) {
     EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "sandbox=none"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
+}
+
+TEST(Sandbox, WarnsOfAnOutputThatMayWriteInAllOfTheWorkingDirectory) {
+    ArhostRun run(counting("lockstep", "frames: 3", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:40: outputs[0].path: 'sink_counter' can write all of '"));
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "outputs[0].path=out/counted.txt"}), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("can write all of")));
+}
+
+TEST(Sandbox, ALibraryThatLiesElsewhereIsGivenByReads) {
+    REQUIRE_LAYER("landlock");
+    ArhostRun run;
+    run.run({"plugins"});
+    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +can't be used: .*cannot open shared object file.*"
+                                            "'--reads FOLDER' of plugins and conform"));
+    run.run({"plugins", "--reads", ARHOST_BINARY_DIRECTORY "/tests/elsewhere"});
+    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +can't be used: .*exports no symbol 'arhost_entry'"));
 }
 
 TEST(Sandbox, AllowsOnlyWhatThereIs) {

@@ -437,6 +437,30 @@ TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
     EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
 }
 
+// Its workers die with it, the output in the midst of a file; all start again under the one that stood by.
+TEST(Supervision, AKilledLauncherIsReplaced) {
+    ArhostRun run(counting("lockstep", "frames: 120, delay_ms: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    wait_for_frames(run, 20);
+    ::kill(run.launcher(), SIGKILL);
+    ASSERT_EQ(run.wait(std::chrono::seconds(30)), 0) << run.output();
+    expect_all_frames_in_order(run, 120);
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
+}
+
+TEST(Supervision, WithoutAnyLauncherTheRunEnds) {
+    ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start();
+    for (const std::size_t frames : {20, 60}) {
+        wait_for_frames(run, frames);
+        ::kill(run.launcher(), SIGKILL);
+    }
+    EXPECT_EQ(run.wait(std::chrono::seconds(30)), 1);
+    EXPECT_THAT(run.output(), HasSubstr("the launcher is gone"));
+}
+
 TEST(Supervision, OnlySourcesAndOutputsMayEndTheRun) {
     for (const char *status : {"2", "3", "4"}) {
         ArhostRun run(counting("lockstep", "frames: 30", "", std::string("answer: ") + status,

@@ -16,12 +16,13 @@
 
 namespace arhost::test {
 
+inline std::filesystem::path own_file() {
+    Dl_info info{};
+    ::dladdr(&arhost_entry, &info);
+    return info.dli_fname;
+}
 inline const std::string &own_name() {
-    static const std::string name = [] {
-        Dl_info info{};
-        ::dladdr(&arhost_entry, &info);
-        return std::filesystem::path(info.dli_fname).stem().string();
-    }();
+    static const std::string name = own_file().stem().string();
     return name;
 }
 

@@ -438,6 +438,9 @@ const arhost_plugin &spoilt_plugin() {
         options[0].default_value = "65";
     if (has("no_licence"))
         descriptor.licence = "";
+    static constexpr const char *unknown[] = {"bluetooth", nullptr};
+    if (has("needs_what_is_unknown"))
+        descriptor.needs = unknown;
     if (has("other_kinds_capability"))
         descriptor.capabilities |= ARHOST_IS_LIVE;
     if (has("unknown_capability"))

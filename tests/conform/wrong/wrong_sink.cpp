@@ -74,6 +74,8 @@ public:
             throw Failure(ARHOST_ERROR_IO, "the file is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
             throw Failure(ARHOST_ERROR_INTERNAL, "what now?");
+        if (has("caches_beside_its_library"))
+            put(own_file().replace_extension(".cache"), "sizes", O_TRUNC);
         if (has("refuses_odd_sizes_without_a_word") && setup.width % 2)
             throw Failure(ARHOST_ERROR_UNSUPPORTED, "");
         if (has("leaks_descriptors_in_start"))

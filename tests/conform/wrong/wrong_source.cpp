@@ -4,9 +4,11 @@
 // this library's file name tells.
 #include "defect.hpp"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <sys/socket.h>
 #include <thread>
 
 namespace {
@@ -45,6 +47,12 @@ public:
         }
         if (has("one_rate_alone") && setup.fps > 0 && setup.fps != 25)
             throw Failure(ARHOST_ERROR_UNSUPPORTED, "it has 25 frames a second");
+        if (has("opens_a_socket")) {
+            const int fd = ::socket(AF_INET, SOCK_DGRAM, 0);
+            if (fd < 0)
+                throw Failure(ARHOST_ERROR_IO, std::string("no socket: ") + std::strerror(errno));
+            ::close(fd);
+        }
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
         given_ = 0;

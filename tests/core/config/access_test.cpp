@@ -88,6 +88,25 @@ TEST_F(Access, IsWidenedByKeys) {
     EXPECT_THAT(policy.writable, ElementsAre("/var/x"));
 }
 
+TEST_F(Access, OfTheEnvironmentIsByName) {
+    EXPECT_THAT(of("{plugin: p, environment: [LICENCE_FILE]}", false).environment, ElementsAre("LICENCE_FILE"));
+    EXPECT_THROW(of("{plugin: p, environment: [LICENCE_FILE=/x]}", false), Error);
+}
+
+TEST_F(Access, ToAHomeOrTheWorkingDirectoryIsWarnedOf) {
+    const auto warning = [&](const std::string &path) {
+        std::ofstream(folder / "run.yaml") << "path: " << path;
+        return warning_of_output(Node::load(folder / "run.yaml").require("path"), "my_sink");
+    };
+    const std::string home = fs::canonical(std::getenv("HOME")).string();
+    EXPECT_THAT(warning(home + "/film.mp4"),
+                HasSubstr("run.yaml:1:7: path: 'my_sink' can write all of '" + home + "'"));
+    EXPECT_THAT(warning("film.mp4"), HasSubstr("give it a folder of its own, as in 'path: output/film.mp4'"));
+    EXPECT_THAT(warning("/film.mp4"), HasSubstr("all of '/'"));
+    EXPECT_EQ(warning("out/film.mp4"), "");
+    EXPECT_EQ(warning((folder / "film.mp4").string()), "");
+}
+
 TEST_F(Access, ToUnknownThingsIsAnError) {
     try {
         of("{plugin: p, allow: [everything]}", false);

@@ -104,6 +104,38 @@ TEST_F(Sandbox, NamespacesLeaveNothingWritableButTheFolders) {
     }));
 }
 
+TEST_F(Sandbox, NamespacesLeaveNoDevicesButThoseOfTheList) {
+    EXPECT_CHECKS(in_child([&] {
+        if (!opens("/dev/ptmx", O_RDWR | O_NOCTTY) ||
+            enter_namespaces(policy).reached.find("mount") == std::string::npos)
+            return layer_is_missing;
+        Checks check;
+        check.that(!opens("/dev/ptmx", O_RDWR | O_NOCTTY));
+        check.that(opens("/dev/null", O_RDWR));
+        check.that(opens("/dev/urandom", O_RDONLY));
+        check.that(opens("/dev/zero", O_RDONLY));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, OfTheEnvironmentTheUsualIsLeftAndWhatIsGiven) {
+    EXPECT_EQ(in_child([&] {
+                  for (const char *variable : {"A_TOKEN", "NVIDIA_API_KEY", "GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME"})
+                      ::setenv(variable, "value", 1);
+                  policy.environment = {"GIVEN"};
+                  char *const secret = ::getenv("A_TOKEN");
+                  drop_environment(policy);
+                  Checks check;
+                  check.that(!::getenv("A_TOKEN"));
+                  check.that(*secret == '\0');
+                  check.that(!::getenv("NVIDIA_API_KEY"));
+                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "PATH"})
+                      check.that(::getenv(variable));
+                  return check.result();
+              }),
+              0);
+}
+
 TEST_F(Sandbox, NamespacesKeepTheWorkingDirectoryWritableWhereItIsOne) {
     EXPECT_CHECKS(in_child([&] {
         fs::current_path(inside);
@@ -273,6 +305,9 @@ TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
                   while (held < 2000 && ::open("/dev/null", O_RDONLY) >= 0)
                       ++held;
                   check.that(held < 512);
+                  rlimit priority{1, 1};
+                  ::getrlimit(RLIMIT_RTPRIO, &priority);
+                  check.that(priority.rlim_max == 0);
                   return check.result();
               }),
               0);
@@ -346,11 +381,13 @@ TEST_F(Sandbox, PoliciesTravelAsJson) {
     policy.mode = Mode::strict;
     policy.allow = {"gpu", "video"};
     policy.readable = {"/a", "/b"};
+    policy.environment = {"GIVEN"};
     policy.memory_bytes = 1ull << 40;
     policy.makes_shared_memory = true;
     const Policy read = policy_from_json(to_json(policy));
     EXPECT_EQ(to_json(read), to_json(policy));
     EXPECT_EQ(read.writable, policy.writable);
+    EXPECT_EQ(read.environment, policy.environment);
     EXPECT_TRUE(read.allows("gpu"));
     EXPECT_FALSE(read.allows("network"));
     EXPECT_THROW(policy_from_json({{"mode", 1}}), nlohmann::json::exception);

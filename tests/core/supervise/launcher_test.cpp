@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <fstream>
 #include <poll.h>
 #include <sys/wait.h>
 
@@ -51,6 +52,22 @@ TEST(Launcher, SaysSoWhereTheProgramIsMissing) {
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 127);
     EXPECT_NE(all_output(spawned).find("can't be executed"), std::string::npos);
+}
+
+TEST(Launcher, HasAnotherThatStandsBy) {
+    Launcher launcher;
+    const Spawned first = launcher.spawn("/usr/bin/yes");
+    std::ifstream status("/proc/" + std::to_string(first.pid) + "/status");
+    pid_t parent = 0;
+    for (std::string key; status >> key && key != "PPid:";) {
+    }
+    status >> parent;
+    ::kill(parent, SIGKILL);
+    wait_dead(first);
+    const Spawned second = launcher.spawn("/bin/true");
+    EXPECT_EQ(WTERMSIG(launcher.wait_exit(first.pid).wait_status), SIGKILL);
+    wait_dead(second);
+    EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(second.pid).wait_status), 0);
 }
 
 TEST(Launcher, TakesItsChildrenAlongWhenItEnds) {

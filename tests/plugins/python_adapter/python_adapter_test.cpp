@@ -82,7 +82,7 @@ class Tracker:
     ASSERT_EQ(lines.size(), 6u);
     for (std::size_t i = 0; i < lines.size(); ++i)
         EXPECT_EQ(lines[i].overlay, std::to_string(i));
-    EXPECT_THAT(run.output(), Not(HasSubstr("warning")));
+    EXPECT_THAT(run.output(), Not(HasSubstr("warning: tracker")));
 }
 
 TEST_F(PythonAdapter, RayTracerReadsTheSceneAndWritesTheImage) {

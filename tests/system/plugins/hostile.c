@@ -68,30 +68,58 @@ static void read_files(const tracker *self) {
     tell(self, "the host's addresses", opens(file, O_RDONLY));
 }
 
+/* Each on names of its own, so that one that succeeds does not stop the next. */
 static void write_files(const tracker *self) {
     char other[1100];
-    snprintf(other, sizeof other, "%s.new", self->target);
-    tell(self, "a new file", opens(other, O_WRONLY | O_CREAT));
     tell(self, "an old file", opens(self->target, O_WRONLY));
-    tell(self, "truncate", truncate(self->target, 0) == 0);
     tell(self, "chmod", chmod(self->target, 0777) == 0);
     tell(self, "chown", chown(self->target, getuid(), getgid()) == 0);
-    tell(self, "rename", rename(self->target, other) == 0);
-    tell(self, "link", link(self->target, other) == 0);
-    tell(self, "symlink", symlink(self->target, other) == 0);
-    tell(self, "mkdir", mkdir(other, 0700) == 0);
-    tell(self, "mkfifo", mkfifo(other, 0600) == 0);
-    tell(self, "unlink", unlink(self->target) == 0);
+    tell(self, "truncate", truncate(self->target, 0) == 0);
+    tell(self, "a new file", opens(strcat(strcpy(other, self->target), ".new"), O_WRONLY | O_CREAT));
+    tell(self, "link", link(self->target, strcat(strcpy(other, self->target), ".link")) == 0);
+    tell(self, "symlink", symlink(self->target, strcat(strcpy(other, self->target), ".symlink")) == 0);
+    tell(self, "mkdir", mkdir(strcat(strcpy(other, self->target), ".folder"), 0700) == 0);
+    tell(self, "mkfifo", mkfifo(strcat(strcpy(other, self->target), ".pipe"), 0600) == 0);
+    tell(self, "rename", rename(self->target, strcat(strcpy(other, self->target), ".renamed")) == 0);
+    tell(self, "unlink", unlink(strcat(strcpy(other, self->target), ".other")) == 0);
 }
 
-static int connects(const char *path, size_t length) {
+/* Those that there are here. */
+static void open_devices(const tracker *self) {
+    const char *const devices[] = {"/dev/ptmx", "/dev/kmsg", "/dev/fuse", "/dev/mem", "/dev/loop0", "/dev/video0"};
+    size_t i;
+    for (i = 0; i < sizeof devices / sizeof *devices; ++i)
+        if (access(devices[i], F_OK) == 0)
+            tell(self, devices[i], opens(devices[i], O_RDONLY | O_NOCTTY));
+}
+
+static int file_has(const char *file, const char *text) {
+    static char bytes[1 << 16];
+    const int fd = open(file, O_RDONLY | O_CLOEXEC);
+    const ssize_t size = fd < 0 ? 0 : read(fd, bytes, sizeof bytes);
+    if (fd >= 0)
+        close(fd);
+    return size > 0 && memmem(bytes, (size_t)size, text, strlen(text)) != NULL;
+}
+
+static void read_environment(const tracker *self) {
+    char file[64];
+    errno = ENOENT;
+    tell(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
+    tell(self, "where it was in memory", file_has("/proc/self/environ", "HOSTILE_SECRET="));
+    snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
+    tell(self, "the launcher's", file_has(file, "HOSTILE_SECRET="));
+}
+
+/* The test listens on both kinds of name. */
+static int connects(const tracker *self, int is_abstract) {
     struct sockaddr_un address = {AF_UNIX, {0}};
     const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
-    int result;
+    int length, result;
     if (fd < 0)
         return 0;
-    memcpy(address.sun_path, path, length);
-    result = connect(fd, (struct sockaddr *)&address, (socklen_t)(sizeof(sa_family_t) + length));
+    length = snprintf(address.sun_path + is_abstract, sizeof address.sun_path - 1, "%s.socket", self->target);
+    result = connect(fd, (struct sockaddr *)&address, (socklen_t)(sizeof(sa_family_t) + (size_t)(length + 1)));
     close(fd);
     return result == 0;
 }
@@ -104,8 +132,8 @@ static void open_sockets(const tracker *self) {
     tell(self, "packets", socket(AF_PACKET, SOCK_RAW, 0) >= 0);
     tell(self, "virtual machines", socket(AF_VSOCK, SOCK_STREAM, 0) >= 0);
     tell(self, "a family with upper bits", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
-    tell(self, "a path", connects(self->target, strlen(self->target) + 1));
-    tell(self, "an abstract name", connects("\0hostile", 8));
+    tell(self, "a path", connects(self, 0));
+    tell(self, "an abstract name", connects(self, 1));
     tell(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
 }
 
@@ -150,7 +178,7 @@ static void signal_host(const tracker *self) {
     CPU_ZERO(&processor);
     CPU_SET(0, &processor);
     tell(self, "kill", kill(host_pid(), SIGKILL) == 0);
-    tell(self, "kill the launcher", kill(getppid(), SIGKILL) == 0);
+    tell(self, "reach the launcher", kill(getppid(), 0) == 0); /* which would take this one along */
     tell(self, "reach all", kill(-1, 0) == 0);
     tell(self, "join the host's group", setpgid(0, getpgid(host_pid())) == 0);
     tell(self, "tkill", syscall(SYS_tkill, host_pid(), SIGKILL) == 0);
@@ -172,7 +200,7 @@ static void *wait_for_ever(void *nothing) {
 }
 
 static void fill_memory(const tracker *self) {
-    enum { step = 16 << 20, most = 1024 };
+    enum { step = 16 << 20, most = 512 };
     size_t taken = 0;
     pthread_t thread;
     int fd, threads = 0;
@@ -183,7 +211,7 @@ static void fill_memory(const tracker *self) {
         memset(bytes, 1, step);
         taken += step >> 20;
     }
-    tell(self, "a GiB", taken >= most);
+    tell(self, "half a GiB", taken >= most);
     tell(self, "shared", mmap(NULL, step, PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
     tell(self, "a stack",
          mmap(NULL, (size_t)400 << 20, PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0) != MAP_FAILED);
@@ -214,10 +242,14 @@ static void fill_disk(const tracker *self) {
 /* As many as there are, and as many again in messages that nobody takes. */
 static void hold_descriptors(const tracker *self) {
     enum { pairs = 20 };
+    struct rlimit limit;
     int held = 0, under_way = 0, pair[pairs][2], i, fd;
+    getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = limit.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &limit);
     for (i = 0; i < pairs; ++i)
         (void)!socketpair(AF_UNIX, SOCK_STREAM, 0, pair[i]);
-    while (held < 100000 && (fd = open("/dev/null", O_RDONLY)) >= 0)
+    while (held < 5000 && (fd = open("/dev/null", O_RDONLY)) >= 0)
         ++held;
     tell(self, "more than 1024", held > 1024);
     for (i = 0; i < pairs;) {
@@ -303,6 +335,10 @@ static void attack(const tracker *self) {
         read_files(self);
     else if (!strcmp(name, "write"))
         write_files(self);
+    else if (!strcmp(name, "devices"))
+        open_devices(self);
+    else if (!strcmp(name, "environment"))
+        read_environment(self);
     else if (!strcmp(name, "sockets"))
         open_sockets(self);
     else if (!strcmp(name, "processes"))

@@ -130,14 +130,16 @@ pub trait Sink: Plugin {
 ///     options: [
 ///         option!(ARHOST_OPTION_INTEGER, "every", "1", "Counts each so-many-th.", 1.0, 1e6),
 ///         option!(ARHOST_OPTION_OUTPUT_PATH, "path", required, "The file to write."),
-///     ]
+///     ],
+///     needs: ["gpu"] // what the sandbox must allow (arhost/plugin.h); may be left out
 /// }
 /// ```
 #[macro_export]
 macro_rules! plugin {
     ($kind:ident $type:ty, $id:literal, $description:literal, capabilities: $capabilities:expr,
-     options: [$($option:expr),* $(,)?]) => {
+     options: [$($option:expr),* $(,)?] $(, needs: [$($need:literal),* $(,)?])? $(,)?) => {
         const _: () = {
+            const NEEDS: &[*const std::os::raw::c_char] = &[$($($crate::c_text!($need),)*)? std::ptr::null()];
             const OPTIONS: &[$crate::arhost_option_descriptor] = &[$($option),*];
             static DESCRIPTOR: $crate::arhost_descriptor = $crate::arhost_descriptor {
                 struct_size: std::mem::size_of::<$crate::arhost_descriptor>() as u32,
@@ -151,7 +153,7 @@ macro_rules! plugin {
                 capabilities: $capabilities,
                 option_count: OPTIONS.len() as u32,
                 options: OPTIONS.as_ptr(),
-                needs: std::ptr::null(),
+                needs: NEEDS.as_ptr(),
             };
             static FUNCTIONS: $crate::table::$kind = $crate::$kind::<$type>();
             static PLUGIN: $crate::arhost_plugin = $crate::plugin_of::<$type>(

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Variables of the environment: tokens and keys are kept there, and libraries and drivers read many others.
+#include "sandbox/layers.hpp"
+
+#include <algorithm>
+#include <fnmatch.h>
+#include <unistd.h>
+
+namespace arhost::sandbox {
+namespace {
+
+// What is read by what plugins are linked with, and is no secret; with wildcards only where none has such a name.
+constexpr const char *kept[] = {
+    // the user and the system
+    "HOME", "LANG", "LANGUAGE", "LC_*", "LD_*", "LOGNAME", "PATH", "SHELL", "TERM", "TMPDIR", "TZ", "TZDIR", "USER",
+    "XDG_*_DIR", "XDG_*_DIRS", "XDG_*_HOME", "XDG_CURRENT_DESKTOP", "XDG_SESSION_TYPE", "GLIBC_TUNABLES", "MALLOC_*",
+    "SSL_CERT_DIR", "SSL_CERT_FILE",
+    // windows
+    "DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY", "XLOCALEDIR", "GDK_*", "QT_*", "SDL_*",
+    // GPUs, and what stands in for them
+    "VK_*", "MESA_*", "LIBGL_*", "GALLIUM_*", "LP_*", "EGL_*", "GBM_*", "DRI_*", "__EGL_*", "__GL*", "__NV_*",
+    "__VK_*", "RADV_*", "ACO_*", "AMD_DEBUG", "ANV_*", "INTEL_DEBUG", "ZINK_*", "LIBVA_*", "VDPAU_*", "CUDA_*",
+    "NVIDIA_DRIVER_CAPABILITIES", "NVIDIA_VISIBLE_DEVICES", "OPTIX_*", "OCL_*", "ROCR_VISIBLE_DEVICES",
+    "HIP_VISIBLE_DEVICES", "HSA_*",
+    // computing
+    "OMP_*", "GOMP_*", "KMP_*", "MKL_*", "OPENBLAS_*", "TBB_*", "EMBREE_*", "OPENCV_*", "HWY_*",
+    // languages and their tools
+    "PYTHON*", "VIRTUAL_ENV", "CONDA_PREFIX", "RUST_BACKTRACE", "RUST_LOG", "ASAN_*", "LSAN_*", "MSAN_*", "TSAN_*",
+    "UBSAN_*", "LLVM_PROFILE_FILE", "GCOV_*",
+    // arhost's own
+    "ARHOST_*"};
+
+bool is_kept(const Policy &policy, std::string_view entry) {
+    const std::string name(entry.substr(0, entry.find('=')));
+    return policy.environment.contains(name) ||
+           std::any_of(std::begin(kept), std::end(kept),
+                       [&](const char *pattern) { return ::fnmatch(pattern, name.c_str(), 0) == 0; });
+}
+
+} // namespace
+
+void drop_environment(const Policy &policy) {
+    char **next = environ;
+    for (char **entry = environ; entry && *entry; ++entry)
+        if (is_kept(policy, *entry))
+            *next++ = *entry;
+        else
+            ::explicit_bzero(*entry, std::strlen(*entry)); // this very memory is what /proc/self/environ shows
+    if (next)
+        *next = nullptr;
+}
+
+} // namespace arhost::sandbox
