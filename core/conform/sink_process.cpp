@@ -55,8 +55,8 @@ std::span<const Test> helper_tests() {
 
 SinkProcess::SinkProcess(Context &context, const Work &work) {
     PluginLibrary &library = context.library;
-    std::vector<std::string> arguments = {"arhost-conform", library.file(), "--run",     helper, "--scratch",
-                                          library.scratch(), "--sandbox",   "none" /* it is in this one's */};
+    std::vector<std::string> arguments = {"arhost-conform",  library.file(), "--run", helper, "--scratch",
+                                          library.scratch(), "--sandbox",    "none" /* it is in this one's */};
     for (const auto &[key, value] : library.settings())
         arguments.insert(arguments.end(), {"--set", key + "=" + value});
     std::vector<char *> argv;

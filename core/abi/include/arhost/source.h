@@ -52,9 +52,9 @@ typedef struct arhost_frame_buffer {
 typedef struct arhost_frame_info {
     uint32_t struct_size;
     arhost_clock clock; /* must be set, to the same for all frames */
-    /* Never smaller than that of the frame before; of ARHOST_CLOCK_MONOTONIC never in the future: a frame of more than
-     * a second ahead is refused, and the source is started anew. Where the format tells fps, frames are about 1/fps
-     * apart on the mean, the skipped ones counted; live ones may be slower. */
+    /* Never smaller than that of the frame before; of ARHOST_CLOCK_MONOTONIC never in the future: a frame of more
+     * than a second ahead is refused, and the source is started anew. Where the format tells fps, frames are about
+     * 1/fps apart on the mean, the skipped ones counted; live ones may be slower. */
     int64_t capture_ns;
     uint32_t skipped;   /* frames that the device lost since the one before */
     int32_t has_grey;   /* non-zero: `grey` has been written */
