@@ -13,11 +13,11 @@
 
 namespace arhost::conform {
 
-// Sorted, in ms, of 100 calls of `frame`, or of as many as take 3 s, but of 11 at least; and until it returns false.
+// Sorted, in ms, of 100 calls of `frame`, or of as many as take 1 s, but of 11 at least; and until it returns false.
 template <class Frame> std::vector<double> frame_times_ms(Frame &&frame) {
     using Clock = std::chrono::steady_clock;
     constexpr std::size_t least = 11, most = 100;
-    constexpr auto enough = 3s;
+    constexpr auto enough = 1s;
     std::vector<double> ms;
     const auto first = Clock::now();
     while (ms.size() < most && (ms.size() < least || Clock::now() - first < enough)) {

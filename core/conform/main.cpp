@@ -52,11 +52,12 @@ struct PolicyOptions {
 
     void add_to(CLI::App &app) {
         const auto add = [&](const char *name, std::vector<std::string> &values, const char *what) {
-            return app.add_option(name, values, what)->delimiter(',')->allow_extra_args(false);
+            return app.add_option(name, values, what)->allow_extra_args(false);
         };
         const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
         add("--allow", allow, "What the sandbox gives it, as a configuration's 'allow' (docs/security.md)")
             ->type_name("WHAT")
+            ->delimiter(',')
             ->check(CLI::IsMember(known));
         add("--reads", reads, "A further file or folder that it may read (again for more)")->type_name("PATH");
         add("--environment", environment, "A further variable that it gets (again for more)")->type_name("NAME");

@@ -41,8 +41,8 @@ void work(Context &context) {
         if (::write(result_fd, ".", 1) != 1)
             break;
     }
-    for (;;) // what is not on the disk yet will never be
-        ::pause();
+    while (std::cin.get() != EOF) { // what is not on the disk yet will never be; at the end the suite itself is gone
+    }
 }
 
 constexpr Test helpers[] = {{helper, "It writes frames until it is killed.", ARHOST_KIND_SINK, "", 60s, work}};
@@ -83,19 +83,26 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
         ::execv("/proc/self/exe", argv.data());
         ::_exit(127);
     }
+    orders_ = std::move(orders.write_end);
     written_ = std::move(written.read_end);
     const std::string order =
         fmt::format("{} {} {} {}\n", work.frames, work.size.width, work.size.height, work.folder);
-    if (::write(orders.write_end.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
+    if (::write(orders_.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
         ring::throw_errno("write to the sink's process");
 }
 
 void SinkProcess::wait_until_written(std::uint64_t frames) {
-    char byte = 0;
-    while (count_ < frames && ::read(written_.get(), &byte, 1) == 1 && byte == '.')
-        ++count_;
-    if (count_ < frames)
-        throw Failure(fmt::format("in a process of its own it gave up after {} frames", count_));
+    std::string result; // comes after the last frame's byte
+    for (char byte = 0; count_ < frames && ::read(written_.get(), &byte, 1) == 1;)
+        if (byte == '.' && result.empty())
+            ++count_;
+        else
+            result += byte;
+    if (count_ == frames)
+        return;
+    const ring::Json told = ring::Json::parse(result, nullptr, false);
+    throw Failure(fmt::format("in a process of its own it gave up after {} frames: {}", count_,
+                              told.is_object() ? told.value("message", "") : "the process ended"));
 }
 
 void SinkProcess::kill() {

@@ -29,7 +29,7 @@ public:
 
 private:
     pid_t pid_ = 0; // 0: reaped
-    ring::UniqueFd written_;
+    ring::UniqueFd orders_, written_; // while the former is open, it stays
     std::uint64_t count_ = 0;
 };
 

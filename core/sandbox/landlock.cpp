@@ -118,6 +118,8 @@ Layer enter_landlock(const Policy &policy) {
         layer.reached += ", TCP";
     if (attributes.scoped)
         layer.reached += ", signals";
+    else if (may_start_processes(policy)) // others are kept from signals by the filter of system calls
+        layer.lacks = "signals to processes that are not its own, which need version 6";
     return layer;
 }
 

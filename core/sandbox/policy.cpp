@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sandbox/layers.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <glob.h>
 #include <sstream>
@@ -115,11 +116,18 @@ Paths paths_of(const Policy &policy) {
 bool let_read(Policy &policy, const fs::path &file) {
     std::error_code ignored;
     const auto type = fs::status(file, ignored).type();
+    if (type != fs::file_type::regular && type != fs::file_type::directory && type != fs::file_type::fifo)
+        return false;
     const char *home = std::getenv("HOME");
     const fs::path real = fs::weakly_canonical(file, ignored);
-    if ((type != fs::file_type::regular && type != fs::file_type::directory && type != fs::file_type::fifo) ||
-        real == "/" || (home && real == fs::weakly_canonical(home, ignored)))
+    const auto holds = [](const fs::path &folder, const fs::path &path) {
+        return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
+    };
+    if (home && holds(real, fs::weakly_canonical(home, ignored)))
         return false;
+    for (const char *kernels : {"/dev", "/proc", "/sys"})
+        if (holds(real, kernels) || (holds(kernels, real) && !holds("/dev/shm", real)))
+            return false;
     policy.readable.push_back(file);
     return true;
 }

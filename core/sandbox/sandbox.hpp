@@ -38,8 +38,8 @@ struct Policy {
     bool allows(std::string_view what) const { return allow.contains(what); }
 };
 
-// Lets a file or folder be read that stands as a value somewhere: not one that is not there, a device, everything
-// or a whole home, which are for other keys to give. False: it does not. Absolute.
+// Lets a file or folder be read that stands as a value somewhere: not one that is not there, what holds the whole
+// home, devices or what is the kernel's, which are for other keys to give. False: it does not. Absolute.
 bool let_read(Policy &policy, const std::filesystem::path &file);
 // The same, and of a printf pattern (frame-%04d.png) the folder.
 void let_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);

@@ -97,6 +97,8 @@ void deny_reaching_others(Filter &filter, bool has_children) {
             filter.deny(call, {differs(0, self)});
         for (const char *call : {"setpgid", "setsid"}) // into the group that a signal to a group then meets
             filter.deny(call);
+    } else {
+        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: everybody. Single others are Landlock's part
     }
     // 0 is the caller. Their limits, priority and processors are all open to whoever has the same user.
     for (const char *call :

@@ -103,16 +103,21 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     send_struct(socket, reply, {pidfd.get()});
 }
 
-// Kills every child that is no worker: the launcher is the subreaper, so what a worker leaves behind comes here,
-// and what that has left behind with the next call.
-void kill_orphans(const std::set<pid_t> &workers) {
+// Kills every child that is not to be kept, and tells how many there were: a launcher is a subreaper, so what a worker
+// leaves behind comes here, and what that has left behind with the next call.
+int kill_orphans(const std::set<pid_t> &kept) {
+    int count = 0;
     std::ifstream children("/proc/thread-self/children");
     for (pid_t child; children >> child;) {
         siginfo_t info{}; // a number of another pid namespace's /proc is no child of ours
-        if (!workers.contains(child) &&
-            ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0)
+        if (!kept.contains(child) &&
+            ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0) {
             ::kill(child, SIGKILL);
+            ::waitpid(child, nullptr, WNOHANG); // or with a later call
+            ++count;
+        }
     }
+    return count;
 }
 
 // The host is gone: so are the workers in a moment, and so must be what they have started.
@@ -138,7 +143,7 @@ void reap(int socket, std::set<pid_t> &spawned) {
         reply.kind = Reply::exited;
         reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
         if (reply.exit.pid <= 0)
-            return kill_orphans(spawned);
+            return (void)kill_orphans(spawned);
         if (spawned.erase(reply.exit.pid) == 0)
             continue;                     // the orphan of a worker
         ::kill(-reply.exit.pid, SIGKILL); // what it has forked; kill_orphans finds what has left its group
@@ -206,6 +211,7 @@ double cpu_seconds(const rusage &usage) {
 }
 
 Launcher::Launcher() {
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1);
     for (int i = 0; i < 2; ++i)
         sides_.push_back(fork_one());
 }
@@ -233,6 +239,12 @@ bool Launcher::go_on_with_the_next() {
     ::kill(sides_.front().pid, SIGKILL); // should only its socket be shut; its workers die with it
     ::waitpid(sides_.front().pid, nullptr, 0);
     sides_.pop_front();
+    // Its workers die with it; what they have forked does not, and is this process's now, the next subreaper.
+    std::set<pid_t> launchers;
+    for (const Side &side : sides_)
+        launchers.insert(side.pid);
+    for (int i = 0; i < 500 && kill_orphans(launchers) > 0; ++i) // not for ever: one may hang in the kernel
+        ::usleep(1000);
     alive_.clear();
     return true;
 }
@@ -253,22 +265,24 @@ Spawned Launcher::spawn(const std::filesystem::path &program) {
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());
 
-    Spawned spawned;
-    ring::Channel mine, theirs;
-    std::tie(mine, theirs) = ring::Channel::make_pair();
-    ring::DoorbellPair doorbell = ring::make_doorbell();
-    int pipe_ends[2];
-    if (::pipe2(pipe_ends, O_CLOEXEC) != 0)
-        ring::throw_errno("pipe for a worker's output");
-    spawned.output.reset(pipe_ends[0]);
-    const UniqueFd output_end(pipe_ends[1]);
-    ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
-
     for (;;) {
+        Spawned spawned;
+        ring::Channel mine, theirs;
+        std::tie(mine, theirs) = ring::Channel::make_pair();
+        ring::DoorbellPair doorbell = ring::make_doorbell();
+        int pipe_ends[2];
+        if (::pipe2(pipe_ends, O_CLOEXEC) != 0)
+            ring::throw_errno("pipe for a worker's output");
+        spawned.output.reset(pipe_ends[0]);
+        const UniqueFd output_end(pipe_ends[1]);
+        ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
+
         std::vector<UniqueFd> fds;
         const Side &side = sides_.front();
         const bool sent =
             send_struct(side.socket.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()});
+        if (!sent && errno != EPIPE && errno != ECONNRESET) // the machine is short of something, not of a launcher
+            ring::throw_errno("no process can be started");
         std::optional<Reply> reply;
         while (sent && (reply = receive_reply(side.socket.get(), side.pid, fds)) && reply->kind == Reply::exited)
             note(reply->exit);

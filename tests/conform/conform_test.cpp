@@ -240,7 +240,7 @@ TEST(Conform, WritesJUnitForContinuousIntegration) {
     ConformRun run;
     run.run({run.link_wrong("no_licence").string(), "--only", "abi.*", "--junit", "junit.xml"});
     const std::string xml = run.read("junit.xml");
-    EXPECT_THAT(xml, HasSubstr("tests=\"10\" failures=\"1\" errors=\"0\" skipped=\"0\""));
+    EXPECT_THAT(xml, HasSubstr("tests=\"11\" failures=\"1\" errors=\"0\" skipped=\"0\""));
     EXPECT_THAT(xml, HasSubstr("<testcase classname=\"abi\" name=\"descriptor\""));
     EXPECT_THAT(xml, HasSubstr("<failure type=\"fail\" message=\"the descriptor's licence is empty\">"));
 }

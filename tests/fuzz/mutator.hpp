@@ -68,7 +68,8 @@ private:
             break;
         }
         case 6: { // a number at the end of some type's range, in its place or in a smaller one's
-            const std::uint64_t number = (std::uint64_t{1} << below(64)) - below(2);
+            const std::uint64_t power = std::uint64_t{1} << below(64);
+            const std::uint64_t number = power - below(2);
             for (std::ptrdiff_t i = 0; i < std::min<std::ptrdiff_t>(length, 8); ++i)
                 begin[i] = static_cast<std::uint8_t>(number >> (8 * i));
             break;

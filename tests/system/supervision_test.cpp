@@ -167,8 +167,8 @@ TEST(Supervision, AWorkerThatSealsItsMemoryDoesNoHarm) {
 
 TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
     const std::string yaml = counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", "");
-    enum class End { worker_dies, run_stops, host_is_killed };
-    for (const End end : {End::worker_dies, End::run_stops, End::host_is_killed}) {
+    enum class End { worker_dies, launcher_dies, run_stops, host_is_killed };
+    for (const End end : {End::worker_dies, End::launcher_dies, End::run_stops, End::host_is_killed}) {
         ArhostRun run(yaml);
         run.write("scene.yaml", small_scene);
         run.start({"--config", "run.yaml", "--set", "tracker.allow=[processes]", "--set", "tracker.writes=[.]"});
@@ -177,13 +177,15 @@ TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
         ASSERT_EQ(children.size(), 2u);
         if (end == End::worker_dies)
             ::kill(run.worker("tracker_counter"), SIGKILL);
+        else if (end == End::launcher_dies)
+            ::kill(run.launcher(), SIGKILL);
         else
             ::kill(run.pid(), end == End::run_stops ? SIGTERM : SIGKILL);
         for (const pid_t child : children) {
             EXPECT_TRUE(is_gone(child)) << static_cast<int>(end);
             ::kill(child, SIGKILL);
         }
-        if (end == End::worker_dies) {
+        if (end == End::worker_dies || end == End::launcher_dies) {
             EXPECT_TRUE(run.running());
         }
     }

@@ -259,6 +259,9 @@ FIELD(arhost_tracker, track, 16, 8);
 FIELD(arhost_tracker, stop, 24, 8);
 
 /* arhost/scene.h */
+VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
+VALUE(ARHOST_SCENE_VERSION, 2);
+VALUE(ARHOST_NONE, 0xffffffff);
 VALUE(ARHOST_Z_UP, 1);
 VALUE(ARHOST_Y_UP, 2);
 VALUE(ARHOST_TRIANGLES, 1);

@@ -96,7 +96,11 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
 
 static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
     self->tracer = tracer_new(setup->scene);
-    return self->tracer ? ARHOST_OK : ARHOST_ERROR_OUT_OF_MEMORY;
+    if (!self->tracer) {
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
+    return ARHOST_OK;
 }
 
 static void stop(arhost_instance *self) {
@@ -107,8 +111,10 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    if (!self)
+    if (!self) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
         return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
     self->host = host;
     /* Every option that is declared below is there. */
     self->side = (int)sqrt((double)arhost_find_option(options, option_count, "samples")->integer);

@@ -39,7 +39,11 @@ static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup
     fclose(file);
     remove(part);
     self->row = malloc(3 * (size_t)setup->width);
-    return self->row ? ARHOST_OK : ARHOST_ERROR_OUT_OF_MEMORY;
+    if (!self->row) {
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");
+        return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
+    return ARHOST_OK;
 }
 
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
@@ -79,8 +83,10 @@ static arhost_status stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    if (!self)
+    if (!self) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
         return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
     self->host = host;
     /* Every option that is declared below is there. */
     snprintf(self->path, sizeof self->path, "%s", arhost_find_option(options, option_count, "path")->text);

@@ -31,7 +31,11 @@ static arhost_status start(arhost_instance *self, const arhost_source_setup *set
     properties->format.width = self->width;
     properties->format.height = self->height;
     properties->format.fps = self->fps;
-    return arhost_frame_layout(&properties->format) ? ARHOST_OK : ARHOST_ERROR_CONFIGURATION;
+    if (!arhost_frame_layout(&properties->format)) {
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR, "width and height are none that a frame can have");
+        return ARHOST_ERROR_CONFIGURATION;
+    }
+    return ARHOST_OK;
 }
 
 static arhost_status read(arhost_instance *self, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
@@ -69,8 +73,10 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    if (!self)
+    if (!self) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
         return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
     self->host = host;
     /* Every option that is declared below is there. */
     self->width = (uint32_t)arhost_find_option(options, option_count, "width")->integer;

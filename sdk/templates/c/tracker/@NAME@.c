@@ -68,8 +68,10 @@ static void stop(arhost_instance *self) {
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
-    if (!self)
+    if (!self) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
         return ARHOST_ERROR_OUT_OF_MEMORY;
+    }
     self->host = host;
     /* Every option that is declared below is there. */
     self->threshold = arhost_find_option(options, option_count, "threshold")->integer;
