@@ -28,7 +28,7 @@ public:
     void kill();                                   // by SIGTERM, and SIGKILL a second later; returns once it is gone
 
 private:
-    pid_t pid_ = 0; // 0: reaped
+    pid_t pid_ = 0;                   // 0: reaped
     ring::UniqueFd orders_, written_; // while the former is open, it stays
     std::uint64_t count_ = 0;
 };

@@ -103,8 +103,8 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     send_struct(socket, reply, {pidfd.get()});
 }
 
-// Kills every child that is not to be kept, and tells how many there were: a launcher is a subreaper, so what a worker
-// leaves behind comes here, and what that has left behind with the next call.
+// Kills every child that is not to be kept, and tells how many there were: a launcher is a subreaper, so what a
+// worker leaves behind comes here, and what that has left behind with the next call.
 int kill_orphans(const std::set<pid_t> &kept) {
     int count = 0;
     std::ifstream children("/proc/thread-self/children");

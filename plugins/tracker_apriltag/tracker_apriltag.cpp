@@ -131,6 +131,10 @@ public:
         detector_->decode_sharpening = sharpening_;
         detector_->nthreads = threads_;
         apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
+        // Older releases' threads take work as soon as they run, while the list of it may still grow and move
+        // (AprilRobotics/apriltag, pull request 339). After a first frame with hardly any they wait to be told.
+        if (threads_ > 1)
+            detect(cv::Mat::zeros(smallest_side(), smallest_side(), CV_8UC1));
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
@@ -161,9 +165,11 @@ public:
     }
 
 private:
+    // The library reads outside images of less than one of its 4×4 px tiles; no tag is that small.
+    int smallest_side() const { return static_cast<int>(8 * decimate_); }
+
     Detections detect(const cv::Mat &grey) {
-        // The library reads outside images of less than one of its 4×4 px tiles; no tag is that small.
-        if (std::min(grey.cols, grey.rows) < 8 * decimate_)
+        if (std::min(grey.cols, grey.rows) < smallest_side())
             return {nullptr, apriltag_detections_destroy};
         cv::Mat pixels = grey;
         if (sigma_ != 0 && decimate_ == 1) // then the library blurs in place, and the frame is read-only
