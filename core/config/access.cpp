@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/access.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 
 namespace arhost::config {
@@ -60,7 +59,7 @@ std::string warning_of_output(const yaml::Node &path, const std::string &plugin)
     const fs::path file = path.text(), folder = real_path(file).parent_path();
     const char *home = std::getenv("HOME");
     for (const fs::path &precious : {real_path(home ? home : "/"), real_path(".")})
-        if (std::mismatch(folder.begin(), folder.end(), precious.begin(), precious.end()).first == folder.end())
+        if (sandbox::holds(folder, precious))
             return path.where() + ": " + path.path() + ": '" + plugin + "' can write all of '" + folder.string() +
                    "' and what is below; give it a folder of its own, as in 'path: output/" +
                    file.filename().string() + "'";

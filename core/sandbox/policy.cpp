@@ -113,6 +113,10 @@ Paths paths_of(const Policy &policy) {
     return paths;
 }
 
+bool holds(const fs::path &folder, const fs::path &path) {
+    return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
+}
+
 bool let_read(Policy &policy, const fs::path &file) {
     std::error_code ignored;
     const auto type = fs::status(file, ignored).type();
@@ -120,9 +124,6 @@ bool let_read(Policy &policy, const fs::path &file) {
         return false;
     const char *home = std::getenv("HOME");
     const fs::path real = fs::weakly_canonical(file, ignored);
-    const auto holds = [](const fs::path &folder, const fs::path &path) {
-        return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
-    };
     if (home && holds(real, fs::weakly_canonical(home, ignored)))
         return false;
     for (const char *kernels : {"/dev", "/proc", "/sys"})

@@ -38,6 +38,9 @@ struct Policy {
     bool allows(std::string_view what) const { return allow.contains(what); }
 };
 
+// Whether `path` is `folder` or lies below it, by their names: both without links and dots.
+bool holds(const std::filesystem::path &folder, const std::filesystem::path &path);
+
 // Lets a file or folder be read that stands as a value somewhere: not one that is not there, what holds the whole
 // home, devices or what is the kernel's, which are for other keys to give. False: it does not. Absolute.
 bool let_read(Policy &policy, const std::filesystem::path &file);
