@@ -4,7 +4,7 @@
 find_program(CCACHE ccache)
 if(CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE})
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()
 
 find_package(PkgConfig REQUIRED)
@@ -20,6 +20,12 @@ add_compile_options(-ffp-contract=off)
 if(ARHOST_SANITIZE)
   add_compile_options(-fsanitize=${ARHOST_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
+endif()
+# For tests and the suite: without the checks of each pointer in their own expressions, a third of the time that GCC
+# takes for them.
+set(ARHOST_UNCHECKED_POINTERS)
+if(ARHOST_SANITIZE MATCHES undefined)
+  set(ARHOST_UNCHECKED_POINTERS -fno-sanitize=null,alignment,vptr,object-size)
 endif()
 
 # As in an installed arhost, so that programs find each other in the same way.
@@ -48,12 +54,14 @@ function(arhost_add_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} arhost-test-support)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
-  if(ARHOST_SANITIZE MATCHES undefined)
-    # Checks of each pointer in the tests' own expressions: a third of the time that GCC takes for them.
-    target_compile_options(${name} PRIVATE -fno-sanitize=null,alignment,vptr,object-size)
-  endif()
+  target_compile_options(${name} PRIVATE ${ARHOST_TEST_OPTIONS})
+  target_precompile_headers(${name} REUSE_FROM arhost-test-headers)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
+  endif()
+  if(ARHOST_SANITIZE AND "slow" IN_LIST ARG_LABELS)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run there, so not even compiled
+    return()
   endif()
   # LeakSanitizer may crash on its way through the thread-locals of libraries that were opened late, as the module for
   # images opens them: it goes without them.
