@@ -2,7 +2,7 @@
 # What `cmake --install` puts where, and the Debian package. Everything is found relative to the programs, so the
 # tree can be moved; `lib` has no architecture in its name for the same reason.
 install(TARGETS arhost arhost-inprocess EXPORT arhost RUNTIME DESTINATION bin)
-install(TARGETS arhost-conform arhost-worker render-scene RUNTIME DESTINATION bin)
+install(TARGETS arhost-conform arhost-launcher arhost-worker render-scene RUNTIME DESTINATION bin)
 set_target_properties(arhost-inprocess PROPERTIES EXPORT_NAME inprocess)
 install(TARGETS arhost-images LIBRARY DESTINATION lib/arhost)
 # The plugins install themselves: arhost_add_plugin.

@@ -14,11 +14,11 @@ namespace arhost::config {
 // be read. Throws yaml::Error.
 sandbox::Policy access_of(const yaml::Node &node, bool is_output);
 
+// The component's `path`, which may stand among its options.
+std::optional<yaml::Node> path_of(const yaml::Node &component);
+
 // Where an output's `path` lets its plugin write more than anybody may mean: in the whole home or working directory.
 // A sentence, or "".
 std::string warning_of_output(const yaml::Node &path, const std::string &plugin);
-
-// The same for all paths to a file, links included; absolute.
-std::filesystem::path real_path(const std::filesystem::path &file);
 
 } // namespace arhost::config

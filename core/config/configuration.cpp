@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
-#include <map>
 #include <set>
 
 namespace arhost::config {
@@ -56,6 +55,9 @@ struct Shared {
 };
 
 ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
+    if (const auto conform = node.find("conform"); conform && schema_path == "outputs[]")
+        conform->fail("an output gives nothing back that could be looked at in a run; try its plugin by "
+                      "'arhost conform PLUGIN.so' (docs/conformance.md)");
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
         node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {},
@@ -101,26 +103,32 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared)
     return tracker;
 }
 
-// That no file is written which the run reads, or writes elsewhere.
-class FilesInUse {
-public:
-    void read(const std::filesystem::path &file) { files_.try_emplace(real_path(file), false); }
-    template <class Configured> void read_all_of(const std::optional<Configured> &component) {
-        if (component)
-            for (const std::filesystem::path &path : component->policy.readable)
-                read(path); // folders too, which no output replaces
+FilesInUse files_read_by(const Configuration &configuration) {
+    FilesInUse files;
+    const yaml::Node &root = configuration.node;
+    files.read(std::filesystem::absolute(root.file()));
+    const auto camera = root.find("camera");
+    for (const auto &node : {root.find("trajectory"), camera ? camera->find("file") : std::nullopt})
+        if (node)
+            files.read(node->input_path());
+    const auto read_all_of = [&](const ComponentConfiguration &component) {
+        for (const auto *paths : {&component.plugins, &component.policy.readable})
+            std::for_each(paths->begin(), paths->end(), [&](const auto &path) { files.read(path); });
+    };
+    if (configuration.source) {
+        read_all_of(*configuration.source);
+        if (const auto path = path_of(configuration.source->node))
+            files.read_numbered(path->input_path()); // whose pattern stands for more than the folder above
     }
-    void write(const yaml::Node &path) {
-        const auto [found, fresh] = files_.try_emplace(real_path(path.text()), true);
-        if (!fresh && found->second)
-            path.fail("another output writes '" + path.text() + "' already; choose another path");
-        if (!fresh)
-            path.fail("'" + path.text() + "' is a file that this run reads; choose another path");
+    if (configuration.tracker)
+        read_all_of(*configuration.tracker);
+    if (configuration.raytracer) {
+        read_all_of(*configuration.raytracer);
+        files.read(configuration.raytracer->scene);
     }
-
-private:
-    std::map<std::filesystem::path, bool> files_; // whether it is written
-};
+    std::for_each(configuration.outputs.begin(), configuration.outputs.end(), read_all_of);
+    return files;
+}
 
 } // namespace
 
@@ -158,8 +166,11 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         configuration.trajectory = camera::read_trajectory(trajectory_node->input_path());
     if (const auto node = trajectory_node ? root.find("source") : root.require("source")) {
         configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
-        if (const auto fps = node->find("fps"))
+        if (const auto fps = node->find("fps")) {
             configuration.source->fps = fps->real(0, 10'000);
+            if (configuration.source->fps > 0 && configuration.source->fps < 1e-6) // a period is in ns, 64 bits
+                fps->fail("must be 0, for the source's own, or 1e-06 to 10000, is " + fps->text());
+        }
     }
     if (const auto mode = root.find("mode"))
         configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
@@ -202,19 +213,10 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", shared));
-    FilesInUse files;
-    files.read(root.file());
-    for (const auto &node : {configuration.source ? configuration.source->path : std::nullopt,
-                             configuration.raytracer ? configuration.raytracer->node.find("scene") : std::nullopt,
-                             root.find("camera") ? root.find("camera")->find("file") : std::nullopt, trajectory_node})
-        if (node)
-            files.read(node->input_path());
-    files.read_all_of(configuration.source);
-    files.read_all_of(configuration.tracker);
-    files.read_all_of(configuration.raytracer);
+    configuration.files = files_read_by(configuration);
     for (const ComponentConfiguration &output : configuration.outputs)
-        if (const auto path = output.path || !output.options ? output.path : output.options->find("path")) {
-            files.write(*path);
+        if (const auto path = path_of(output.node)) {
+            configuration.files.write(*path);
             const std::filesystem::path &plugin = output.plugins.front();
             if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
                 continue; // arhost's own are trusted that far
@@ -229,14 +231,14 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = real_path(node->text()); // of a link, which is not to be replaced, where it leads to
+            *file = ring::real_path(node->text()); // of a link, which is not to be replaced, where it leads to
             std::error_code error;
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;
             if (type != regular && type != not_found && type != character)
                 node->fail("'" + node->text() + "' is no regular file, or can't be reached; choose another path");
             if (type != character) // /dev/null takes both
-                files.write(*node);
+                configuration.files.write(*node);
         }
     if (!configuration.source && !configuration.raytracer)
         trajectory_node->fail("a trajectory needs a 'source', which it gives cameras to, or a 'raytracer', which "

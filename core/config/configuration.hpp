@@ -5,6 +5,7 @@
 
 #include "camera/coordinates.hpp"
 #include "camera/trajectory.hpp"
+#include "config/files_in_use.hpp"
 #include "config/plugin_path.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/component.hpp"
@@ -62,6 +63,7 @@ struct Configuration {
     std::chrono::milliseconds max_latency{500};
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
+    FilesInUse files{};                                       // but for those that the scene names
 };
 
 // The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind,

@@ -2,7 +2,6 @@
 #include "config/options.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <limits>
 
 namespace arhost::config {
@@ -27,7 +26,7 @@ ring::OptionValue value_of(const ring::OptionDeclaration &declared, const yaml::
         value.text = node.input_path().string();
         break;
     case ARHOST_OPTION_OUTPUT_PATH:
-        value.text = std::filesystem::absolute(node.text()).lexically_normal().string();
+        value.text = node.output_path().string();
         break;
     default:
         if (declared.choices.empty()) {

@@ -20,9 +20,15 @@ using ring::Call;
 
 void load(Context &context) {
     try {
-        const arhost_descriptor &descriptor = context.library.descriptor();
-        context.facts = ring::to_json(descriptor);
-    } catch (const std::runtime_error &error) { // what arhost-worker would say
+        const ring::Json told = ring::to_json(context.library.descriptor());
+        ring::description_from_json(told);
+        const std::size_t size = told.dump(-1, ' ', false, ring::Json::error_handler_t::replace).size();
+        if (size > ring::max_descriptor_size)
+            throw std::runtime_error(fmt::format("its descriptor has {} bytes as JSON, and {} are the most: fewer "
+                                                 "options, or shorter texts",
+                                                 size, ring::max_descriptor_size));
+        context.facts = told;
+    } catch (const std::exception &error) { // what arhost-worker or the host would say
         throw Failure(error.what());
     }
 }
@@ -88,6 +94,13 @@ void negotiation(Context &context) {
         throw Failure(fmt::format("offered versions {} to {}, negotiate returned {}; it must be UNSUPPORTED",
                                   spoken + 1, spoken + 7, status_name(newer.status)));
 
+    constexpr auto short_offer = static_cast<std::uint32_t>(offsetof(arhost_offer, newest_abi_version));
+    const Exchange half_offered(context, {short_offer, spoken, spoken}, answer_size);
+    if (half_offered.status >= 0)
+        throw Failure(fmt::format("given an offer of {} bytes, without the newest version, negotiate returned {}; it "
+                                  "must refuse",
+                                  short_offer, status_name(half_offered.status)));
+
     constexpr auto short_answer = static_cast<std::uint32_t>(offsetof(arhost_answer, plugin));
     const Exchange shorter(context, {offer_size, spoken, spoken}, short_answer);
     if (shorter.status >= 0)
@@ -114,9 +127,18 @@ void descriptor(Context &context) {
     if (const std::uint32_t others = d.capabilities & ~capabilities_of_kind[d.kind])
         throw Failure(
             fmt::format("the descriptor's capabilities have the bits {:#x}, which its kind has not", others));
+    const ring::Json told = ring::to_json(d);
+    for (const auto &[field, value] : told.items()) {
+        const std::string text = value.dump(-1, ' ', false, ring::Json::error_handler_t::replace);
+        try {
+            value.dump();
+        } catch (const ring::Json::exception &) {
+            throw Failure(fmt::format("the descriptor's {} is not UTF-8: {:.200}", field, text));
+        }
+    }
     std::set<std::string> keys;
     for (const arhost_option_descriptor *option : options_of(d)) {
-        if (!option->key || !*option->key)
+        if (!*option->key)
             throw Failure(fmt::format("option {} has no key", keys.size()));
         if (!keys.insert(option->key).second)
             throw Failure(fmt::format("the option '{}' is declared twice", option->key));

@@ -3,9 +3,15 @@
 
 #include "conform/test.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <fcntl.h>
 #include <sys/mman.h>
+#include <system_error>
 #include <unistd.h>
 
 namespace arhost::conform {
@@ -30,12 +36,45 @@ sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     return sandbox::enter_for(subject.plugin, policy);
 }
 
+constexpr off_t room_mib = 16;
+
+// 0: the folder has room for so much; otherwise the error.
+int look_for_room(const std::filesystem::path &folder) {
+    const std::filesystem::path file = folder / "room";
+    const ring::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
+    const int error = fd ? ::posix_fallocate(fd.get(), 0, room_mib << 20) : errno;
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+    return error;
+}
+std::runtime_error no_room(const std::filesystem::path &folder, int error) {
+    return std::runtime_error(fmt::format("the test's folder {} has no room for {} MiB: {}; free some, or set "
+                                          "TMPDIR to another place",
+                                          folder.string(), room_mib, std::strerror(error)));
+}
+
+void run_in_sandbox(const Test &test, Context &context) {
+    if (test.kind != ARHOST_KIND_SINK)
+        return test.run(context);
+    const std::filesystem::path &folder = context.library.scratch();
+    if (const int error = look_for_room(folder); error != 0)
+        throw no_room(folder, error);
+    try {
+        test.run(context);
+    } catch (const Failure &) {
+        // Others write too, and for a full disk no sink is to blame; for other errors it may be.
+        if (const int error = look_for_room(folder); error == ENOSPC || error == EDQUOT)
+            throw no_room(folder, error);
+        throw;
+    }
+}
+
 Result run(const Test &test, const Subject &subject, Context &context) {
     Result result;
     result.test = test.name;
     try {
         const sandbox::Level level = enter_sandbox(test, subject);
-        test.run(context);
+        run_in_sandbox(test, context);
         if (!context.facts.empty())
             context.facts["sandbox"] = sandbox::to_text(level);
         result.verdict = Verdict::pass;
@@ -53,12 +92,20 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.verdict = Verdict::warn;
         result.message = warning.what();
     } catch (const std::exception &error) {
-        result.message = error.what();
+        const auto *system = dynamic_cast<const std::system_error *>(&error);
+        const bool none_left = system && system->code() == std::errc::too_many_files_open; // the suite keeps few
+        result.verdict = none_left ? Verdict::fail : Verdict::error;
+        result.message = none_left ? "it keeps descriptors until there is none left" : error.what();
     }
     return result;
 }
 
 } // namespace
+
+std::filesystem::path default_reference() {
+    const std::filesystem::path own_folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+    return (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+}
 
 int run_child(const std::string &name, const Subject &subject) {
     const CallPage calls = map_call_page();
@@ -70,6 +117,7 @@ int run_child(const std::string &name, const Subject &subject) {
         PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         context.prints = subject.prints;
+        context.patience = subject.patience;
         Result result = run(test, subject, context);
         result.facts = context.facts;
         const std::string line = to_json(result).dump(-1, ' ', false, ring::Json::error_handler_t::replace) + "\n";
@@ -103,6 +151,8 @@ Result result_from_json(const ring::Json &json) {
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
     result.message = json.at("message").get<std::string>();
     result.facts = json.at("facts");
+    if (result.facts != ring::Json::object())
+        ring::description_from_json(result.facts); // throws unless it is one
     for (const ring::Json &image : json.at("images"))
         result.exhibits.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
                                    image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});

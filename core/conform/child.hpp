@@ -20,11 +20,15 @@ struct Subject {
     std::filesystem::path plugin, reference;
     Settings settings;
     std::uint64_t seed = 1;
+    double patience = 1;             // times each deadline
     std::filesystem::path scratch{}; // of one test; gone after it
     PrintFiles prints{};
     sandbox::Policy policy{};                  // but for the scratch folder
     std::vector<std::string> policy_options{}; // which it came of, as on the command line
 };
+
+// The ray tracer that is compared with unless another is named.
+std::filesystem::path default_reference();
 
 // The descriptors that a child finds.
 inline constexpr int result_fd = 3, call_page_fd = 4;

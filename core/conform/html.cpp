@@ -31,7 +31,7 @@ std::string figure(const Exhibit &exhibit, const Result &result) {
                            100 * ((*result.wrong_pixel)[1] + 0.5) / exhibit.height);
     return fmt::format("<figure><div class=\"image\"><img alt=\"\" src=\"data:image/png;base64,{}\">{}</div>"
                        "<figcaption>{}</figcaption></figure>",
-                       exhibit.png, mark, escaped(exhibit.label));
+                       escaped(exhibit.png), mark, escaped(exhibit.label));
 }
 
 } // namespace

@@ -2,15 +2,19 @@
 //
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
 #include "conform/report.hpp"
+#include "conform/report_file.hpp"
+#include "ring/text.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <fnmatch.h>
-#include <fstream>
+#include <set>
+#include <sys/signalfd.h>
 #include <thread>
 
 namespace {
@@ -20,6 +24,30 @@ namespace sandbox = arhost::sandbox;
 namespace fs = std::filesystem;
 
 enum ExitStatus { usage_or_suite_failed = 2 };
+
+template <class Number> bool parse_number(std::string_view text, Number &number) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+// For CLI::Option::check: what is wrong with a text, or "".
+std::string wrong_with_name(const std::string &text) {
+    return text.empty() ? "the name is empty" : "";
+}
+std::string wrong_with_variable(const std::string &text) {
+    return text.empty() || text.find('=') != std::string::npos
+               ? "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with"
+               : "";
+}
+std::string wrong_with_seed(const std::string &text) {
+    std::uint64_t seed = 0;
+    return parse_number(text, seed) ? "" : fmt::format("'{}' must be a whole number from 0 to {}", text, UINT64_MAX);
+}
+std::string wrong_with_patience(const std::string &text) {
+    double factor = 0;
+    const bool fits = parse_number(text, factor) && factor >= 0.001 && factor <= 1000; // no NaN
+    return fits ? "" : "'" + text + "' must be a number from 0.001 to 1000";
+}
 
 Settings parse_settings(const std::vector<std::string> &texts) {
     Settings settings;
@@ -37,8 +65,7 @@ PrintFiles parse_prints(const std::vector<std::string> &texts) {
     for (const std::string &text : texts) {
         const std::size_t equals = text.find('=');
         int id = 0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + std::min(equals, text.size()), id);
-        if (equals == std::string::npos || error != std::errc() || end != text.data() + equals)
+        if (equals == std::string::npos || !parse_number(text.substr(0, equals), id) || equals + 1 == text.size())
             throw std::runtime_error("--print " + text + ": must be ID=FILE, a marker's id and its picture");
         prints[id] = fs::absolute(text.substr(equals + 1));
     }
@@ -59,8 +86,12 @@ struct PolicyOptions {
             ->type_name("WHAT")
             ->delimiter(',')
             ->check(CLI::IsMember(known));
-        add("--reads", reads, "A further file or folder that it may read (again for more)")->type_name("PATH");
-        add("--environment", environment, "A further variable that it gets (again for more)")->type_name("NAME");
+        add("--reads", reads, "A further file or folder that it may read (again for more)")
+            ->type_name("PATH")
+            ->check(CLI::ExistingPath);
+        add("--environment", environment, "A further variable that it gets (again for more)")
+            ->type_name("NAME")
+            ->check(wrong_with_variable);
         app.add_option("--sandbox", sandbox, "permissive, strict or none, as the configuration's 'sandbox'")
             ->type_name("MODE")
             ->check(CLI::IsMember(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end())));
@@ -95,15 +126,6 @@ struct PolicyOptions {
     }
 };
 
-void write(const std::string &file, const std::string &text) {
-    if (file.empty())
-        return;
-    std::ofstream stream(file, std::ios::binary);
-    stream << text << std::flush;
-    if (!stream)
-        throw std::runtime_error("can't write " + file);
-}
-
 void list(const std::string &pattern) {
     for (const Test &test : all_tests())
         if (::fnmatch(pattern.c_str(), test.name, 0) == 0)
@@ -126,44 +148,90 @@ bool makes_instances(std::span<const Test> tests, std::string_view name) {
     return test != tests.end() && makes_instances(tests, test->needs);
 }
 
+// Why nothing can be compared with the reference: that is no plugin's fault. "": it can.
+std::string wrong_with_reference(std::span<const Test> tests, const RunSettings &settings) {
+    const fs::path &file = settings.subject.reference;
+    if (!fs::is_regular_file(file))
+        return fmt::format("the reference '{}' is not there; give --reference FILE", file.string());
+    RunSettings of_reference = settings;
+    of_reference.subject.plugin = file;
+    of_reference.subject.settings.clear();
+    for (const Test &test : tests)
+        if (test.name == std::string_view("abi.load") || test.name == std::string_view("raytracer.render")) {
+            const Result result = run_alone(test, of_reference);
+            if (result.verdict != Verdict::pass)
+                return fmt::format("the reference '{}' can't be used, by {}: {}", file.string(), test.name,
+                                   result.message);
+            if (const arhost_kind kind = result.facts.value("kind", arhost_kind{ARHOST_KIND_RAYTRACER});
+                kind != ARHOST_KIND_RAYTRACER)
+                return fmt::format("the reference '{}' is a {} and must be a ray tracer; give --reference FILE",
+                                   file.string(), arhost::ring::to_text(kind));
+        }
+    return {};
+}
+
 Report run(const RunSettings &settings, const std::string &pattern, bool quiet) {
     Report report{settings, all_tests(), {}, {}};
+    const auto wanted = [&](const char *test) { return ::fnmatch(pattern.c_str(), test, 0) == 0; };
+    const auto is_fine = [](const Result &result) {
+        return result.verdict == Verdict::pass || result.verdict == Verdict::skip;
+    };
     const auto tell = [&](const Result &result) {
-        if (!quiet || (result.verdict != Verdict::pass && result.verdict != Verdict::skip))
+        if (!is_fine(result) || (wanted(result.test.c_str()) && !quiet))
             fmt::print("{}", as_line(report, result));
         std::fflush(stdout);
     };
-    const auto wanted = [&](const Test &test) { return ::fnmatch(pattern.c_str(), test.name, 0) == 0; };
+    const auto give = [&](const Test &test, Verdict verdict, const std::string &why) {
+        report.results.push_back({test.name, verdict, why});
+        tell(report.results.back());
+    };
     // Always first: it tells the plugin's kind.
-    const Test &load = report.tests.front();
-    Result loaded = run_alone(load, settings);
-    report.plugin = loaded.facts;
-    const arhost_kind kind = loaded.facts.value("kind", 0);
-    const bool passed = loaded.verdict == Verdict::pass;
-    const std::string lacks = lacking(loaded, settings.subject.policy);
-    if (!passed || wanted(load)) {
-        tell(loaded);
-        report.results.push_back(std::move(loaded));
-    }
+    run_all({report.tests.data(), 1}, settings, report.results, tell);
+    report.plugin = report.results.front().facts;
+    const arhost_kind kind = report.plugin.value("kind", 0);
     std::vector<Test> selected;
-    for (const Test &test : report.tests) {
-        if (&test == &load || !wanted(test) || (test.kind != 0 && test.kind != kind))
-            continue;
-        selected.push_back(test);
-        if (!lacks.empty() && makes_instances(report.tests, test.name)) {
-            report.results.push_back({test.name, Verdict::skip, lacks});
-            tell(report.results.back());
+    std::set<std::string_view> needed;
+    std::for_each(report.tests.rbegin(), report.tests.rend(), [&](const Test &test) {
+        if ((wanted(test.name) && (test.kind == 0 || test.kind == kind)) || needed.contains(test.name)) {
+            selected.insert(selected.begin(), test);
+            needed.insert(test.needs);
         }
-    }
+    });
+    const std::string lacks = lacking(report.results.front(), settings.subject.policy);
+    for (const Test &test : selected)
+        if (!lacks.empty() && makes_instances(report.tests, test.name))
+            give(test, Verdict::skip, lacks);
+        else if (test.name == std::string_view("raytracer.reference"))
+            if (const std::string wrong = wrong_with_reference(report.tests, settings); !wrong.empty())
+                give(test, Verdict::error, wrong);
     run_all(selected, settings, report.results, tell);
+    // What others need and nobody has asked for goes without saying.
+    std::erase_if(report.results,
+                  [&](const Result &result) { return is_fine(result) && !wanted(result.test.c_str()); });
     std::sort(report.results.begin(), report.results.end(),
               [&](const Result &a, const Result &b) { return &report.test_of(a) < &report.test_of(b); });
     return report;
 }
 
+// Those that end a program, but for what whoever started this one wants ignored (nohup): taken from here on by who
+// reads the descriptor.
+arhost::ring::UniqueFd take_signals() {
+    sigset_t taken;
+    ::sigemptyset(&taken);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction now {};
+        if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
+            ::sigaddset(&taken, signal);
+    }
+    ::sigprocmask(SIG_BLOCK, &taken, nullptr);
+    return arhost::ring::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
+    std::signal(SIGPIPE, SIG_IGN); // as where a plugin runs: a full disk, and who reads no more, are errors
+    std::signal(SIGXFSZ, SIG_IGN);
     CLI::App app("Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
                  "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell.",
                  "arhost conform");
@@ -171,8 +239,7 @@ int main(int argc, char **argv) {
     RunSettings settings;
     std::vector<std::string> option_texts, print_texts;
     std::string plugin, pattern = "*", json, junit, html, child_test;
-    const fs::path own_folder = fs::read_symlink("/proc/self/exe").parent_path();
-    std::string reference = (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+    std::string reference = default_reference();
     bool only_list = false, quiet = false;
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
     app.add_option("PLUGIN", plugin, "The plugin's shared object");
@@ -187,16 +254,23 @@ int main(int argc, char **argv) {
         ->allow_extra_args(false);
     PolicyOptions policy_options;
     policy_options.add_to(app);
-    app.add_option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")->type_name("N");
+    app.add_option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")
+        ->type_name("N")
+        ->check(wrong_with_seed);
     app.add_option("--jobs", settings.jobs, "Tests at a time")->type_name("N")->check(CLI::Range(1, 256));
-    app.add_option("--patience", settings.patience, "Times each deadline, on slow machines (1)")
+    app.add_option("--patience", settings.subject.patience, "Times each deadline, on slow machines (1)")
         ->type_name("FACTOR")
-        ->check(CLI::PositiveNumber);
-    app.add_option("--reference", reference, "The ray tracer that images are compared with")->type_name("FILE");
+        ->check(wrong_with_patience);
+    app.add_option("--reference", reference, "The ray tracer that images are compared with")
+        ->type_name("FILE")
+        ->check(wrong_with_name);
     app.add_flag("-q,--quiet", quiet, "Print neither what passes nor what is skipped");
-    app.add_option("--json", json, "Write the results as JSON")->type_name("FILE");
-    app.add_option("--junit", junit, "Write them as JUnit XML")->type_name("FILE");
-    app.add_option("--html", html, "Write them as one page, with images")->type_name("FILE");
+    const auto add_file = [&](const char *name, std::string &file, const char *what) {
+        app.add_option(name, file, what)->type_name("FILE")->check(wrong_with_name);
+    };
+    add_file("--json", json, "Write the results as JSON");
+    add_file("--junit", junit, "Write them as JUnit XML");
+    add_file("--html", html, "Write them as one page, with images");
     app.add_option("--run", child_test, "")->group(""); // for this program itself: be the process of that test
     app.add_option("--scratch", settings.subject.scratch, "")->group("");
     try {
@@ -220,16 +294,22 @@ int main(int argc, char **argv) {
         settings.subject.policy_options = policy_options.texts();
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
+        ReportFile json_file(json), junit_file(junit), html_file(html);
+        const arhost::ring::UniqueFd signals = take_signals();
+        settings.signals = signals.get();
         const Report report = run(settings, pattern, quiet);
         fmt::print("{}", as_summary(report));
         if (report.results.empty())
             throw std::runtime_error("--only " + pattern + ": no test of this kind of plugin has such a name");
-        write(json, as_json(report));
-        write(junit, as_junit(report));
-        write(html, as_html(report));
+        json_file.write(as_json(report));
+        junit_file.write(as_junit(report));
+        html_file.write(as_html(report));
         return report.exit_status();
+    } catch (const Interrupted &interrupted) {
+        fmt::print(stderr, "{}\n", interrupted.what());
+        return 128 + interrupted.signal;
     } catch (const std::exception &error) {
-        fmt::print(stderr, "error: {}\n", error.what());
+        fmt::print(stderr, "error: {}\n", arhost::ring::printable(error.what()));
         return usage_or_suite_failed;
     }
 }

@@ -33,14 +33,6 @@ const arhost_option_descriptor *PluginLibrary::option(const std::string &key) {
     return nullptr;
 }
 
-std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor) {
-    std::vector<const arhost_option_descriptor *> all;
-    for (std::uint32_t i = 0; i < descriptor.option_count; ++i) // each is as long as the first
-        all.push_back(reinterpret_cast<const arhost_option_descriptor *>(
-            reinterpret_cast<const std::byte *>(descriptor.options) + i * descriptor.options->struct_size));
-    return all;
-}
-
 arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text) {
     arhost_option value{sizeof value, option.type, option.key, 0, 0, text.c_str()};
     const auto refuse = [&](const char *why) {

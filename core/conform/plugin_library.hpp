@@ -4,6 +4,7 @@
 // that they speak with.
 #pragma once
 
+#include "ring/json_abi.hpp"
 #include "ring/memory.hpp"
 #include "ring/protocol.hpp"
 
@@ -71,8 +72,7 @@ private:
     const arhost_plugin *plugin_ = nullptr;
 };
 
-// The options in a descriptor, stepped through as the ABI says.
-std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
+using ring::options_of;
 
 // The value that a text is for an option, or why it is none.
 arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text);
@@ -85,6 +85,7 @@ public:
 
     const arhost_host *get() const { return &host_; }
     void cancel() { cancelled_ = true; }
+    bool is_cancelled() const { return cancelled_; }
     std::vector<std::string> log() const;
     std::string last_error() const; // "": there was none
 

@@ -48,6 +48,22 @@ void inside_sphere(Context &context) {
     });
 }
 
+void near_the_eye(Context &context) {
+    for (const double mm : {1.0, 0.05}) { // of a scene of 230; the sphere begins at 3/4 of it: 1.6e-4 of that
+        scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
+        builder.add_object("near", builder.add_spheres({{0, 0, 200 - mm, mm / 4}}),
+                           builder.add_material(glowing(glm::vec3(0.8f))));
+        const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+        expect_pixels(picture, [&](auto x, auto y) {
+            constexpr double radius = 48; // of 51.6 px: the sine is 1/4
+            const Pixel p = picture.at(x, y);
+            if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // 231 and 255
+                return fmt::format("a bright sphere {} mm before the eye is not seen, but {}", mm, text_of(p));
+            return std::string();
+        });
+    }
+}
+
 void depth_order(Context &context) {
     scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
     const std::uint32_t bright = builder.add_material(glowing(glm::vec3(0.8f)));
@@ -186,6 +202,8 @@ constexpr Test tests[] = {
     {"raytracer.straight-alpha", "Where an object covers a part of a pixel, its colour is not multiplied by alpha.",
      kind, gate, 20s, straight_alpha},
     {"raytracer.inside-sphere", "A camera inside an object sees it everywhere.", kind, gate, 20s, inside_sphere},
+    {"raytracer.near-the-eye", "What is a twentieth of a millimetre before the eye is seen.", kind, gate, 20s,
+     near_the_eye},
     {"raytracer.depth-order", "The nearer object hides the farther one.", kind, gate, 20s, depth_order},
     {"raytracer.occluder", "An occluder hides what is behind it, and nothing else.", kind, gate, 20s, occluder},
     {"raytracer.catcher-in-light", "A catcher in the light is not seen.", kind, gate, 20s, catcher_in_light},

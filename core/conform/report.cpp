@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/report.hpp"
 
+#include "ring/text.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +17,14 @@ std::string quoted(const std::string &word) {
             std::string::npos &&
         !word.empty())
         return word;
+    if (ring::printable(word) != word) { // bytes that are better not shown, as bash writes them
+        std::string text = "$'";
+        for (const char c : word)
+            text += c == '\'' || c == '\\' ? fmt::format("\\{}", c)
+                    : c >= ' ' && c <= '~' ? std::string(1, c)
+                                           : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+        return text + "'";
+    }
     std::string text = "'";
     for (const char c : word)
         text += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -52,13 +62,17 @@ std::string Report::command(const Result &result) const {
         text += fmt::format(" --print {}={}", id, quoted(file.string()));
     for (const std::string &option : subject.policy_options)
         text += " " + quoted(option);
+    if (subject.reference != default_reference())
+        text += " --reference " + quoted(subject.reference);
+    if (subject.patience != 1)
+        text += fmt::format(" --patience {}", subject.patience);
     return text;
 }
 
 std::string as_line(const Report &report, const Result &result) {
     std::string text = fmt::format("{:<8} {}", to_text(result.verdict), result.test);
     if (!result.message.empty())
-        text += fmt::format("\n         {}", result.message);
+        text += fmt::format("\n         {}", ring::printable(result.message));
     if (is_bad(result.verdict))
         text += fmt::format("\n         promised: {}\n         again: {}", report.test_of(result).promise,
                             report.command(result));
@@ -70,7 +84,8 @@ std::string as_summary(const Report &report) {
     for (std::size_t i = 1; i < verdict_texts.size(); ++i)
         if (const std::size_t count = report.count(static_cast<Verdict>(i)))
             text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, verdict_texts[i]);
-    return fmt::format("{}: {}\n", report.settings.subject.plugin.string(), text.empty() ? "no test ran" : text);
+    return fmt::format("{}: {}\n", ring::printable(report.settings.subject.plugin.string()),
+                       text.empty() ? "no test ran" : text);
 }
 
 std::string as_json(const Report &report) {
@@ -125,7 +140,7 @@ std::string as_junit(const Report &report) {
 
 std::string escaped(const std::string &text) {
     std::string result;
-    for (const char c : text) {
+    for (const char c : ring::printable(text)) {
         switch (c) {
         case '&':
             result += "&amp;";
@@ -140,7 +155,7 @@ std::string escaped(const std::string &text) {
             result += "&quot;";
             break;
         default:
-            result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+            result += c;
         }
     }
     return result;

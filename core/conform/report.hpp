@@ -30,7 +30,7 @@ std::string as_json(const Report &report);
 std::string as_junit(const Report &report);
 std::string as_html(const Report &report);
 
-// &, <, > and quotes for XML and HTML; control characters, which XML has not, become spaces.
+// Printable, with &, <, > and quotes as XML and HTML write them.
 std::string escaped(const std::string &text);
 
 } // namespace arhost::conform

@@ -2,6 +2,8 @@
 #include "conform/runner.hpp"
 
 #include "ring/memory.hpp"
+#include "ring/orphans.hpp"
+#include "ring/text.hpp"
 
 #include <fmt/format.h>
 
@@ -12,8 +14,10 @@
 #include <fcntl.h>
 #include <list>
 #include <poll.h>
+#include <set>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/signalfd.h>
 #include <sys/wait.h>
 
 namespace arhost::conform {
@@ -75,6 +79,9 @@ private:
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) // it died before the line above
         ::_exit(127);
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
     // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
@@ -93,9 +100,10 @@ private:
 
 class Child {
 public:
-    Child(const Test &test, const RunSettings &settings)
-        : test_(test), begin_(Clock::now()),
-          deadline_(begin_ + std::chrono::duration_cast<Clock::duration>(test.deadline * settings.patience)),
+    // `alive`: all of its kind; what has been orphaned meanwhile ends with each of them.
+    Child(const Test &test, const RunSettings &settings, std::set<pid_t> &alive)
+        : test_(test), alive_(alive), begin_(Clock::now()),
+          deadline_(begin_ + std::chrono::duration_cast<Clock::duration>(test.deadline * settings.subject.patience)),
           memory_(ring::SharedMemory::create("arhost-conform-call", sizeof(Call))),
           calls_(memory_.map(ring::Access::read_only)) {
         int ends[2];
@@ -104,9 +112,12 @@ public:
         pipe_.reset(ends[0]);
         const UniqueFd write_end(ends[1]);
         const Subject &subject = settings.subject;
-        std::vector<std::string> arguments = {
-            "arhost-conform", subject.plugin,    "--run",     test.name,      "--seed", std::to_string(subject.seed),
-            "--reference",    subject.reference, "--scratch", scratch_.path()};
+        std::vector<std::string> arguments = {"arhost-conform", subject.plugin,
+                                              "--run",          test.name,
+                                              "--seed",         std::to_string(subject.seed),
+                                              "--patience",     std::to_string(subject.patience),
+                                              "--reference",    subject.reference,
+                                              "--scratch",      scratch_.path()};
         for (const auto &[key, value] : subject.settings)
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
         for (const auto &[id, file] : subject.prints)
@@ -119,6 +130,7 @@ public:
         if (pid_ < 0)
             ring::throw_errno("fork");
         ::setpgid(pid_, pid_); // here too: who comes first is open
+        alive_.insert(pid_);
     }
     ~Child() {
         if (pid_ > 0)
@@ -130,12 +142,12 @@ public:
     int fd() const { return closed_ ? -1 : pipe_.get(); }
     Clock::time_point deadline() const { return deadline_; }
 
-    // Takes what has come. True once the test is over: it ended, or its time is up.
+    // Takes what has come. True once the test is over: it ended, or its time is up, or it tells more than a test can.
     bool poll() {
         const bool ended = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
         take(); // afterwards: what it wrote at the end is there now
         ended_ = ended;
-        return ended_ || Clock::now() >= deadline_;
+        return ended_ || Clock::now() >= deadline_ || has_flooded();
     }
 
     Result finish() {
@@ -143,22 +155,22 @@ public:
         const std::string where = told ? " when the process ended" : place(calls_.read(), test_);
         end();
         Result result;
-        try {
-            if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && told) {
-                result = result_from_json(ring::Json::parse(text_));
-            } else if (!in_time) {
-                result.verdict = Verdict::timeout;
-                result.message = fmt::format("no end after {:.3g} s{}",
-                                             std::chrono::duration<double>(deadline_ - begin_).count(), where);
-            } else {
-                result.verdict = Verdict::crashed;
-                result.message =
-                    WIFSIGNALED(status_)
-                        ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
-                        : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
-            }
-        } catch (const std::exception &error) {
-            result.message = std::string("the result can't be read: ") + error.what();
+        if (has_flooded()) {
+            result.verdict = Verdict::fail;
+            result.message =
+                fmt::format("what came on its result pipe, descriptor {}, is no result: more than {} MiB", result_fd,
+                            most_told >> 20);
+        } else if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && told) {
+            result = told_result();
+        } else if (!in_time) {
+            result.verdict = Verdict::timeout;
+            result.message = fmt::format("no end after {:.3g} s{}",
+                                         std::chrono::duration<double>(deadline_ - begin_).count(), where);
+        } else {
+            result.verdict = Verdict::crashed;
+            result.message = WIFSIGNALED(status_)
+                                 ? fmt::format("SIG{}{}", ::sigabbrev_np(WTERMSIG(status_)), where)
+                                 : fmt::format("the process exited with status {}{}", WEXITSTATUS(status_), where);
         }
         result.test = test_.name;
         result.seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
@@ -166,10 +178,30 @@ public:
     }
 
 private:
+    static constexpr std::size_t most_told = 32 << 20; // a result has images of some MB
+    bool has_flooded() const { return text_.size() > most_told; }
+
+    // The plugin could write there too.
+    Result told_result() const {
+        try {
+            return result_from_json(ring::Json::parse(text_, [](int depth, auto, auto &) {
+                if (depth > 16)
+                    throw std::runtime_error("nested too deep");
+                return true;
+            }));
+        } catch (const std::exception &) {
+            Result result;
+            result.verdict = Verdict::fail;
+            result.message = fmt::format("what came on its result pipe, descriptor {}, is no result: '{}'", result_fd,
+                                         ring::printable(text_.substr(0, 60)));
+            return result;
+        }
+    }
+    // Not all, of who writes without end: others are waited for, and time goes by.
     void take() {
         char buffer[1 << 16];
         pollfd ready{pipe_.get(), POLLIN, 0};
-        while (!closed_ && ::poll(&ready, 1, 0) > 0) { // children of the plugin's may keep it open
+        for (int i = 0; i < 16 && !closed_ && ::poll(&ready, 1, 0) > 0; ++i) { // its children may keep it open
             const ssize_t count = ::read(pipe_.get(), buffer, sizeof buffer);
             if (count > 0)
                 text_.append(buffer, static_cast<std::size_t>(count));
@@ -180,10 +212,14 @@ private:
         ::kill(-pid_, SIGKILL); // and what the plugin has started
         if (!ended_)
             ::waitpid(pid_, &status_, 0);
+        alive_.erase(pid_);
         pid_ = 0;
+        for (int i = 0; i < 500 && ring::kill_orphans(alive_) > 0; ++i) // not for ever: one may hang in the kernel
+            ::usleep(1000);
     }
 
     const Test &test_;
+    std::set<pid_t> &alive_;
     Clock::time_point begin_, deadline_;
     ScratchFolder scratch_; // goes once the process is gone
     ring::SharedMemory memory_;
@@ -200,21 +236,24 @@ const Result *find(const std::vector<Result> &results, const std::string &test) 
     return found == results.end() ? nullptr : &*found;
 }
 
-void wait(const std::list<Child> &running) {
-    std::vector<pollfd> fds;
+// Returns the signal that has come meanwhile; 0: none.
+int wait(const std::list<Child> &running, int signals) {
+    std::vector<pollfd> fds = {{signals, POLLIN, 0}};
     for (const Child &child : running)
         fds.push_back({child.fd(), POLLIN, 0}); // -1, which poll passes over, once it is closed
     ::poll(fds.data(), fds.size(), 2);          // an end of a process closes no pipe that its children hold
+    signalfd_siginfo taken{};
+    if (fds.front().revents != 0 && ::read(signals, &taken, sizeof taken) == sizeof taken)
+        return static_cast<int>(taken.ssi_signo);
+    return 0;
 }
 
 } // namespace
 
 Result run_alone(const Test &test, const RunSettings &settings) {
-    std::list<Child> running;
-    Child &child = running.emplace_back(test, settings);
-    while (!child.poll())
-        wait(running);
-    return child.finish();
+    std::vector<Result> results;
+    run_all({&test, 1}, settings, results, [](const Result &) {});
+    return results.front();
 }
 
 void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
@@ -231,6 +270,8 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
     for (const Test &test : tests)
         if (!find(results, test.name))
             waiting.push_back(&test);
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1);       // what a test leaves behind comes here
+    std::set<pid_t> alive = ring::children(); // of who became this program by exec
     std::list<Child> running;
     while (!waiting.empty() || !running.empty()) {
         for (auto it = waiting.begin(); it != waiting.end() && running.size() < settings.jobs;) {
@@ -244,9 +285,11 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
             if (need && need->verdict != Verdict::pass)
                 take({test.name, Verdict::skip, fmt::format("needs {}, which has not passed", test.needs)});
             else
-                running.emplace_back(test, settings);
+                running.emplace_back(test, settings, alive);
         }
-        wait(running);
+        if (const int signal = wait(running, settings.signals))
+            throw Interrupted(signal, fmt::format("interrupted after {} of {} tests", results.size(),
+                                                  results.size() + running.size() + waiting.size()));
         for (auto it = running.begin(); it != running.end();) {
             if (it->poll()) {
                 take(it->finish());

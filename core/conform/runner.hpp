@@ -8,6 +8,7 @@
 
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 namespace arhost::conform {
@@ -15,13 +16,19 @@ namespace arhost::conform {
 struct RunSettings {
     Subject subject;
     unsigned jobs = 1;
-    double patience = 1; // times each deadline
+    int signals = -1; // a signalfd: what comes there ends a run
+};
+
+// A run was ended by a signal. Nothing of it is left, neither processes nor folders.
+struct Interrupted : std::runtime_error {
+    Interrupted(int signal, const std::string &what) : std::runtime_error(what), signal(signal) {}
+    int signal;
 };
 
 Result run_alone(const Test &test, const RunSettings &settings);
 
 // `results` may begin with those of tests that were run before. A test whose need has not passed is skipped;
-// a need that is not among the tests counts as passed.
+// a need that is not among the tests counts as passed. What the tests leave behind is killed. Throws Interrupted.
 void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
              const std::function<void(const Result &)> &on_result);
 

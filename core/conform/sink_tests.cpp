@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Sinks: what they take, and what becomes of their files, in peace, after a kill and on a full disk.
+#include "conform/cancelling.hpp"
 #include "conform/frame_times.hpp"
 #include "conform/process_usage.hpp"
 #include "conform/sink_process.hpp"
 #include "conform/sink_run.hpp"
+#include "conform/slow_disk.hpp"
 
 #include <fmt/format.h>
 
@@ -13,6 +15,7 @@
 #include <deque>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sys/resource.h>
 #include <thread>
 
@@ -126,19 +129,12 @@ void two_instances(Context &context) {
 }
 
 void leaks(Context &context) {
-    constexpr int warm_up = 2, starts = 10;
     SinkRun run(context, "out");
-    const auto work = [&](int count) {
-        for (int i = 0; i < count; ++i) {
-            run.start();
-            run.write(0, 8);
-            run.stop();
-        }
-    };
-    work(warm_up);
-    constexpr long allowed_kib = 8192;
-    if (const std::string grown = growth_by([&] { work(starts); }, allowed_kib); !grown.empty())
-        throw Failure(fmt::format("{} starts with 8 frames each led {}", starts, grown));
+    expect_no_leak([&](int frames) {
+        run.start();
+        run.write(0, static_cast<std::uint64_t>(frames));
+        run.stop();
+    });
 }
 
 void idle(Context &context) {
@@ -156,19 +152,14 @@ void idle(Context &context) {
 }
 
 void cancelled(Context &context) {
-    const auto expect_fine = [](const char *call, arhost_status status) {
-        if (status != ARHOST_OK && status != ARHOST_ERROR_CANCELLED)
-            throw Failure(fmt::format("cancelled before, {} returned {}; it must be OK or CANCELLED", call,
-                                      status_name(status)));
-    };
     SinkRun running(context, "a"), starting(context, "b");
     running.start();
     running.write(0, 1);
     running.instance().host().cancel();
-    expect_fine("write", running.try_write(SealedOutput({1})));
-    expect_fine("stop", running.try_stop());
+    expect_ok_or_cancelled("write", running.try_write(SealedOutput({1})));
+    expect_ok_or_cancelled("stop", running.try_stop());
     starting.instance().host().cancel();
-    expect_fine("start", starting.try_start());
+    expect_ok_or_cancelled("start", starting.try_start());
 }
 
 // ---- What it is given ------------------------------------------------------------------------------
@@ -278,9 +269,13 @@ void files(Context &context) {
     }
 }
 
-void every_frame(Context &context) {
+void require_every_frame(Context &context) {
     if (context.library.descriptor().capabilities & ARHOST_IS_REALTIME_SINK)
         throw Skip("ARHOST_IS_REALTIME_SINK is declared");
+}
+
+void every_frame(Context &context) {
+    require_every_frame(context);
     constexpr std::uint64_t frames = 12;
     const Course course = course_of(context, frames);
     for (std::size_t n = 0; n < frames; ++n)
@@ -289,6 +284,87 @@ void every_frame(Context &context) {
                 fmt::format("write of frame {} returned OK, but no file has changed; from then on the frame "
                             "must survive a kill",
                             n));
+}
+
+using Number = std::pair<std::size_t, std::string>; // of so many digits: "10" comes behind "9"
+
+// Each number in a file's name, under the path without it.
+std::map<std::string, Number> numbers_in(const std::string &path) {
+    constexpr const char *digits = "0123456789";
+    std::map<std::string, Number> numbers;
+    for (std::size_t at = path.find_first_of(digits, path.rfind('/') + 1), end; at != std::string::npos;
+         at = path.find_first_of(digits, end)) {
+        end = std::min(path.find_first_not_of(digits, at), path.size());
+        numbers[path.substr(0, at) + '#' + path.substr(end)] = {end - at, path.substr(at, end - at)};
+    }
+    return numbers;
+}
+
+// With another frame of one number its files change where that frame is; without knowing more of them, only those
+// tell that are as long whatever is in them, or one for each frame, with names that differ in a number.
+void order(Context &context) {
+    require_every_frame(context);
+    constexpr std::uint64_t frames = 6;
+    const auto files_with_other = [&](std::uint64_t other) {
+        SinkRun run(context, fmt::format("{}", other));
+        run.start();
+        for (std::uint64_t n = 0; n < frames; ++n)
+            run.write(SealedOutput({.sequence = n, .size = {}, .padding = 0, .in_padding = 0, .other = n == other}));
+        run.stop();
+        return run.files();
+    };
+    struct Change {
+        std::uint64_t frame;
+        std::size_t byte;
+    };
+    const Files usual = files_with_other(frames); // none
+    std::map<std::string, std::vector<Change>> changes;
+    std::set<std::string> resized;
+    for (std::uint64_t frame = 0; frame < frames; ++frame)
+        for (const auto &[name, bytes] : files_with_other(frame)) {
+            const auto found = usual.find(name);
+            if (found == usual.end() || found->second == bytes)
+                continue;
+            if (found->second.size() != bytes.size())
+                resized.insert(name);
+            const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin(), found->second.end());
+            changes[name].push_back({frame, static_cast<std::size_t>(at.first - bytes.begin())});
+        }
+    bool told = false;
+    struct File {
+        std::uint64_t frame;
+        std::string name;
+    };
+    std::map<std::string, std::map<Number, File>> families; // files of a frame each
+    for (const auto &[name, of_file] : changes) {
+        if (of_file.size() == 1)
+            for (const auto &[family, number] : numbers_in(name))
+                families[family][number] = {of_file[0].frame, name};
+        for (std::size_t i = 1; i < of_file.size() && !resized.contains(name); ++i) {
+            told = true;
+            if (of_file[i].byte < of_file[i - 1].byte)
+                throw Failure(
+                    fmt::format("in '{}', frame {} begins at byte {}, before frame {}, which begins at byte {}", name,
+                                of_file[i].frame, of_file[i].byte, of_file[i - 1].frame, of_file[i - 1].byte));
+        }
+    }
+    for (const auto &[family, files] : families) {
+        std::set<std::uint64_t> in_files;
+        for (const auto &[number, file] : files)
+            in_files.insert(file.frame);
+        if (files.size() != frames || in_files.size() != frames) // what the number counts is not the frames
+            continue;
+        told = true;
+        const File *before = nullptr;
+        for (const auto &[number, file] : files) {
+            if (before && file.frame < before->frame)
+                throw Failure(fmt::format("frame {} is in '{}', and frame {} in '{}'", before->frame, before->name,
+                                          file.frame, file.name));
+            before = &file;
+        }
+    }
+    if (!told)
+        throw Skip("without decoding them its files do not tell where a frame begins");
 }
 
 void last_frame(Context &context) {
@@ -425,6 +501,29 @@ void full_disk(Context &context) {
                                       bytes.size(), whole->second.size()));
 }
 
+// ---- A slow disk -----------------------------------------------------------------------------------
+
+void slow_disk(Context &context) {
+    SlowDisk::under([&](SlowDisk &disk) {
+        require_files(context);
+        require_every_frame(context);
+        constexpr std::uint64_t frames = 3;
+        SinkRun run(context, "slow");
+        run.start();
+        Files before = run.files();
+        for (std::uint64_t n = 0; n < frames; ++n) {
+            disk.hold_up_next_write();
+            run.write(n, n + 1);
+            Files after = run.files();
+            if (after == before)
+                throw Failure(
+                    fmt::format("on a slow disk write of frame {} returned OK, but no file has changed", n));
+            before = std::move(after);
+        }
+        run.stop();
+    });
+}
+
 // ---- Speed -----------------------------------------------------------------------------------------
 
 void speed(Context &context) {
@@ -474,6 +573,8 @@ constexpr Test tests[] = {
     {"sink.stride", "Its files depend on pixels, not on what lies between rows.", kind, same, 30s, of_files<stride>},
     {"sink.every-frame", "Once write has returned OK the frame is in a file.", kind, gate, 30s,
      of_files<every_frame>},
+    {"sink.order", "Its frames are in order: in a file, and in files one each by the number in their names.", kind,
+     same, 30s, of_files<order>},
     {"sink.last-frame", "Its files at the end show the last frame.", kind, same, 30s, of_files<last_frame>},
     {"sink.earlier-files", "Until its first frame it leaves an earlier run's files as they are.", kind, gate, 30s,
      of_files<earlier_files>},
@@ -484,6 +585,8 @@ constexpr Test tests[] = {
      of_files<restart>, true},
     {"sink.full-disk", "Where the disk takes no more it says so, and leaves no part of a file.", kind, same, 60s,
      of_files<full_disk>},
+    {"sink.slow-disk", "Where the disk takes its time the frame is in a file as well once write has returned OK.",
+     kind, "sink.every-frame", 60s, slow_disk},
     {"sink.speed", "A small frame takes less than 100 ms on the median; a warning otherwise.", kind, gate, 120s,
      speed},
 };

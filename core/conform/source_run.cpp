@@ -127,7 +127,8 @@ arhost_status SourceRun::try_read(bool filled) {
     info_.struct_size = sizeof info_;
     const arhost_status status = in_call(library_.calls(), Call::per_frame,
                                          [&] { return functions_.read(instance_->get(), &buffer, &info_); });
-    next_ += status == ARHOST_OK;
+    if (status == ARHOST_OK)
+        next_ += std::uint64_t{1} + info_.skipped;
     return status;
 }
 

@@ -73,6 +73,7 @@ public:
     std::optional<Frame> read(bool filled = false);   // nothing: the source is at its end
     std::vector<Frame> read_up_to(std::size_t count); // fewer: it is at its end
     Frame frame() const;                              // what was read last
+    std::uint64_t next() const { return next_; }      // arhost_frame_buffer.sequence of the next one
 
     bool is_live() const { return (library_.descriptor().capabilities & ARHOST_IS_LIVE) != 0; }
     bool can_seek() const { return (library_.descriptor().capabilities & ARHOST_CAN_SEEK) != 0; }

@@ -50,6 +50,7 @@ struct Context {
     std::mt19937_64 random;                  // of the seed, the same for every test
     ring::Json facts = ring::Json::object(); // of abi.load: what the plugin tells of itself
     std::string note{};                      // beside a pass: what was measured
+    double patience = 1;                     // times what a test allows
     PrintFiles prints{};                     // of the markers that a tracker finds; none: the suite's own
 
     double uniform(double low, double high) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A tracker's life from start to stop, what it refuses, what its records say, and that a frame is tracked for itself.
+#include "conform/cancelling.hpp"
 #include "conform/frame_times.hpp"
 #include "conform/process_usage.hpp"
 #include "conform/tracker.hpp"
@@ -84,18 +85,13 @@ void unusable_lens(Context &context) {
 }
 
 void cancelled(Context &context) {
-    const auto expect_fine = [](const char *call, arhost_status status) {
-        if (status != ARHOST_OK && status != ARHOST_ERROR_CANCELLED)
-            throw Failure(fmt::format("cancelled before, {} returned {}; it must be OK or CANCELLED", call,
-                                      status_name(status)));
-    };
     Started running(context);
     running.tracker.instance().host().cancel();
-    expect_fine("track", running.tracker.try_track(
-                             SealedFrame(running.at(running.marker.camera_from_marker), ARHOST_GREY8), 0, 0));
+    const SealedFrame frame(running.at(running.marker.camera_from_marker), ARHOST_GREY8);
+    expect_ok_or_cancelled("track", running.tracker.try_track(frame, 0, 0));
     Tracker starting(context);
     starting.instance().host().cancel();
-    expect_fine("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
+    expect_ok_or_cancelled("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
 }
 
 // ---- Again and again -------------------------------------------------------------------------------
@@ -112,23 +108,16 @@ void start_again(Context &context) {
 }
 
 void leaks(Context &context) {
-    constexpr int warm_up = 5, starts = 25, frames = 4;
     const Placed marker = first_print(context);
     const arhost_intrinsics camera = pinhole(192, 160, 180);
     const Grey image = draw(camera, marker);
     Tracker tracker(context);
-    const auto work = [&](int count) {
-        for (int i = 0; i < count; ++i) {
-            tracker.start(camera, {{marker.print.id, side_mm}});
-            for (int frame = 0; frame < frames; ++frame)
-                tracker.track(image);
-            tracker.stop();
-        }
-    };
-    work(warm_up);
-    constexpr long allowed_kib = 8192;
-    if (const std::string grown = growth_by([&] { work(starts); }, allowed_kib); !grown.empty())
-        throw Failure(fmt::format("{} starts with {} frames each led {}", starts, frames, grown));
+    expect_no_leak([&](int frames) {
+        tracker.start(camera, {{marker.print.id, side_mm}});
+        for (int frame = 0; frame < frames; ++frame)
+            tracker.track(image);
+        tracker.stop();
+    });
 }
 
 void longer_structs(Context &context) {
@@ -212,12 +201,15 @@ void threads(Context &context) {
                     fmt::format("on {} threads", count));
 }
 
+arhost_marker told_anew(Context &context, const Started &started, const Grey &image) {
+    Started other(context);
+    return expect_one(other.tracker.track(image), started.marker.print.id, "to a new instance", image);
+}
+
 // What it has just told of this frame is what a new instance tells, unless it is smoothed.
 void expect_as_new(Context &context, const Started &started, const Grey &image, const std::string &when) {
     const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
-    Started other(context);
-    const arhost_marker should =
-        expect_one(other.tracker.track(image), started.marker.print.id, "to a new instance", image);
+    const arhost_marker should = told_anew(context, started, image);
     if (is.state == ARHOST_MARKER_DETECTED && should.state == ARHOST_MARKER_DETECTED)
         expect_same({&is, 1}, {&should, 1}, when);
 }
@@ -236,6 +228,22 @@ void frames_before(Context &context) {
     expect_none(started.tracker.track(empty), "taken away", empty);
     expect_none(started.tracker.track(empty), "taken away", empty);
     expect_at(here, "there again");
+}
+
+void settles(Context &context) {
+    constexpr int moving = 10, still = 60; // arhost/tracker.h
+    Started started(context);
+    const Grey elsewhere = started.at(tilted({-60, 40, -320}, 45, 200, 120)),
+               image = started.at(started.marker.camera_from_marker);
+    for (int i = 0; i < moving; ++i)
+        started.tracker.track(elsewhere);
+    for (int i = 0; i < still; ++i)
+        started.tracker.track(image);
+    const std::string when = fmt::format("standing still for {} frames", still);
+    const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
+    if (is.state == ARHOST_MARKER_DETECTED)
+        return; // of this frame alone
+    expect_pose(is, pose_of(told_anew(context, started, image)), roughly, when, image);
 }
 
 void out_of_order(Context &context) {
@@ -324,6 +332,45 @@ void record(Context &context) {
     });
 }
 
+// What it tells of a marker that is not in view, if it tells of it.
+void not_seen(Context &context) {
+    constexpr std::uint32_t seen_for = 3, gone_for = 12;
+    Started started(context);
+    const Grey here = started.at(started.marker.camera_from_marker), gone = without_print();
+    bool told = false;
+    for (int time = 0; time < 2; ++time) {
+        std::vector<arhost_marker> last, last_seen;
+        for (std::uint32_t i = 0; i < seen_for; ++i) {
+            started.tracker.track(here);
+            last = last_seen = started.tracker.records();
+            if (const arhost_marker is = expect_one(last, started.marker.print.id, "in view", here);
+                is.age_frames != 0)
+                throw Failure(fmt::format("seen, it has age_frames {} and must have 0", is.age_frames));
+        }
+        for (std::uint32_t age = 1; age <= gone_for; ++age) {
+            started.tracker.track(gone);
+            const std::vector<arhost_marker> records = started.tracker.records();
+            if (records.empty())
+                continue;
+            told = true;
+            const std::string when = fmt::format("{} frames after it was last seen", age);
+            const arhost_marker is = expect_one(records, started.marker.print.id, when, gone);
+            if (is.state != ARHOST_MARKER_PREDICTED && is.state != ARHOST_MARKER_LOST)
+                throw Failure(fmt::format("{}, its state is {}; it must be PREDICTED or LOST", when, is.state));
+            if (is.age_frames != age)
+                throw Failure(fmt::format("{}, its age_frames is {}", when, is.age_frames));
+            if (const std::string problem = not_rigid(is.mt, orthonormal); !problem.empty())
+                throw Failure(fmt::format("{}, its mt {}", when, problem));
+            if (is.state == ARHOST_MARKER_LOST && !std::equal(is.mt, is.mt + 16, last[0].mt) &&
+                !std::equal(is.mt, is.mt + 16, last_seen[0].mt))
+                throw Failure(fmt::format("{}, it is LOST, and its mt is not the last one that was known", when));
+            last = records;
+        }
+    }
+    if (!told)
+        throw Skip("it tells nothing of markers that it does not see");
+}
+
 // ---- Speed -----------------------------------------------------------------------------------------
 
 void speed(Context &context) {
@@ -362,6 +409,10 @@ constexpr Test tests[] = {
     {"tracker.threads", "Any number of threads gives the same result.", kind, gate, 20s, threads},
     {"tracker.frames-before", "What is DETECTED is in this frame, and of this frame alone, whatever came before.",
      kind, "tracker.deterministic", 20s, frames_before},
+    {"tracker.not-seen", "What is not in view is left out, or PREDICTED or LOST, with its age and a rigid pose.",
+     kind, "tracker.frames-before", 20s, not_seen},
+    {"tracker.settles", "A print that stands still is told where it is within 60 frames, smoothed or not.", kind,
+     gate, 30s, settles},
     {"tracker.out-of-order", "Dropped, repeated and older frames are tracked like others.", kind,
      "tracker.deterministic", 20s, out_of_order},
     {"tracker.speed", "A frame of 640×480 takes less than 50 ms on the median; a warning otherwise.", kind, gate, 60s,

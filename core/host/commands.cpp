@@ -3,6 +3,9 @@
 
 #include "config/schema.hpp"
 #include "host/probe.hpp"
+#include "ring/text.hpp"
+
+#include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <csignal>
@@ -16,9 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path own_folder() {
-    return fs::read_symlink("/proc/self/exe").parent_path();
-}
 fs::path built_in_plugins() {
     return own_prefix() / "lib/arhost/plugins";
 }
@@ -278,6 +278,10 @@ fs::path own_prefix() {
     return own_folder().parent_path();
 }
 
+fs::path own_folder() {
+    return fs::read_symlink("/proc/self/exe").parent_path();
+}
+
 int run(const Arguments &arguments, supervise::Starter &launcher) {
     return run(read_configuration(arguments), arguments.verbose, launcher);
 }
@@ -313,7 +317,7 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
     if (configuration.raytracer) {
         std::optional<std::string> outcome;
         const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
-                                   configuration.raytracer->limits.start,
+                                   configuration.raytracer->limits.start, configuration.files,
                                    {[&](const ring::SharedMemory &) { outcome = ""; },
                                     [&](const std::string &reason) { outcome = reason; }});
         while (!outcome)
@@ -335,31 +339,28 @@ int list_plugins(bool with_options, const std::vector<fs::path> &reads, bool ver
         policy.readable.push_back(fs::absolute(path));
     int status = success;
     std::string level;
+    const auto print = [](const std::string &line) { std::printf("%s\n", ring::printable(line).c_str()); };
     for (const fs::path &file : files) {
         const ProbeResult result = probe(context, file, policy, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
-            std::printf("%-18s can't be used: %s\n", file.stem().c_str(), reason->c_str());
+            print(fmt::format("{:<18} can't be used: {}", file.stem().string(), *reason));
             status = run_failed;
             continue;
         }
         const auto &plugin = std::get<ring::PluginDescription>(result);
-        std::printf("%-18s %-10s %-8s %s\n", plugin.id.c_str(), ring::to_text(plugin.kind), plugin.version.c_str(),
-                    file.c_str());
-        std::printf("%-18s %s\n", "", plugin.description.c_str());
+        print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, ring::to_text(plugin.kind), plugin.version,
+                          file.string()));
+        print(fmt::format("{:<18} {}", "", plugin.description));
         for (const std::string &need : plugin.needs)
-            std::printf("%-18s needs 'allow: [%s]'\n", "", need.c_str());
+            print(fmt::format("{:<18} needs 'allow: [{}]'", "", need));
         if (!with_options)
             continue;
         for (const ring::OptionDeclaration &option : plugin.options) {
             const std::string standard =
                 option.default_value ? "default '" + *option.default_value + "'" : "required";
-            std::printf("    %-20s %s (%s)\n", option.key.c_str(), option.help.c_str(), standard.c_str());
-            if (!option.choices.empty()) {
-                std::printf("    %-20s one of:", "");
-                for (const std::string &choice : option.choices)
-                    std::printf(" %s", choice.c_str());
-                std::printf("\n");
-            }
+            print(fmt::format("    {:<20} {} ({})", option.key, option.help, standard));
+            if (!option.choices.empty())
+                print(fmt::format("    {:<20} one of: {}", "", fmt::join(option.choices, " ")));
         }
     }
     if (!level.empty())

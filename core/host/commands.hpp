@@ -34,7 +34,6 @@ struct ReplayArguments {
     bool with_pipeline = false;
 };
 
-// A launcher is to be forked before any thread.
 int run(const Arguments &arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
 int check(const Arguments &arguments, supervise::Starter &launcher);
@@ -44,7 +43,8 @@ int print_schema(bool markdown);
 // Becomes arhost-conform, which lies beside this program: the host itself opens no plugin.
 int conform(std::vector<std::string> arguments);
 
-// Where this arhost is installed: <prefix>/bin/arhost.
+// Where this arhost is installed: <prefix>/bin/arhost, in a folder with the programs that it starts.
 std::filesystem::path own_prefix();
+std::filesystem::path own_folder();
 
 } // namespace arhost::host

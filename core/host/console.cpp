@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/console.hpp"
 
+#include "ring/text.hpp"
+
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -17,15 +19,6 @@ template <class Sink>
 std::shared_ptr<spdlog::logger> make_logger(const std::shared_ptr<spdlog::details::thread_pool> &thread) {
     return std::make_shared<spdlog::async_logger>("arhost", std::make_shared<Sink>(), thread,
                                                   spdlog::async_overflow_policy::overrun_oldest);
-}
-
-// Whatever a component logs, it stays one line and can't steer the terminal.
-std::string one_line(const std::string &text) {
-    std::string line = text;
-    for (char &c : line)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-            c = ' ';
-    return line;
 }
 
 } // namespace
@@ -65,7 +58,7 @@ void Console::log(arhost_severity severity, const std::string &component, const 
     const char *blame = severity == ARHOST_SEVERITY_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
                         : severity == ARHOST_SEVERITY_HOST_MISBEHAVING ? "the host misbehaves: "
                                                                        : "";
-    log_->log(level, "{}: {}{}", component, blame, one_line(text));
+    log_->log(level, "{}: {}{}", component, blame, ring::printable(text));
 }
 
 void Console::show(const Progress &progress, const Statistics &statistics) {

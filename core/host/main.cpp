@@ -3,6 +3,7 @@
 // arhost: the command line.
 #include "host/commands.hpp"
 #include "host/new_plugin.hpp"
+#include "ring/text.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -23,6 +24,12 @@ void prepare_process() {
     ::close(fd);
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// One line, which no name of a file makes two.
+int refuse(const std::string &why, int exit_status) {
+    std::fprintf(stderr, "error: %s\n", arhost::ring::printable(why).c_str());
+    return exit_status;
 }
 
 } // namespace
@@ -102,6 +109,7 @@ int main(int argc, char **argv) {
     plugins_command->add_flag("--options", with_options, "With their options");
     std::vector<std::filesystem::path> reads;
     plugins_command->add_option("--reads", reads, "A folder where libraries of theirs lie (again for more)")
+        ->check(CLI::ExistingPath)
         ->type_name("FOLDER")
         ->allow_extra_args(false);
 
@@ -137,7 +145,7 @@ int main(int argc, char **argv) {
             return new_plugin(plugin, own_prefix());
         if (*conform_command)
             return conform(conform_command->remaining());
-        arhost::supervise::Launcher launcher; // before any thread
+        arhost::supervise::Launcher launcher(own_folder() / "arhost-launcher");
         if (*replay_command)
             return replay(arguments, replay_arguments, launcher);
         if (*check_command)
@@ -150,14 +158,11 @@ int main(int argc, char **argv) {
         }
         return run(arguments, launcher);
     } catch (const arhost::yaml::Error &error) {
-        std::fprintf(stderr, "error: %s\n", error.what());
-        return bad_configuration;
+        return refuse(error.what(), bad_configuration);
     } catch (
         const std::filesystem::filesystem_error &error) { // a name too long, a folder that may not be looked into
-        std::fprintf(stderr, "error: %s: %s\n", error.path1().c_str(), error.code().message().c_str());
-        return bad_configuration;
+        return refuse(error.path1().string() + ": " + error.code().message(), bad_configuration);
     } catch (const std::exception &error) {
-        std::fprintf(stderr, "error: %s\n", error.what());
-        return run_failed;
+        return refuse(error.what(), run_failed);
     }
 }

@@ -31,19 +31,35 @@ const std::map<std::string, Kind> kinds = {{"raytracer", {"raytracer", "rt_pytho
                                            {"source", {"source", "source_python", "in"}},
                                            {"sink", {"outputs[0]", "sink_python", "composited"}}};
 
-void check_name(const std::string &name, const fs::path &prefix) {
-    const auto refuse = [&](const std::string &why) { throw std::runtime_error("the name '" + name + "' " + why); };
+[[noreturn]] void refuse(const std::string &name, const std::string &why) {
+    throw std::runtime_error("the name '" + name + "' " + why);
+}
+[[noreturn]] void refuse_taken(const std::string &name, const std::string &by) {
+    refuse(name, by + "; choose another, as 'my_" + name + "'");
+}
+
+void check_name(const std::string &name, const std::string &language, const fs::path &prefix) {
     const auto fits = [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; };
     if (name.empty() || name.size() > 64 || !std::islower(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), fits))
-        refuse("must be 1 to 64 small letters, digits and underscores, the first a letter, as in 'my_tracer'");
-    // Targets of CMake's, crates of Rust's, modules of Python's.
-    for (const char *taken : {"all", "alloc", "arhost", "build", "clean", "core", "crate", "deps", "help", "install",
-                              "json", "numpy", "out", "package", "self", "std", "super", "sys", "test"})
+        refuse(name, "must be 1 to 64 small letters, digits and underscores, the first a letter, as in 'my_tracer'");
+    // Targets and libraries of CMake's, crates of Rust's, folders of all builds.
+    for (const char *taken :
+         {"all",   "alloc",  "arhost",  "arhost_sys",     "build",      "clean",         "core",
+          "crate", "depend", "deps",    "edit_cache",     "help",       "install",       "list_install_components",
+          "m",     "out",    "package", "package_source", "preinstall", "rebuild_cache", "self",
+          "std",   "super",  "test"})
         if (name == taken)
-            refuse("has a meaning of its own in a build tool or a language; choose another, as 'my_" + name + "'");
+            refuse_taken(name, "has a meaning of its own in a build tool or a language");
+    // A script's folder comes before Python's own modules, whose names are single words but for these.
+    if (language == "python" && name.find('_') == std::string::npos)
+        refuse_taken(name,
+                     "has no underscore, which every name in Python needs: it might hide a module of Python's own");
+    for (const char *module : {"py_compile", "pydoc_data", "sre_compile", "sre_constants", "sre_parse"})
+        if (language == "python" && name == module)
+            refuse_taken(name, "is that of a module of Python's");
     if (fs::exists(prefix / "lib/arhost/plugins" / (name + ".so")))
-        refuse("is that of a plugin that comes with arhost; choose another, as 'my_" + name + "'");
+        refuse_taken(name, "is that of a plugin that comes with arhost");
 }
 
 std::string camel_case(const std::string &name) {
@@ -77,9 +93,24 @@ std::string filled_in(std::string text, const Words &words) {
     return text;
 }
 
+bool has_word(const std::string &text, const std::string &word) {
+    const auto is_of_word = [&](std::size_t at) {
+        return at < text.size() && (std::isalnum(static_cast<unsigned char>(text[at])) || text[at] == '_');
+    };
+    for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; ++at)
+        if ((at == 0 || !is_of_word(at - 1)) && !is_of_word(at + word.size()))
+            return true;
+    return false;
+}
+
 void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
     std::ostringstream text;
     text << std::ifstream(from, std::ios::binary).rdbuf();
+    const std::string &name = words.at("@NAME@"), &type = words.at("@CLASS@");
+    if (text.str().find("@CLASS@") != std::string::npos && has_word(text.str(), type))
+        refuse_taken(name, "makes a class '" + type + "', a word that the skeleton uses for something else");
+    if (fs::exists(to))
+        refuse_taken(name, "is that of another file of the skeleton");
     fs::create_directories(to.parent_path());
     std::ofstream file(to, std::ios::binary);
     file << filled_in(text.str(), words) << std::flush;
@@ -101,7 +132,7 @@ void copy_folder(const fs::path &from, const fs::path &to, const Words &words) {
 } // namespace
 
 int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
-    check_name(plugin.name, prefix);
+    check_name(plugin.name, plugin.language, prefix);
     const fs::path folder = plugin.into / plugin.name;
     if (fs::symlink_status(folder).type() != fs::file_type::not_found)
         throw std::runtime_error(folder.string() +

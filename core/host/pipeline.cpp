@@ -20,6 +20,10 @@ constexpr std::size_t reads_in_flight = 2;
 constexpr std::size_t live_sink_depth = 3;
 constexpr std::uint32_t max_tries = 2; // a frame that was in a worker's hands at two deaths is suspect
 
+std::int64_t now_ns() {
+    return std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
+}
+
 std::shared_ptr<SlotPool> pool_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
 }
@@ -55,9 +59,9 @@ bool Pipeline::run() {
             fail(reason, true);
             scene_loading_.reset();
         };
-        scene_loading_ =
-            std::make_unique<SceneLoading>(context_, configuration_.raytracer->scene, configuration_.sandbox,
-                                           configuration_.raytracer->limits.start, std::move(hooks));
+        scene_loading_ = std::make_unique<SceneLoading>(
+            context_, configuration_.raytracer->scene, configuration_.sandbox, configuration_.raytracer->limits.start,
+            configuration_.files, std::move(hooks));
     }
     while (phase_ != Phase::over) {
         context_.reactor.run_once();
@@ -86,9 +90,12 @@ Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &
 void Pipeline::make_source() {
     const config::SourceConfiguration &source = *configuration_.source;
     Component::Hooks hooks = hooks_for("source", source.node);
-    hooks.hello = [this, &source](const PluginDescription &plugin, std::size_t candidate) {
+    hooks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &plugin,
+                                                         std::size_t candidate) mutable {
+        if (std::exchange(last, candidate) != candidate)
+            source_promises_.reset(); // another plugin's
         const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate));
-        Json setup = {{"first_sequence", next_read_}, {"fps", source.fps}, {"paced", live_}};
+        Json setup = {{"first_sequence", next_read_ + skipped_}, {"fps", source.fps}, {"paced", live_}};
         if (configuration_.camera)
             setup["intrinsics"] = to_json(*configuration_.camera);
         return Component::Create{{{"options", options}, {"setup", setup}}, {}};
@@ -100,6 +107,9 @@ void Pipeline::make_source() {
             throw std::runtime_error("the restarted source gives frames of another format");
         format_ = format;
         frame_count_ = ready.at("frame_count").get<std::uint64_t>();
+        const bool is_live = (source_->description().capabilities & ARHOST_IS_LIVE) != 0;
+        if (source.conform && !source_promises_)
+            source_promises_.emplace(SourcePromises::Rate{is_live ? 0 : format.fps, source.fps > 0, live_}, now_ns());
         if (configuration_.camera)
             intrinsics_ = *configuration_.camera;
         else if (ready.contains("intrinsics"))
@@ -393,19 +403,20 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     frame->record.struct_size = sizeof(arhost_record);
     frame->record.sequence = command.sequence;
     frame->record.overlay = ARHOST_OVERLAY_NONE;
-    const std::int64_t now_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
-    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, now_ns, frame->record)) {
+    const std::int64_t came_ns = now_ns();
+    if (const char *problem = take_frame_info(result.frame, last_capture_ns_, came_ns, frame->record)) {
         next_read_ = command.sequence;
         return source_->end_process(std::string("broke the contract: ") + problem);
     }
     last_capture_ns_ = result.frame.capture_ns;
     frame->pixels = std::move(pixels);
     if (configuration_.source->conform) {
-        look_at_capture_time(statistics_.promises, frame->record, now_ns);
+        source_promises_->look(statistics_.promises, frame->record, result.frame.skipped, came_ns);
         frame->pixels_sample = sample_of(frame->pixels.bytes(), frame->record.sequence);
     }
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
-    statistics_.dropped["source"] += result.frame.skipped;
+    skipped_ += result.frame.skipped;
+    statistics_.dropped["source"] = skipped_;
     statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
     begin(std::move(frame));
 }

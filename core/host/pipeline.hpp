@@ -113,6 +113,7 @@ private:
 
     std::deque<Lease> reads_; // the slots of the reads under way, oldest first
     std::uint64_t next_read_ = 0;
+    std::uint64_t skipped_ = 0; // by the source, before that
     std::int64_t last_capture_ns_ = INT64_MIN;
     bool ended_ = false; // the source has said so, or shall give no more
     bool interrupted_ = false;
@@ -121,6 +122,7 @@ private:
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // and the frame it belongs to
 
     Statistics statistics_;
+    std::optional<SourcePromises> source_promises_; // of the plugin at work, over its restarts
     std::optional<OverlayPromises> overlay_promises_;
     std::string failure_;
     bool failed_by_configuration_ = false;

@@ -20,6 +20,10 @@ std::uint32_t first_of(std::uint64_t frame) {
     return static_cast<std::uint32_t>((frame + frame / share) % share);
 }
 
+double seconds(std::int64_t ns) {
+    return 1e-9 * static_cast<double>(ns);
+}
+
 std::string name_of(const arhost_marker &marker) {
     return fmt::format("marker {}", marker.id);
 }
@@ -109,13 +113,46 @@ void Promises::look(const std::string &name, std::uint64_t frame, const std::str
         on_first_(name, promise.first);
 }
 
-void look_at_capture_time(Promises &promises, const arhost_record &record, std::int64_t now_ns) {
-    if (record.clock != ARHOST_CLOCK_MONOTONIC)
-        return;
+void SourcePromises::look(Promises &promises, const arhost_record &record, std::uint32_t skipped,
+                          std::int64_t now_ns) {
+    const bool is_first = clock_ == 0;
+    if (is_first)
+        clock_ = record.clock;
+    promises.look(
+        "source.clock", record.sequence,
+        record.clock == clock_ ? "" : fmt::format("has the clock {}, those before had {}", record.clock, clock_));
+
     // As numbers that can't overflow: a source may tell any.
-    const double age_s = 1e-9 * (static_cast<double>(now_ns) - static_cast<double>(record.capture_ns));
-    promises.look("source.capture-time", record.sequence,
-                  age_s < 0 ? fmt::format("was captured {:.3f} s after it came", -age_s) : std::string());
+    const double capture_s = seconds(record.capture_ns), age_s = seconds(now_ns) - capture_s;
+    std::string problem;
+    if (record.clock == ARHOST_CLOCK_MONOTONIC && age_s < 0)
+        problem = fmt::format("was captured {:.3f} s after it came", -age_s);
+    if (record.clock == ARHOST_CLOCK_MEDIA && capture_s < 0)
+        problem = fmt::format("is of {:.3f} s, before the beginning", capture_s);
+    promises.look("source.capture-time", record.sequence, problem);
+
+    if (is_first)
+        first_s_ = last_s_ = capture_s;
+    if (rate_.fps > 0 && record.clock == clock_ && clock_ == ARHOST_CLOCK_MEDIA)
+        promises.look("source.rate", record.sequence,
+                      is_first ? "" : problem_with_rate(capture_s - first_s_, capture_s - last_s_, skipped, now_ns));
+    last_s_ = capture_s;
+}
+
+std::string SourcePromises::problem_with_rate(double since_first_s, double since_last_s, std::uint32_t skipped,
+                                              std::int64_t now_ns) const {
+    // Of files' clocks; and what a source may begin with before its start returns.
+    constexpr double tolerance_s = 0.001, head_start_s = 1;
+    const double step_s = (1.0 + skipped) / rate_.fps;
+    if (rate_.is_asked && std::abs(since_last_s - step_s) > tolerance_s)
+        return fmt::format("comes {:.3f} s after the one before, which at {:g} frames a second, {} of them skipped, "
+                           "is {:.3f} s",
+                           since_last_s, rate_.fps, skipped, step_s);
+    const double elapsed_s = seconds(now_ns) - seconds(began_ns_);
+    if (rate_.is_paced && since_first_s > elapsed_s + head_start_s)
+        return fmt::format("is {:.3f} s behind the first, and came {:.3f} s after the start", since_first_s,
+                           elapsed_s);
+    return {};
 }
 
 void look_at_markers(Promises &promises, const arhost_record &record, const arhost_intrinsics &intrinsics,

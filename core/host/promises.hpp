@@ -44,8 +44,30 @@ private:
     std::map<std::string, Promise> all_;
 };
 
-// source.capture-time: on the monotonic clock, a frame was captured before now.
-void look_at_capture_time(Promises &promises, const arhost_record &record, std::int64_t now_ns);
+// source.clock: all frames have the same.
+// source.capture-time: on the monotonic clock, a frame was captured before now; media time begins at 0 or later.
+// source.rate: media time goes on as `Rate` has it, the skipped frames counted.
+class SourcePromises {
+public:
+    struct Rate {
+        double fps = 0; // that the source tells; 0: none, or it is live
+        bool is_asked =
+            false; // by the configuration: each frame is 1/fps behind the one before; a film's own need not be
+        bool is_paced = false; // mode live: no faster than the clock, either
+    };
+    SourcePromises(const Rate &rate, std::int64_t now_ns) : rate_(rate), began_ns_(now_ns) {}
+    // `record` is of a frame that has come at `now_ns` of CLOCK_MONOTONIC, and has sequence, clock and time.
+    void look(Promises &promises, const arhost_record &record, std::uint32_t skipped, std::int64_t now_ns);
+
+private:
+    std::string problem_with_rate(double since_first_s, double since_last_s, std::uint32_t skipped,
+                                  std::int64_t now_ns) const;
+
+    Rate rate_;
+    std::int64_t began_ns_;
+    arhost_clock clock_ = 0; // of all frames; 0: there was none
+    double first_s_ = 0, last_s_ = 0;
+};
 
 // tracker.order, tracker.numbers, and tracker.pose: corners are as far from where the pose has them as is told.
 void look_at_markers(Promises &promises, const arhost_record &record, const arhost_intrinsics &intrinsics,

@@ -25,16 +25,19 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
 } // namespace
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                           std::chrono::milliseconds patience, Hooks hooks)
-    : context_(context), hooks_(std::move(hooks)), scene_(scene.string()), patience_(patience) {
+                           std::chrono::milliseconds patience, config::FilesInUse files, Hooks hooks)
+    : context_(context), hooks_(std::move(hooks)), files_(std::move(files)), scene_(scene.string()),
+      patience_(patience) {
     supervise::Process::Events events;
     events.message = [this](Message &message) {
         const std::string type = message.body.at("type").get<std::string>();
         watch();
         if (type == "failed")
-            failure_ = message.body.at("text").get<std::string>();
+            fail(message.body.at("text").get<std::string>());
         else if (type == "loaded" && message.fds.size() == 1)
             arena_ = std::move(message.fds[0]);
+        else if (type == "reads")
+            look_at({message.body.at("path").get<std::string>(), message.body.at("node").get<std::string>()});
         else if (type == "progress")
             context_.log(ARHOST_SEVERITY_DEBUG, "scene", message.body.at("what").get<std::string>());
     };
@@ -53,10 +56,24 @@ void SceneLoading::watch() {
     });
 }
 
+void SceneLoading::look_at(const FileIdentity &file_read) {
+    try {
+        files_.check_read(file_read);
+    } catch (const yaml::Error &error) {
+        fail(error.what());
+        process_->end("no longer needed");
+    }
+}
+
+void SceneLoading::fail(const std::string &reason) {
+    if (failure_.empty()) // the first is the cause
+        failure_ = reason;
+}
+
 void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
     const Hooks hooks = std::move(hooks_);
-    if (!death.clean || !arena_)
+    if (!failure_.empty() || !death.clean || !arena_)
         return hooks.failed(failure_.empty() ? scene_ + ": the scene loader was " + death.how : failure_);
     try {
         // The loader is gone, so nobody maps it writable; where somebody does, this throws.

@@ -4,6 +4,7 @@
 // comes back before anyone else sees it.
 #pragma once
 
+#include "config/files_in_use.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
@@ -22,16 +23,19 @@ public:
         std::function<void(ring::SharedMemory arena)> loaded; // frozen and valid
         std::function<void(const std::string &reason)> failed;
     };
-    // `patience`: the longest time without a word of progress.
+    // `patience`: the longest time without a word of progress. Fails where one of `files` that is written is read.
     SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                 std::chrono::milliseconds patience, Hooks hooks);
+                 std::chrono::milliseconds patience, config::FilesInUse files, Hooks hooks);
 
 private:
     void watch();
+    void look_at(const ring::FileIdentity &file_read);
+    void fail(const std::string &reason);
     void on_died(const supervise::Death &death);
 
     supervise::Context &context_;
     Hooks hooks_;
+    config::FilesInUse files_;
     std::string scene_, failure_;
     ring::UniqueFd arena_;
     std::chrono::milliseconds patience_;

@@ -28,7 +28,7 @@ ThreadStarter::~ThreadStarter() {
         thread.join();
 }
 
-supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &) {
+supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const supervise::LogFunction &) {
     supervise::Spawned spawned;
     ring::Channel theirs;
     std::tie(spawned.channel, theirs) = ring::Channel::make_pair();

@@ -20,7 +20,8 @@ public:
     ThreadStarter(const ThreadStarter &) = delete;
     ThreadStarter &operator=(const ThreadStarter &) = delete;
 
-    supervise::Spawned spawn(const std::filesystem::path &program) override; // the program is not looked at
+    // The program is not looked at.
+    supervise::Spawned spawn(const std::filesystem::path &program, const supervise::LogFunction &log) override;
     supervise::Exit wait_exit(pid_t pid) override;
 
 private:

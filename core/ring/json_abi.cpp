@@ -14,8 +14,9 @@ std::string text_or_empty(const char *text) {
 // A string of a message, of a sane length.
 std::string text_of(const Json &json, const char *key) {
     std::string text = json.at(key).get<std::string>();
-    if (text.size() > 4096)
-        throw std::runtime_error(std::string("'") + key + "' is too long");
+    if (text.size() > max_text_size)
+        throw std::runtime_error(std::string("the descriptor's '") + key + "' has " + std::to_string(text.size()) +
+                                 " bytes, and " + std::to_string(max_text_size) + " are the most");
     return text;
 }
 
@@ -28,21 +29,27 @@ double finite(const Json &json, const char *key) {
 
 } // namespace
 
+std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor) {
+    std::vector<const arhost_option_descriptor *> all;
+    for (std::uint32_t i = 0; i < descriptor.option_count; ++i)
+        all.push_back(reinterpret_cast<const arhost_option_descriptor *>(
+            reinterpret_cast<const std::byte *>(descriptor.options) +
+            std::size_t{i} * descriptor.options->struct_size));
+    return all;
+}
+
 Json to_json(const arhost_descriptor &d) {
     Json options = Json::array();
-    for (std::uint32_t i = 0; i < d.option_count; ++i) {
-        // Elements are as long as the plugin's headers had them, which may be newer than these.
-        const auto &o = *reinterpret_cast<const arhost_option_descriptor *>(
-            reinterpret_cast<const char *>(d.options) + std::size_t(i) * d.options->struct_size);
-        Json option = {{"key", text_or_empty(o.key)},
-                       {"type", o.type},
-                       {"minimum", o.minimum},
-                       {"maximum", o.maximum},
-                       {"help", text_or_empty(o.help)}};
-        if (o.default_value)
-            option["default"] = o.default_value;
+    for (const arhost_option_descriptor *o : options_of(d)) {
+        Json option = {{"key", text_or_empty(o->key)},
+                       {"type", o->type},
+                       {"minimum", o->minimum},
+                       {"maximum", o->maximum},
+                       {"help", text_or_empty(o->help)}};
+        if (o->default_value)
+            option["default"] = o->default_value;
         option["choices"] = Json::array();
-        for (const char *const *choice = o.choices; choice && *choice; ++choice)
+        for (const char *const *choice = o->choices; choice && *choice; ++choice)
             option["choices"].push_back(*choice);
         options.push_back(std::move(option));
     }

@@ -38,6 +38,12 @@ struct OptionValue {
     std::string text;
 };
 
+// The options in a descriptor: elements are as long as the plugin's headers had them, which may be newer than these.
+std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
+
+// What a host takes of a descriptor: in a text of it, and in all as JSON, which must fit a hello.
+constexpr std::size_t max_text_size = 4096, max_descriptor_size = Channel::max_message_size - 1024;
+
 Json to_json(const arhost_descriptor &descriptor);
 PluginDescription description_from_json(const Json &json);
 

@@ -12,10 +12,8 @@
 namespace arhost::scene {
 namespace {
 
-constexpr std::size_t alignment = 64, spare_bytes = 16;
-
 constexpr std::uint64_t align_up(std::uint64_t size) {
-    return (size + alignment - 1) / alignment * alignment;
+    return (size + arena_alignment - 1) / arena_alignment * arena_alignment;
 }
 
 // Puts buffers one behind the other; where there is no memory, it only counts.
@@ -30,7 +28,7 @@ public:
         if (values.size() > ARHOST_NONE)
             throw std::length_error("more than 2^32 elements in one buffer of the scene");
         const std::uint64_t offset = end_;
-        end_ = align_up(offset + values.size_bytes() + spare_bytes);
+        end_ = align_up(offset + values.size_bytes() + arena_spare_bytes);
         if (arena_) {
             std::memcpy(arena_ + offset, values.data(), values.size_bytes());
             std::memset(arena_ + offset + values.size_bytes(), 0, end_ - offset - values.size_bytes());
@@ -161,7 +159,7 @@ arhost_light make_light(arhost_light_type type) {
 }
 
 Arena::Arena(std::size_t byte_size)
-    : size_(byte_size), bytes_(static_cast<std::byte *>(std::aligned_alloc(alignment, align_up(byte_size)))) {
+    : size_(byte_size), bytes_(static_cast<std::byte *>(std::aligned_alloc(arena_alignment, align_up(byte_size)))) {
     if (!bytes_)
         throw std::bad_alloc();
 }
@@ -258,7 +256,7 @@ std::size_t ArenaBuilder::byte_size() const {
 
 void ArenaBuilder::write(std::span<std::byte> arena) && {
     const std::size_t size = byte_size();
-    if (arena.size() < size || reinterpret_cast<std::uintptr_t>(arena.data()) % alignment != 0)
+    if (arena.size() < size || reinterpret_cast<std::uintptr_t>(arena.data()) % arena_alignment != 0)
         throw std::invalid_argument("the memory for the scene is too small or not aligned to 64 bytes");
 
     arhost_scene scene{};

@@ -25,6 +25,7 @@ namespace arhost::scene {
 
 // No coordinate may be larger, so that no ray tracer's arithmetic overflows.
 inline constexpr float coordinate_limit_mm = 1e9f;
+inline constexpr std::size_t arena_alignment = 64, arena_spare_bytes = 16; // of and behind each buffer, by scene.h
 inline constexpr std::uint32_t max_depth_limit = 100;
 inline constexpr std::uint32_t texture_side_limit = 16384;
 inline constexpr float radiance_limit = 1e6f;   // of texels and of what is given off

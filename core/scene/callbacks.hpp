@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -12,6 +13,7 @@ struct LoadCallbacks {
     std::function<void(double fraction, const std::string &what)> progress; // 0 to 1, several times a second
     std::function<bool()> cancelled;                                        // true: stop, throwing Cancelled
     std::function<void(const std::string &)> info, warning;                 // one sentence for the log
+    std::function<void(const std::filesystem::path &)> reads;               // a file that is about to be opened
 };
 
 class Cancelled : public std::runtime_error {

@@ -38,7 +38,8 @@ bool is_file(const std::string &file, void *) { // a FIFO would be waited for
     return std::filesystem::is_regular_file(file, ignored);
 }
 
-bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *) {
+bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *watch) {
+    static_cast<const Watch *>(watch)->reads(file);
     std::error_code ignored;
     if (is_file(file, nullptr) && std::filesystem::file_size(file, ignored) <= file_limit)
         return tinygltf::ReadWholeFile(content, error, file, nullptr);
@@ -117,7 +118,8 @@ tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
     check_structure(text);
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
-    parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, nullptr});
+    parser.SetFsCallbacks(
+        {is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, const_cast<Watch *>(&watch)});
     tinygltf::Model model;
     std::string error, warning;
     const std::string folder = file.parent_path().string();

@@ -111,6 +111,8 @@ void accumulate(std::span<const double> values, std::span<float> sums) {
 
 Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Watch &watch) {
     const std::string name = file.string();
+    if (content.empty())
+        watch.reads(file);
     const char *format = format_of(
         content.empty() ? start_of(file)
                         : std::string(content.begin(), content.begin() + std::min<std::size_t>(8, content.size())));

@@ -41,6 +41,7 @@ std::string mebibytes(std::uint64_t bytes) {
 }
 
 Bytes read_whole(const std::string &name, std::uint64_t byte_limit, const Watch &watch) {
+    watch.reads(name);
     const File file(name);
     struct stat status {};
     if (file.fd() < 0 || fstat(file.fd(), &status) != 0)

@@ -44,6 +44,10 @@ public:
         if (callbacks_.info)
             callbacks_.info(text);
     }
+    void reads(const std::filesystem::path &file) const {
+        if (callbacks_.reads)
+            callbacks_.reads(file);
+    }
 
 private:
     const LoadCallbacks &callbacks_;

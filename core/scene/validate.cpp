@@ -16,7 +16,6 @@
 namespace arhost::scene {
 namespace {
 
-constexpr std::size_t alignment = 64, spare_bytes = 16;
 constexpr float extinction_limit = 1e6f;
 // Of lengths, sums of weights and the bounds' fit: what float arithmetic may lose.
 constexpr float tolerance = 1e-3f;
@@ -115,7 +114,7 @@ public:
 
 private:
     void check_header() {
-        if (reinterpret_cast<std::uintptr_t>(arena_.data()) % alignment != 0)
+        if (reinterpret_cast<std::uintptr_t>(arena_.data()) % arena_alignment != 0)
             fault("it does not lie at a multiple of 64 bytes in memory");
         if (arena_.size() < sizeof(arhost_scene))
             fault("it is too short for its header");
@@ -157,11 +156,11 @@ private:
         if (buffer.stride != sizeof(T))
             fault(what + " has a stride of " + std::to_string(buffer.stride) + " bytes, not " +
                   std::to_string(sizeof(T)));
-        if (buffer.offset % alignment != 0)
+        if (buffer.offset % arena_alignment != 0)
             fault(what + " does not begin at a multiple of 64 bytes");
         if (buffer.offset < sizeof(arhost_scene))
             fault(what + " lies over the header");
-        const std::uint64_t needed = std::uint64_t(buffer.count) * sizeof(T) + spare_bytes; // < 2^32 · 2^7
+        const std::uint64_t needed = std::uint64_t(buffer.count) * sizeof(T) + arena_spare_bytes; // < 2^32 · 2^7
         if (buffer.offset > arena_.size() || needed > arena_.size() - buffer.offset)
             fault(what + " reaches past the end of the scene");
         if (needed > unclaimed_)

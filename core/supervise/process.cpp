@@ -45,7 +45,7 @@ void signal_process(const UniqueFd &pidfd, int signal) {
 
 Process::Process(Context &context, std::string name, Events events, const Json &first)
     : context_(context), name_(std::move(name)), events_(std::move(events)),
-      spawned_(context.launcher.spawn(context.worker_program)),
+      spawned_(context.launcher.spawn(context.worker_program, context.log)),
       host_memory_(SharedMemory::create("arhost-host-page", sizeof(HostPage))),
       worker_memory_(SharedMemory::create("arhost-worker-page", sizeof(WorkerPage))),
       host_page_(host_memory_.map(Access::read_write)), worker_page_(worker_memory_.map(Access::read_only)),

@@ -9,16 +9,11 @@
 #include "ring/reactor.hpp"
 #include "supervise/launcher.hpp"
 
-#include <arhost/plugin.h>
-
 #include <deque>
 #include <functional>
 #include <string>
 
 namespace arhost::supervise {
-
-using LogFunction =
-    std::function<void(arhost_severity severity, const std::string &component, const std::string &text)>;
 
 // What every component of a host shares.
 struct Context {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/library.hpp"
 
+#include "ring/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <dlfcn.h>
 #include <initializer_list>
 #include <span>
@@ -33,11 +35,19 @@ void check_functions(const std::filesystem::path &file, NamedFunctions functions
             refuse(file, "its function '" + std::string(name) + "' is NULL, which " + owner + " must have");
 }
 
+// Where a struct ended in version 1. A plugin that knows no more of it is as good as any (docs/abi.md).
+#define ARHOST_SIZE_UP_TO(type, last) (offsetof(type, last) + sizeof(type::last))
+constexpr std::size_t entry_point_size = ARHOST_SIZE_UP_TO(arhost_entry_point, negotiate),
+                      plugin_size = ARHOST_SIZE_UP_TO(arhost_plugin, get_extension),
+                      descriptor_size = ARHOST_SIZE_UP_TO(arhost_descriptor, needs),
+                      option_size = ARHOST_SIZE_UP_TO(arhost_option_descriptor, help);
+template <class Functions> constexpr std::size_t functions_size = ARHOST_SIZE_UP_TO(Functions, stop);
+
 template <class Functions, class PerFrame>
 void check_kind(const std::filesystem::path &file, const void *given, PerFrame per_frame, const char *name,
                 const std::string &owner) {
     const auto &f = *static_cast<const Functions *>(given);
-    if (f.struct_size < sizeof f)
+    if (f.struct_size < functions_size<Functions>)
         refuse(file, "the struct of its functions is shorter than that of " + owner +
                          "; build it against this arhost's headers");
     check_functions(file, {{"start", f.start}, {name, f.*per_frame}, {"stop", f.stop}}, owner);
@@ -76,7 +86,7 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
         refuse(file, "is no arhost plugin: it exports no symbol 'arhost_entry'");
-    if (entry->struct_size < sizeof(arhost_entry_point) || !entry->negotiate)
+    if (entry->struct_size < entry_point_size || !entry->negotiate)
         refuse(file,
                "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
     return *entry;
@@ -93,9 +103,9 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
                          ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
-    if (!plugin || plugin->struct_size < sizeof(arhost_plugin))
+    if (!plugin || plugin->struct_size < plugin_size)
         refuse(file, "its negotiate gave no (whole) arhost_plugin");
-    if (!plugin->descriptor || plugin->descriptor->struct_size < sizeof(arhost_descriptor) || !plugin->descriptor->id)
+    if (!plugin->descriptor || plugin->descriptor->struct_size < descriptor_size || !plugin->descriptor->id)
         refuse(file, "has no (whole) descriptor");
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
@@ -110,9 +120,13 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
         refuse(file, "its descriptor counts options but lists none");
     if (plugin->descriptor->option_count > 0 &&
-        (plugin->descriptor->options->struct_size < sizeof(arhost_option_descriptor) ||
+        (plugin->descriptor->options->struct_size < option_size ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
         refuse(file, "its options' struct_size is not that of an arhost_option_descriptor");
+    const auto options = ring::options_of(*plugin->descriptor);
+    if (const auto found = std::ranges::find(options, nullptr, &arhost_option_descriptor::key);
+        found != options.end())
+        refuse(file, "its option " + std::to_string(found - options.begin()) + " has no key");
     check_kind(file, *plugin);
     return *plugin;
 }

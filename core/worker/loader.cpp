@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/loader.hpp"
 
+#include "ring/file_identity.hpp"
 #include "scene/loader.hpp"
 
 #include <arhost/plugin.h>
@@ -14,6 +15,10 @@ int load_scene_for(Link &link, const ring::Message &load) {
     callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
     callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
     callbacks.warning = [&](const std::string &text) { link.log(ARHOST_SEVERITY_WARNING, text); };
+    callbacks.reads = [&](const std::filesystem::path &file) {
+        const ring::FileIdentity identity = ring::identity_of(file);
+        link.send({{"type", "reads"}, {"path", identity.path}, {"node", identity.node}});
+    };
     scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);
     const ring::SharedMemory memory = ring::SharedMemory::create("arhost-scene", builder.byte_size());
     {

@@ -29,7 +29,7 @@ public:
         const Json &json = create.body.at("setup");
         arhost_source_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.first_sequence = json.at("first_sequence").get<std::uint64_t>();
+        setup.first_sequence = next_ = json.at("first_sequence").get<std::uint64_t>();
         setup.fps = json.at("fps").get<double>();
         setup.paced = json.at("paced").get<bool>();
         arhost_intrinsics intrinsics{};
@@ -65,9 +65,11 @@ public:
         for (std::uint32_t i = 0; i < format_.plane_count; ++i)
             buffer.plane[i] = as_pixels(slot) + format_.offset[i];
         buffer.grey = as_pixels(slot) + format_.grey_offset;
-        buffer.sequence = command.sequence;
+        buffer.sequence = next_;
         result.frame.struct_size = sizeof result.frame;
         const arhost_status status = source_.read(instance_, &buffer, &result.frame);
+        if (status == ARHOST_OK)
+            next_ += std::uint64_t{1} + result.frame.skipped;
         // Once for all trackers, and out of the host's process.
         if (status == ARHOST_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
             fill_grey(format_, buffer.plane, buffer.grey);
@@ -80,6 +82,7 @@ private:
     const arhost_source &source_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
+    std::uint64_t next_ = 0; // by the source's count, which has what it skips
 };
 
 class TrackerService final : public Service {

@@ -4,9 +4,11 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <set>
@@ -55,6 +57,21 @@ std::vector<std::string> split_path(const std::string &path) {
 
 std::string place_in(const std::string &name, const YAML::Mark &mark) {
     return name + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
+}
+
+std::filesystem::path without_dots(const std::filesystem::path &path) {
+    std::filesystem::path result;
+    std::error_code error; // what is not there is no link
+    for (const std::filesystem::path &part : std::filesystem::absolute(path)) {
+        if (part == ".." && std::filesystem::is_symlink(result, error))
+            if (const auto target = std::filesystem::weakly_canonical(result, error); !error)
+                result = target;
+        if (part == "..")
+            result = result.parent_path();
+        else if (part != ".")
+            result /= part;
+    }
+    return result;
 }
 
 // Where documents begin, and nothing else of them.
@@ -278,21 +295,28 @@ std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
 
 double Node::real(double minimum, double maximum) const {
     const std::string text = scalar("a number");
+    std::string digits = text.substr(text.starts_with('+') ? 1 : 0);
+    if (const std::size_t dot = digits.find('.');
+        dot != std::string::npos && std::isalpha(static_cast<unsigned char>(digits[dot + 1])))
+        digits.erase(dot, 1); // YAML's .inf and .nan
     double value = 0;
-    const char *begin = text.data() + (text.starts_with('+') ? 1 : 0);
-    const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    const char *end_of_text = digits.data() + digits.size();
+    const auto [end, error] = std::from_chars(digits.data(), end_of_text, value);
+    if (error == std::errc::invalid_argument || end != end_of_text)
         fail("must be a number, is '" + text + "'");
-    if (value < minimum || value > maximum) {
-        std::ostringstream range;
-        if (std::isinf(maximum))
-            range << "must be at least " << minimum;
-        else if (std::isinf(minimum))
-            range << "must be at most " << maximum;
-        else
-            range << "must be " << minimum << " to " << maximum;
-        fail(range.str() + ", is " + text);
-    }
+    std::ostringstream range;
+    if (std::isfinite(minimum) && std::isfinite(maximum))
+        range << minimum << " to " << maximum;
+    else if (std::isfinite(minimum))
+        range << "at least " << minimum;
+    else if (std::isfinite(maximum))
+        range << "at most " << maximum;
+    const bool too_small = error != std::errc() && std::abs(std::strtod(digits.c_str(), nullptr)) < 1;
+    if (error != std::errc() || !std::isfinite(value))
+        fail((too_small ? "must be a number farther from 0" : "must be a finite number") +
+             (range.str().empty() ? "" : ", " + range.str()) + ", is " + text);
+    if (value < minimum || value > maximum)
+        fail("must be " + range.str() + ", is " + text);
     return value;
 }
 
@@ -300,6 +324,8 @@ std::string Node::text() const {
     std::string value = scalar("text");
     if (value.empty())
         fail("must not be empty");
+    if (value.find('\0') != std::string::npos) // where a name would end for the kernel
+        fail("must not have a NUL character in it");
     return value;
 }
 
@@ -330,7 +356,11 @@ std::vector<double> Node::reals(std::size_t count) const {
 std::filesystem::path Node::input_path() const {
     const std::filesystem::path value = text();
     const std::filesystem::path base = is_overridden() ? std::filesystem::path() : file().parent_path();
-    return std::filesystem::absolute(base / value).lexically_normal();
+    return without_dots(base / value);
+}
+
+std::filesystem::path Node::output_path() const {
+    return without_dots(text());
 }
 
 } // namespace arhost::yaml

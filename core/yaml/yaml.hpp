@@ -94,8 +94,9 @@ public:
     std::vector<double> reals() const;                  // a sequence of finite numbers
     std::vector<double> reals(std::size_t count) const; // exactly so many
 
-    // A path relative to the folder of the document's file (to the working directory after `--set`).
-    std::filesystem::path input_path() const;
+    // Absolute paths, without dots: `..` behind a link leads up from its target, as it does for the kernel.
+    std::filesystem::path input_path() const;  // from the folder of the document's file (after `--set` as below)
+    std::filesystem::path output_path() const; // from the working directory
 
 private:
     struct Document {

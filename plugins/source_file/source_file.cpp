@@ -55,7 +55,7 @@ public:
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        std::uint64_t frame = buffer.sequence + skipped_;
+        std::uint64_t frame = buffer.sequence;
         if (const arhost_status status = go_to(frame); status != ARHOST_OK)
             return status;
         if (paced_)
@@ -124,7 +124,7 @@ private:
 
     // Waits until `frame` is due. Where that is past already, goes on to the frame that is due now.
     arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
-        const auto period_ns = static_cast<std::int64_t>(1e9 / fps_);
+        const auto period_ns = std::max(static_cast<std::int64_t>(1e9 / fps_), std::int64_t{1});
         if (!epoch_set_) {
             epoch_ns_ = now_ns() - time_ns(frame);
             epoch_set_ = true;
@@ -133,7 +133,6 @@ private:
             // At most a second's frames: after a long halt the time in between was not meant to be seen.
             info.skipped = static_cast<std::uint32_t>(std::min(late_ns, std::int64_t{1'000'000'000}) / period_ns);
             frame += info.skipped;
-            skipped_ += info.skipped;
             if (const arhost_status status = go_to(frame); status != ARHOST_OK)
                 return status;
             // A decoder that can't keep up plays slower, instead of skipping ever more.
@@ -158,7 +157,6 @@ private:
 
     bool paced_ = false, epoch_set_ = false;
     std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
-    std::uint64_t skipped_ = 0; // frames that were not given since they would have been late
 };
 
 using arhost::option;

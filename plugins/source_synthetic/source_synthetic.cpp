@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <thread>
 
@@ -123,7 +124,7 @@ public:
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        std::uint64_t frame = buffer.sequence + skipped_;
+        std::uint64_t frame = buffer.sequence;
         if (paced_)
             if (const arhost_status status = wait_for(frame, info); status != ARHOST_OK)
                 return status;
@@ -182,11 +183,10 @@ private:
             epoch_set_ = true;
         }
         const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame);
-        if (const auto late = static_cast<std::uint32_t>(std::max(0.0, static_cast<double>(late_ns) * fps_ / 1e9))) {
-            info.skipped = late;
-            skipped_ += late;
-            frame += late;
-        }
+        // What does not fit, after a halt of weeks, is left out with the next frame.
+        constexpr double most = std::numeric_limits<std::uint32_t>::max();
+        info.skipped = static_cast<std::uint32_t>(std::clamp(static_cast<double>(late_ns) * fps_ / 1e9, 0.0, most));
+        frame += info.skipped;
         const std::chrono::steady_clock::time_point due(std::chrono::nanoseconds(epoch_ns_ + time_ns(frame)));
         return host_.wait_until(due) ? ARHOST_OK : ARHOST_ERROR_CANCELLED;
     }
@@ -209,7 +209,6 @@ private:
 
     bool paced_ = false, epoch_set_ = false;
     std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
-    std::uint64_t skipped_ = 0; // frames that were not given since they would have been late
 };
 
 using arhost::option;

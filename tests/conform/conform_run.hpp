@@ -11,11 +11,20 @@ namespace arhost::test {
 
 class ConformRun {
 public:
-    int run(std::vector<std::string> arguments) {
+    // `prepare` is called in the child, which becomes arhost.
+    void start(
+        std::vector<std::string> arguments, const std::function<void()> &prepare = [] {}) {
         arguments.insert(arguments.begin(), "conform");
-        run_.start(std::move(arguments));
-        return run_.wait(std::chrono::minutes(3));
+        run_.start(std::move(arguments), prepare);
     }
+    int wait() { return run_.wait(std::chrono::minutes(3)); }
+    int run(std::vector<std::string> arguments) {
+        start(std::move(arguments));
+        return wait();
+    }
+    pid_t pid() const { return run_.pid(); }
+    void write(const std::string &name, const std::string &text) const { run_.write(name, text); }
+    bool exists(const std::string &name) const { return run_.exists(name); }
     std::string output() const { return run_.output(); }
     std::string read(const std::string &name) const { return run_.read(name); }
     nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }

@@ -8,6 +8,9 @@
 
 #include <algorithm>
 #include <array>
+#include <csignal>
+#include <sys/resource.h>
+#include <thread>
 
 namespace arhost::test {
 namespace {
@@ -35,14 +38,31 @@ TEST(Conform, SaysWhatIsWrongWithNumbersAndHowToSeeItAgain) {
 
 TEST(Conform, NamesTheSignalAndTheCall) {
     ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("crash_in_render").string(), "--only", "raytracer.region"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.region\n         SIGSEGV in render"));
+    EXPECT_EQ(run.run({run.link_wrong("crash_in_render").string(), "--only", "raytracer.render"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.render\n         SIGSEGV in render"));
 }
 
 TEST(Conform, SkipsWhatNeedsATestThatHasNotPassed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string()}), 1);
     EXPECT_THAT(run.output(), HasSubstr("raytracer.start\n         needs abi.create, which has not passed"));
+}
+
+TEST(Conform, RunsWhatATestNeedsWithoutAWord) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.miss-alpha"}), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
+    EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string(), "--only", "abi.longer-options"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("crashed  abi.create\n"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n         needs abi.create, which has not "));
+}
+
+TEST(Conform, TellsInOnePlaceWhatCantBeLoaded) {
+    ConformRun run;
+    run.write("text.so", "no library");
+    EXPECT_EQ(run.run({"text.so", "--only", "abi.longer-options"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("fail     abi.load\n"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n"));
 }
 
 TEST(Conform, ErrsWhereNoTestRan) {
@@ -55,6 +75,195 @@ TEST(Conform, ErrsWhereTheReferenceIsMissing) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", "none.so"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("none.so' is not there; give --reference FILE"));
+}
+
+// What is wrong with the reference is no plugin's fault.
+TEST(Conform, ErrsWhereTheReferenceCantBeComparedWith) {
+    ConformRun run;
+    run.write("text.so", "no library");
+    const std::string crashing = run.link_wrong("crash_in_render").string();
+    for (const auto &[reference, why] :
+         {std::pair<std::string, std::string>{ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
+                                              "tracker_aruco.so' is a tracker and must be a ray tracer"},
+          {"text.so", "text.so' can't be used, by abi.load: "},
+          {crashing, "can't be used, by raytracer.render: SIGSEGV in render"}}) {
+        EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
+                           ARHOST_PLUGIN_DIRECTORY}),
+                  2);
+        EXPECT_THAT(run.output(), HasSubstr("error    raytracer.reference\n"));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+    }
+}
+
+TEST(Conform, TellsHowToRunATestAgainAsItWasRun) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("no_licence").string(), reference = run.link_wrong("none").string();
+    EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", ARHOST_PLUGIN_DIRECTORY, "--reference",
+                       reference, "--patience", "2.5"}),
+              1);
+    EXPECT_THAT(run.output(),
+                HasSubstr("again: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
+                          ARHOST_PLUGIN_DIRECTORY + " --reference " + reference + " --patience 2.5\n"));
+}
+
+TEST(Conform, RefusesOptionsThatMakeNoSense) {
+    const std::array<std::array<std::string, 3>, 12> wrong = {
+        {{"--patience", "nan", "'nan' must be a number from 0.001 to 1000"},
+         {"--patience", "1e300", "'1e300' must be a number from 0.001 to 1000"},
+         {"--seed", "99999999999999999999", "must be a whole number from 0 to 18446744073709551615"},
+         {"--seed", "-1", "must be a whole number from 0 to"},
+         {"--reads", "", "does not exist"},
+         {"--reads", "nowhere", "does not exist: nowhere"},
+         {"--reference", "", "the name is empty"},
+         {"--json", "", "the name is empty"},
+         {"--print", "1=", "must be ID=FILE"},
+         {"--print", "99999999999=a.png", "must be ID=FILE"},
+         {"--environment", "A=B", "'A=B' must be a variable's name alone"},
+         {"--environment", "", "must be a variable's name alone"}}};
+    for (const auto &[option, value, why] : wrong) {
+        ConformRun run;
+        EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, value}), 2) << option << " " << value;
+        EXPECT_THAT(run.output(), HasSubstr(option));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+        EXPECT_THAT(run.output(), Not(HasSubstr("abi.load")));
+    }
+}
+
+TEST(Conform, SeesBeforeTheRunWhetherItsReportsCanBeWritten) {
+    ConformRun run;
+    std::filesystem::create_directory(run.path("folder"));
+    for (const auto &[file, why] : {std::pair<std::string, std::string>{"none/page", "No such file"},
+                                    {"folder", "can't write folder: it is a folder"}})
+        for (const std::string option : {"--json", "--junit", "--html"}) {
+            EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, file}), 2);
+            EXPECT_THAT(run.output(), HasSubstr(why));
+            EXPECT_THAT(run.output(), Not(HasSubstr("abi.load")));
+        }
+}
+
+bool has_unfinished_file(const ConformRun &run) {
+    const std::filesystem::directory_iterator files(run.path("."));
+    return std::any_of(begin(files), end(files), [](const auto &file) { return file.path().extension() == ".tmp"; });
+}
+
+TEST(Conform, WritesNoTwoReportsToOneFile) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "report", "--html", "./report"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("can't write ./report: another report is written there"));
+    EXPECT_FALSE(has_unfinished_file(run));
+}
+
+TEST(Conform, WritesAReportWhereALinkLeads) {
+    ConformRun run;
+    run.write("target.json", "earlier");
+    std::filesystem::create_symlink("target.json", run.path("link.json"));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "link.json"}), 0);
+    EXPECT_TRUE(std::filesystem::is_symlink(run.path("link.json")));
+    EXPECT_EQ(run.json("target.json").at("exit_status"), 0);
+}
+
+TEST(Conform, KeepsAnEarlierReportUntilThereIsANewOne) {
+    ConformRun run;
+    run.write("results.json", "earlier");
+    EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*", "--json", "results.json"}), 2);
+    EXPECT_EQ(run.read("results.json"), "earlier");
+    EXPECT_FALSE(has_unfinished_file(run));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "results.json"}), 0);
+    EXPECT_EQ(run.json("results.json").at("exit_status"), 0);
+    EXPECT_FALSE(has_unfinished_file(run));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "/dev/stdout"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("\"exit_status\": 0"));
+}
+
+// ---- What a plugin leaves behind, and what it says --------------------------------------------------
+
+// The process that rt_hangs_beside_a_process has started.
+pid_t process_beside(const ConformRun &run) {
+    const std::string before = "process ";
+    for (int i = 0; i < 5000; ++i) {
+        const std::string output = run.output();
+        if (const std::size_t at = output.find(before);
+            at != std::string::npos && output.find('\n', at) < output.size())
+            return std::stoi(output.substr(at + before.size()));
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    throw std::runtime_error("it has started none: " + run.output());
+}
+
+TEST(Conform, EndsWhatATestHasStarted) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
+                       "processes"}), // and not less patience: what comes before it must end in time
+              1);
+    EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
+    EXPECT_NE(::kill(process_beside(run), 0), 0);
+}
+
+TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        ConformRun run;
+        std::filesystem::create_directory(run.path("tmp"));
+        run.start({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow", "processes",
+                   "--json", "results.json"},
+                  [&] {
+                      ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
+                      std::signal(signal, SIG_DFL); // whatever this test's parent has it at
+                  });
+        const pid_t process = process_beside(run);
+        EXPECT_EQ(::kill(process, 0), 0);
+        EXPECT_FALSE(std::filesystem::is_empty(run.path("tmp")));
+        ::kill(run.pid(), signal);
+        EXPECT_EQ(run.wait(), 128 + signal);
+        EXPECT_THAT(run.output(), HasSubstr("interrupted after 1 of 2 tests\n"));
+        EXPECT_NE(::kill(process, 0), 0);
+        EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+        EXPECT_FALSE(run.exists("results.json"));
+        EXPECT_FALSE(has_unfinished_file(run));
+    }
+}
+
+TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("floods_descriptor_3").string(), "--only", "abi.create"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: more than 32 MiB"));
+    EXPECT_EQ(run.run({run.link_wrong("writes_to_descriptor_3").string(), "--only", "abi.create"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: '{} {"));
+}
+
+TEST(Conform, FailsDescriptorsThatAHostCantTake) {
+    const std::array<std::array<std::string, 3>, 4> wrong = {
+        {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes, and 4096 are the most"},
+         {"many_options", "abi.load", "bytes as JSON, and 130048 are the most: fewer options"},
+         {"option_without_key", "abi.load", "its option 1 has no key"},
+         {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
+    for (const auto &[defect, test, why] : wrong) {
+        ConformRun run;
+        EXPECT_EQ(run.run({run.link_wrong(defect).string(), "--only", "abi.*"}), 1);
+        EXPECT_THAT(run.output(), HasSubstr("fail     " + test));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+    }
+}
+
+TEST(Conform, ShowsAPluginsWordsWithoutTheirControlCharacters) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("create_fails").string(), "--only", "abi.create", "--junit", "junit.xml",
+                       "--html", "page.html"}),
+              1);
+    EXPECT_THAT(run.output(), HasSubstr("create returned UNSUPPORTED: no [2J \ufffd<&\n"));
+    for (const std::string file : {"junit.xml", "page.html"})
+        EXPECT_THAT(run.read(file), HasSubstr("create returned UNSUPPORTED: no [2J \ufffd&lt;&amp;"));
+}
+
+TEST(Conform, ShowsPathsWithoutTheirControlCharacters) {
+    ConformRun run;
+    run.write("a\x1b[2J\xff/text.so", "no library");
+    EXPECT_EQ(run.run({"a\x1b[2J\xff/text.so", "--junit", "junit.xml", "--html", "page.html"}), 1);
+    for (const std::string &shown : {run.output(), run.read("junit.xml"), run.read("page.html")}) {
+        EXPECT_THAT(shown, HasSubstr("a [2J\ufffd/text.so: can't be loaded"));
+        EXPECT_THAT(shown, HasSubstr("a\\x1b[2J\\xff/text.so")); // in the command, for the shell
+        EXPECT_THAT(shown, Not(HasSubstr("\x1b")));
+        EXPECT_THAT(shown, Not(HasSubstr("\xff")));
+    }
 }
 
 TEST(Conform, ErrsOnAPluginThatIsNotThere) {
@@ -223,6 +432,27 @@ TEST(Conform, LeavesNothingOfASinksFilesBehind) {
     EXPECT_THAT(run.output(), HasSubstr("SIGSEGV in stop"));
     EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
     EXPECT_FALSE(std::filesystem::exists(run.path("out")));
+}
+
+TEST(Conform, BlamesNoSinkForAFullDisk) {
+    ConformRun run;
+    run.start({ARHOST_PLUGIN_DIRECTORY "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"}, [] {
+        const rlimit full{1 << 20, 1 << 20}; // as far as a process can see
+        ::setrlimit(RLIMIT_FSIZE, &full);
+    });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("error    sink.start\n"));
+    EXPECT_THAT(run.output(), HasSubstr("has no room for 16 MiB: File too large; free some, or set TMPDIR"));
+}
+
+TEST(Conform, BlamesASinkThatLeavesNoDescriptor) {
+    ConformRun run;
+    run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks"}, [] {
+        const rlimit few{100, 100}; // gone after the warm-up
+        ::setrlimit(RLIMIT_NOFILE, &few);
+    });
+    EXPECT_EQ(run.wait(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("fail     sink.leaks\n"));
 }
 
 TEST(Conform, WritesAPageThatShowsTheWrongPixel) {

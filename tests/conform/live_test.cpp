@@ -84,7 +84,8 @@ class LiveRun : public ArhostRun {
 public:
     explicit LiveRun(const Parts &parts) : ArhostRun(parts.text()) {
         write("scene.yaml", parts.scene);
-        for (const auto &[kind, file] : {std::pair("rt", "wrong"), std::pair("tracker", "wrong_tracker")}) {
+        for (const auto &[kind, file] :
+             {std::pair("rt", "wrong"), std::pair("tracker", "wrong_tracker"), std::pair("source", "wrong_source")}) {
             const std::string text = parts.text(), begin = std::string("./") + kind + "_";
             if (const std::size_t at = text.find(begin); at != std::string::npos)
                 std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") + file + ".so",
@@ -114,9 +115,11 @@ void expect_broken(const Parts &parts, const std::set<std::string> &promises) {
     }
 }
 
-const std::set<std::string> all_promises = {"source.frame-stays",   "tracker.order",    "tracker.numbers",
-                                            "tracker.pose",         "raytracer.region", "raytracer.place",
-                                            "raytracer.image-stays"};
+const std::set<std::string> source_promises = {"source.clock", "source.capture-time", "source.rate",
+                                               "source.frame-stays"};
+const std::set<std::string> all_promises = {
+    "source.clock",    "source.capture-time", "source.rate",      "source.frame-stays", "tracker.order",
+    "tracker.numbers", "tracker.pose",        "raytracer.region", "raytracer.place",    "raytracer.image-stays"};
 
 void expect_kept(const Parts &parts, const std::set<std::string> &promises = all_promises) {
     SCOPED_TRACE(parts.text());
@@ -131,7 +134,7 @@ void expect_kept(const Parts &parts, const std::set<std::string> &promises = all
 TEST(LiveConformance, FindsNothingWrongWithArhostsOwn) {
     LiveRun run((Parts()));
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("conform: 7 of 7 promises kept"));
+    EXPECT_THAT(run.output(), HasSubstr("conform: 10 of 10 promises kept"));
     const auto stats = run.stats();
     for (const std::string &promise : all_promises) {
         EXPECT_EQ(stats["conformance"][promise]["looked"], 40) << promise;
@@ -146,6 +149,16 @@ TEST(LiveConformance, TellsOfASourceThatIsWrong) {
     writes_later.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // so that frames wait
     expect_broken(writes_later, {"source.frame-stays"});
     expect_broken(with_numbers("ahead_ms: 300", "", ""), {"source.capture-time"});
+    for (const auto &[defect, promise] :
+         {std::pair("changes_clocks", "source.clock"), std::pair("begins_before_0", "source.capture-time"),
+          std::pair("times_jump", "source.rate"), std::pair("microseconds", "source.rate")}) {
+        Parts parts;
+        parts.source = wrong("source", defect, "fps: 50");
+        parts.camera = "{width: 62, height: 46, fx: 70}";
+        parts.tracker.clear();
+        parts.raytracer.clear();
+        expect_broken(parts, {promise});
+    }
 }
 
 TEST(LiveConformance, TellsOfATrackerThatIsWrong) {
@@ -186,7 +199,9 @@ TEST(LiveConformance, LooksAtAPinholesImageBeforeItIsBent) {
     Parts parts = with_numbers("", "", "");
     parts.camera = lens;
     parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // which knows of no lens
-    expect_kept(parts, {"source.frame-stays", "raytracer.region", "raytracer.place", "raytracer.image-stays"});
+    std::set<std::string> promises = source_promises;
+    promises.merge(std::set<std::string>{"raytracer.region", "raytracer.place", "raytracer.image-stays"});
+    expect_kept(parts, promises);
     parts.scene = scene; // whose ball is not where the numbers are
     expect_broken(parts, {"raytracer.place"});
 }
@@ -219,26 +234,32 @@ class LiveConformanceAfterARestart : public testing::TestWithParam<const char *>
 
 TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
     Parts parts;
-    // Few frames a second: a source that has left frames out, being late, does not yet go on at its media's time.
-    parts.source = "{plugin: source_synthetic, fps: 10, options: {frames: 90}, conform: true}";
+    parts.source =
+        "{plugin: source_synthetic, fps: 30, options: {frames: 100000}, conform: true}"; // for as long as it takes
     parts.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 20}}";
     parts.more = std::string("mode: ") + GetParam() + "\n";
     LiveRun run(parts);
     run.start();
     std::size_t shown = 0;
-    for (const char *plugin : {"source_synthetic", "tracker_aruco", "rt_embree"}) {
-        for (shown += 12; run.running() && counted(run).size() < shown;)
+    const auto wait_for_more = [&](std::size_t frames) {
+        for (shown += frames; run.running() && counted(run).size() < shown;)
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    };
+    for (const char *plugin : {"source_synthetic", "tracker_aruco", "rt_embree"}) {
+        wait_for_more(12);
         const pid_t worker = run.worker(plugin);
         ASSERT_GT(worker, 0) << plugin << run.output();
         ::kill(worker, SIGKILL);
     }
-    ASSERT_EQ(run.wait(), 0) << run.output();
+    const std::size_t before = shown;
+    wait_for_more(30);
+    ::kill(run.pid(), SIGINT);
+    ASSERT_EQ(run.wait(), 130) << run.output();
     const nlohmann::json stats = run.stats();
     for (const char *component : {"source", "tracker", "raytracer"})
         EXPECT_EQ(stats["restarts"][component], 1) << component;
     for (const auto &[name, entry] : stats["conformance"].items())
-        EXPECT_GT(entry["looked"], shown) << name;
+        EXPECT_GT(entry["looked"], before) << name;
     EXPECT_EQ(run.promises(false), all_promises) << run.output();
     EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
 }

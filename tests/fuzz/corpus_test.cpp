@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <unistd.h>
 #include <vector>
 
 using namespace arhost::fuzz;
@@ -50,13 +51,13 @@ TEST_P(Corpus, AndWhatIsLikeItPasses) {
     constexpr std::uint32_t seed = 1;
     Mutator mutator(std::move(kept), seed);
     // What was tried last is left behind where it ends the process.
-    const std::filesystem::path last = "fuzz-" + std::string(GetParam().name) + ".input";
+    const std::filesystem::path last = testing::TempDir() + "arhost-fuzz-" + std::string(GetParam().name) + "-" +
+                                       std::to_string(::getpid()) + ".input";
     for (unsigned i = 0; i < GetParam().tries; ++i) {
         const Mutator::Content content = mutator.next();
         std::ofstream(last, std::ios::binary)
             .write(reinterpret_cast<const char *>(content.data()), static_cast<std::streamsize>(content.size()));
-        ASSERT_NO_THROW(GetParam().run(content))
-            << "try " << i << ", the input is " << std::filesystem::absolute(last);
+        ASSERT_NO_THROW(GetParam().run(content)) << "try " << i << ", the input is " << last;
     }
     std::filesystem::remove(last);
 }

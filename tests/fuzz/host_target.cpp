@@ -276,7 +276,7 @@ private:
 
 class Troupe final : public supervise::Starter {
 public:
-    supervise::Spawned spawn(const std::filesystem::path &) override {
+    supervise::Spawned spawn(const std::filesystem::path &, const supervise::LogFunction &) override {
         supervise::Spawned spawned;
         Channel theirs;
         std::tie(spawned.channel, theirs) = Channel::make_pair();

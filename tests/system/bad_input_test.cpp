@@ -42,6 +42,10 @@ const std::vector<Case> cases = {
      replaced(good, "deadline_ms", "deadlinems"),
      small_scene,
      {"run.yaml:4:", "tracker.deadlinems", "did you mean 'deadline_ms'"}},
+    {"ConformOfAnOutput",
+     replaced(good, "path: counted.txt", "path: counted.txt, conform: true"),
+     small_scene,
+     {"run.yaml:6:", "outputs[0].conform: an output gives nothing back", "arhost conform PLUGIN.so"}},
     {"DuplicateKey", good + "mode: live\n", small_scene, {"run.yaml:8:", "mode", "twice"}},
     {"WrongType",
      replaced(good, "side_mm: 80", "side_mm: wide"),
@@ -193,6 +197,47 @@ const std::vector<Case> cases = {
      replaced(counting("lockstep", "frames: 5", "file: path.txt", ""), "path: counted.txt", "path: path.txt"),
      small_scene,
      {"run.yaml:6:", "'path.txt' is a file that this run reads"}},
+    {"OutputOverThePluginThatIsNamedByItsPath",
+     replaced(replaced(good, "rt_counter", "./text.so"), "path: counted.txt", "path: text.so"),
+     small_scene,
+     {"run.yaml:6:", "outputs[0].path: 'text.so' is a file that this run reads"}},
+    {"OutputOverTheSceneByAHardLink",
+     replaced(good, "path: counted.txt", "path: hard.yaml"),
+     small_scene,
+     {"run.yaml:6:", "outputs[0].path: 'hard.yaml' is a file that this run reads (", "/scene.yaml)"}},
+    {"OutputOverTheSourcesFrames",
+     replaced(replaced(good, "source_counter,", "source_file, path: f-%04d.png,"), "path: counted.txt",
+              "path: f-00%02d.png"),
+     small_scene,
+     {"run.yaml:6:", "outputs[0].path: 'f-00%02d.png' is a file that this run reads (", "/f-0001.png)"}},
+    {"StatisticsOverAFrameOfTheSource",
+     replaced(good, "source_counter,", "source_file, path: f-%04d.png,").append("timeline: f-0001.png\n"),
+     small_scene,
+     {"run.yaml:8:11: timeline: 'f-0001.png' is a file that this run reads"}},
+    {"OutputOverAFileThatItReadsItself",
+     replaced(good, "path: counted.txt", "path: path.txt, options: {script: path.txt}"),
+     small_scene,
+     {"run.yaml:6:", "outputs[0].path: 'path.txt' is a file that this run reads"}},
+    {"OutputOverAMeshOfTheScene",
+     replaced(good, "path: counted.txt", "path: mesh.obj"),
+     replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"),
+     {"run.yaml:6:", "outputs[0].path: 'mesh.obj' is a file that this run reads"}},
+    {"TimelineOverAMeshOfTheScene",
+     good + "timeline: mesh.obj\n",
+     replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"),
+     {"run.yaml:8:11: timeline: 'mesh.obj' is a file that this run reads"}},
+    {"TimelineOverAMeshOfTheSceneByAHardLink",
+     good + "timeline: hard.obj\n",
+     replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"),
+     {"run.yaml:8:11: timeline: 'hard.obj' is a file that this run reads (", "/mesh.obj)"}},
+    {"FramesPerSecondThatAreNoNumber",
+     replaced(good, "source_counter,", "source_counter, fps: .nan,"),
+     small_scene,
+     {"run.yaml:3:", "source.fps: must be a finite number, 0 to 10000, is .nan"}},
+    {"FramesPerSecondThatNoClockCounts",
+     replaced(good, "source_counter,", "source_counter, fps: 1e-300,"),
+     small_scene,
+     {"run.yaml:3:", "source.fps: must be 0, for the source's own, or 1e-06 to 10000, is 1e-300"}},
     {"SceneThatIsAFifo",
      replaced(good, "scene.yaml", "fifo.obj"),
      small_scene,
@@ -229,7 +274,11 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
     run.write("path.txt", "0 0 9 0 0 8 0 1 0\n");
     run.write("text.so", "This is no shared object, whatever its name says, and it is longer than an ELF header.\n");
     run.write("cut.so", "\177ELF");
+    run.write("f-0001.png", "x");
+    run.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     std::filesystem::create_symlink("scene.yaml", run.path("linked.yaml"));
+    std::filesystem::create_hard_link(run.path("scene.yaml"), run.path("hard.yaml"));
+    std::filesystem::create_hard_link(run.path("mesh.obj"), run.path("hard.obj"));
     ASSERT_EQ(::mkfifo(run.path("fifo.obj").c_str(), 0600), 0);
     EXPECT_EQ(run.run(), 2) << run.output();
     const std::string output = run.output();
@@ -242,6 +291,22 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, testing::ValuesIn(cases), [](const auto &info) { return info.param.name; });
+
+TEST(Check, FindsAnOutputOverAMeshOfTheScene) {
+    ArhostRun run(replaced(good, "path: counted.txt", "path: mesh.obj"));
+    run.write("scene.yaml", replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"));
+    run.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:40: outputs[0].path: 'mesh.obj' is a file that this run reads"));
+}
+
+TEST(Check, TakesAMeshWithAPercentSignInItsNameForNoPattern) {
+    ArhostRun run(replaced(good, "path: counted.txt", "path: mesh-7.obj"));
+    run.write("scene.yaml", replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh-%d.obj"));
+    for (const char *mesh : {"mesh-%d.obj", "mesh-7.obj"})
+        run.write(mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+}
 
 TEST(Check, EndsWhereTheSceneIsLoadedTooSlowly) {
     ArhostRun run(good);
@@ -273,6 +338,7 @@ TEST(BadCommandLine, IsRefused) {
     } const lines[] = {
         {{"--config", "none.yaml"}, "none.yaml: can't be read: No such file or directory"},
         {{"--config", "."}, "is a folder"},
+        {{"--config", "two\nlines\033[2J"}, "error: two lines [2J: can't be read"},
         {{"--config", "run.yaml", "--set", "mode"}, "key.path=value"},
         {{"--config", "run.yaml", "--set", "mode=fast"}, "--set: mode: 'fast' is not one of lockstep, live"},
         {{"--config", "run.yaml", "--set", "nonsense=1"}, "nonsense: unknown key"},

@@ -33,14 +33,14 @@ std::uint64_t dropped(const nlohmann::json &stats) { // at all stages together
 } // namespace
 
 TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
-    ArhostRun run(counting("live", "frames: 60", "", "delay_ms: 100"));
+    ArhostRun run(counting("live", "frames: 60", "", "delay_ms: 300", "live: {max_latency_ms: 60000}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     const auto lines = counted(run);
     expect_own_overlays_in_order(lines);
     const auto stats = run.stats();
     EXPECT_EQ(stats["frames"]["in"], 60);
-    // 100 ms a frame at 30 fps: two of three frames are dropped, however fast the machine is.
+    // 300 ms a frame at 30 fps: eight of nine frames are dropped, however fast the machine is.
     EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
     EXPECT_EQ(dropped(stats) + lines.size(), 60u) << "each frame is shown or counted where it was dropped\n"
                                                   << stats.dump(1);
@@ -79,21 +79,24 @@ TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
 }
 
 TEST(Live, TheVideoGoesOnWhileABackendHangs) {
-    ArhostRun run(counting("live", "frames: 90", "", "hang_at: 20", "live: {max_latency_ms: 150}\n"));
+    ArhostRun run(counting("live", "frames: 120", "", "hang_at: 20", "live: {max_latency_ms: 150}\n"));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.deadline_ms=700"}), 0) << run.output();
     const auto lines = counted(run);
     expect_own_overlays_in_order(lines);
     const auto plain =
         std::count_if(lines.begin(), lines.end(), [](const auto &line) { return line.overlay == "none"; });
     EXPECT_GE(plain, 5) << "the plain video was to go on until the deadline";
-    EXPECT_NE(lines.back().overlay, "none") << "the overlay was to come back";
+    ASSERT_GT(lines.size(), 20u);
+    EXPECT_TRUE(std::any_of(lines.end() - 20, lines.end(), [](const auto &line) { return line.overlay != "none"; }))
+        << "the overlay was to come back";
     EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
 }
 
 TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
     ArhostRun run(
-        counting("live", "frames: 90", "", "", "restart: {proven_after_frames: 100000, first_delay_ms: 600}\n"));
+        counting("live", "frames: 90", "", "",
+                 "live: {max_latency_ms: 60000}\nrestart: {proven_after_frames: 100000, first_delay_ms: 600}\n"));
     run.write("scene.yaml", small_scene);
     run.start();
     while (run.running() && counted(run).size() < 15)
@@ -115,4 +118,31 @@ TEST(Live, ASlowOutputDropsItsOwnFramesOnly) {
     const auto stats = run.stats();
     EXPECT_GE(stats["frames"]["dropped"]["sink_counter#1"], 20);
     EXPECT_GE(counted(run).size(), 40u);
+}
+
+TEST(Live, ASourceThatHasLeftFramesOutGoesOnBehindThemAfterADeath) {
+    ArhostRun run(
+        "version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 50, options: {frames: 250}, conform: "
+        "true}\ncamera: {width: 64, height: 48, fx: 60}\noutputs: [{plugin: sink_counter, path: "
+        "counted.txt}]\nstats: stats.json\n");
+    run.start();
+    const auto wait_for_frames = [&](std::size_t more) {
+        for (const std::size_t frames = counted(run).size() + more; run.running() && counted(run).size() < frames;)
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    };
+    wait_for_frames(10);
+    const pid_t source = run.worker("source_synthetic");
+    ::kill(source, SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(400)); // 20 frames
+    ::kill(source, SIGCONT);
+    wait_for_frames(5);
+    ::kill(source, SIGKILL);
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    const auto stats = run.stats();
+    EXPECT_EQ(stats["restarts"]["source"], 1) << run.output();
+    EXPECT_GE(stats["frames"]["dropped"]["source"], 15);
+    // A death comes between no two frames: each is given, or told as skipped. Those at the very end, maybe not.
+    EXPECT_LE(stats["frames"]["in"].get<int>() + stats["frames"]["dropped"]["source"].get<int>(), 250);
+    for (const auto &[promise, entry] : stats["conformance"].items())
+        EXPECT_EQ(entry["broken"], 0) << promise;
 }

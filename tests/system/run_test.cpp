@@ -340,6 +340,7 @@ TEST(CommandLine, TellsVersionHelpAndPlugins) {
     EXPECT_THAT(run.output(), HasSubstr("no_plugin          can't be used: "));
     EXPECT_THAT(run.output(), HasSubstr("while its library was loaded"));
     EXPECT_THAT(run.output(), HasSubstr("first                The first of three (default '1')"));
+    EXPECT_THAT(run.output(), HasSubstr("Tries what it must not be able to do,  [2Jfor tests."));
     EXPECT_THAT(run.output(), HasSubstr("third                The third of three (default 'c')"));
     EXPECT_EQ(run.run({}), 2);
     EXPECT_EQ(run.run({"--nonsense"}), 2);

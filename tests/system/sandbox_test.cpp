@@ -92,6 +92,11 @@ public:
     Victim(const Victim &) = delete;
     Victim &operator=(const Victim &) = delete;
     pid_t pid() const { return pid_; }
+    bool lives() const {
+        siginfo_t end{};
+        ::waitid(P_PID, static_cast<id_t>(pid_), &end, WEXITED | WNOHANG | WNOWAIT);
+        return end.si_pid == 0;
+    }
 
 private:
     pid_t pid_;
@@ -235,6 +240,34 @@ TEST(Sandbox, TheHostIsNotSignalled) {
     REQUIRE_LAYER("seccomp");
     HostileRun run("signal");
     expect_stopped(run);
+}
+
+// What may have processes must be able to signal those, and before Landlock's sixth version that is any single one.
+TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOlderKernels) {
+    REQUIRE_NO_SANITIZER();
+    REQUIRE_LAYER("seccomp");
+    const bool scoped = has("signals");
+    for (const char *attack : {"signal", "signal_by_child"}) {
+        SCOPED_TRACE(attack);
+        HostileRun run(attack, ", allow: [processes]");
+        const Victim victim; // should it be reached, not the host
+        run.start_it(victim.pid());
+        ASSERT_EQ(run.wait(), 0) << run.output();
+        EXPECT_EQ(victim.lives(), scoped) << run.output();
+        const std::string call = attack == std::string("signal") ? ": kill: " : ": a child's kill: ";
+        EXPECT_THAT(run.output(), HasSubstr(call + (scoped ? "stopped" : "SUCCEEDED")));
+        if (attack == std::string("signal_by_child"))
+            EXPECT_THAT(run.output(), HasSubstr("its child ends"));
+        else
+            for (const char *what : {"reach all", "tkill", "pidfd", "a descriptor's owner", "a limit"})
+                EXPECT_THAT(run.output(), HasSubstr(std::string(": ") + what + ": stopped"));
+        expect_whole_video(run);
+    }
+    HostileRun strict("none", ", allow: [processes]", "sandbox: strict\n");
+    const int status = strict.attack(); // other layers may be missing too
+    const bool refused = strict.output().find("signals to processes that are not its own") != std::string::npos;
+    EXPECT_EQ(refused, !scoped) << strict.output();
+    EXPECT_TRUE(!refused || status == 2) << status;
 }
 
 TEST(Sandbox, MemoryEndsAtItsLimit) {

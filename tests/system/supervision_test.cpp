@@ -31,10 +31,18 @@ void wait_for_frames(const ArhostRun &run, std::size_t frames) {
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
 }
 
+// Or dead and not waited for: an orphan's new parent may not care.
 bool is_gone(pid_t pid) {
-    for (int i = 0; i < 1000 && ::kill(pid, 0) == 0; ++i)
+    const auto lives = [&] {
+        std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+        std::string text;
+        std::getline(stat, text);
+        const std::size_t end_of_name = text.rfind(')');
+        return end_of_name != std::string::npos && text.substr(end_of_name).compare(0, 3, ") Z") != 0;
+    };
+    for (int i = 0; i < 1000 && lives(); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    return ::kill(pid, 0) != 0;
+    return !lives();
 }
 
 std::vector<pid_t> forked_children(const ArhostRun &run) {
@@ -72,14 +80,14 @@ TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 40);
-    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within 700 ms"));
+    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within 3000 ms"));
     EXPECT_EQ(counted(run)[20].overlay, "none");
 }
 
 TEST(Supervision, AHungPluginThatIgnoresSigabrtIsKilled) {
     ArhostRun run(counting("lockstep", "frames: 30", "hang_at: 20, ignore_abort: true", ""));
     run.write("scene.yaml", small_scene);
-    run.start({"--config", "run.yaml", "--set", "tracker.deadline_ms=100"});
+    run.start({"--config", "run.yaml", "--set", "tracker.deadline_ms=1000"});
     ASSERT_EQ(run.wait(std::chrono::seconds(20)), 0) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(counted(run)[20].overlay, "none");
@@ -439,28 +447,41 @@ TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
     EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
 }
 
-// Its workers die with it, the output in the midst of a file; all start again under the one that stood by.
-TEST(Supervision, AKilledLauncherIsReplaced) {
-    ArhostRun run(counting("lockstep", "frames: 120, delay_ms: 5", "", ""));
+// Its workers die with it, the output in the midst of a file; all start again under another.
+TEST(Supervision, AKilledLauncherIsReplacedAsOftenAsItTakes) {
+    ArhostRun run(counting("lockstep", "frames: 240, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
     run.start();
-    wait_for_frames(run, 20);
-    ::kill(run.launcher(), SIGKILL);
-    ASSERT_EQ(run.wait(std::chrono::seconds(30)), 0) << run.output();
-    expect_all_frames_in_order(run, 120);
-    EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
-}
-
-TEST(Supervision, WithoutAnyLauncherTheRunEnds) {
-    ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 5", "", ""));
-    run.write("scene.yaml", small_scene);
-    run.start();
-    for (const std::size_t frames : {20, 60}) {
+    for (const std::size_t frames : {20, 60, 100}) {
         wait_for_frames(run, frames);
         ::kill(run.launcher(), SIGKILL);
     }
-    EXPECT_EQ(run.wait(std::chrono::seconds(30)), 1);
-    EXPECT_THAT(run.output(), HasSubstr("the launcher is gone"));
+    ASSERT_EQ(run.wait(std::chrono::seconds(30)), 0) << run.output();
+    expect_all_frames_in_order(run, 240);
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 3);
+    EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher is gone, and all workers with it; starting"));
+}
+
+// Nobody is left to end what is stopped but the kernel, which lets the launcher go on.
+TEST(Supervision, AHostThatIsKilledLeavesNothingThoughAllIsStopped) {
+    ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", ""));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml", "--set", "tracker.allow=[processes]", "--set", "tracker.writes=[.]"});
+    wait_for_frames(run, 20);
+    std::vector<pid_t> all = forked_children(run);
+    ASSERT_EQ(all.size(), 2u);
+    for (const pid_t worker : run.workers())
+        all.push_back(worker);
+    all.push_back(run.launcher());
+    ASSERT_GE(all.size(), 7u);
+    for (auto pid = all.rbegin(); pid != all.rend(); ++pid)
+        ::kill(*pid, SIGSTOP);
+    ::kill(run.pid(), SIGKILL);
+    for (const pid_t pid : all) {
+        EXPECT_TRUE(is_gone(pid)) << pid;
+        ::kill(pid, SIGKILL);
+    }
 }
 
 TEST(Supervision, OnlySourcesAndOutputsMayEndTheRun) {

@@ -38,9 +38,9 @@ inline void hang() {
     for (;;)
         ::pause();
 }
-inline void leak_memory() {
+inline void leak_memory(std::size_t bytes) {
     static std::vector<std::vector<char>> kept;
-    kept.emplace_back(1 << 18, 'x');
+    kept.emplace_back(bytes, 'x');
 }
 
 // The plugin in this file of arhost's own, for who spoils it.

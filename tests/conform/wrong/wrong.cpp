@@ -182,22 +182,42 @@ void spoil(const Pixels &pixels) {
 
 Wrong *only = nullptr; // one_instance: the one that lives
 
+// In a session of its own and nobody's child.
+void start_a_process() {
+    if (::fork() != 0)
+        return;
+    ::setsid();
+    if (::fork() != 0)
+        ::_exit(0);
+    ::dprintf(STDERR_FILENO, "process %d\n", ::getpid());
+    hang();
+}
+
 arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
                      arhost_instance **instance) {
     if (has("crash_in_create"))
         crash();
     if (has("hang_in_create"))
         hang();
+    if (has("hangs_beside_a_process")) {
+        start_a_process();
+        hang();
+    }
+    if (has("writes_to_descriptor_3"))
+        (void)!::write(3, "{}\n", 3);
+    if (has("floods_descriptor_3"))
+        for (const std::vector<char> zeros(1 << 16, '0');;)
+            (void)!::write(3, zeros.data(), zeros.size());
     if (has("no_instance"))
         return ARHOST_OK;
     if (has("create_fails")) {
-        host->log(host, ARHOST_SEVERITY_ERROR, "no");
+        host->log(host, ARHOST_SEVERITY_ERROR, "no\x1b[2J\n\xff<&");
         return ARHOST_ERROR_UNSUPPORTED;
     }
     if (has("needs_an_extension") && *static_cast<const int *>(host->get_extension(host, "arhost.host.depth/1")) == 0)
         return ARHOST_ERROR_UNSUPPORTED;
     if (has("leaks_memory"))
-        leak_memory();
+        leak_memory(1 << 18);
     if (has("leaks_descriptors"))
         (void)::dup(0);
     if (has("leaves_a_thread"))
@@ -257,6 +277,20 @@ SceneCopy make_copy(const arhost_scene &scene) {
 }
 arhost_scene &scene_in(const SceneCopy &copy) {
     return *reinterpret_cast<arhost_scene *>(copy.get());
+}
+
+// A sphere is before the camera, less than a millimetre off.
+bool is_near(const Wrong &self, const arhost_camera &camera) {
+    const arhost_scene &scene = scene_in(self.scene);
+    for (const auto &geometry : view<arhost_geometry>(scene, scene.geometries))
+        if (geometry.type == ARHOST_SPHERES)
+            for (const auto &s : view<std::array<float, 4>>(scene, geometry.positions)) {
+                const double distance =
+                    std::hypot(s[0] - camera.eye[0], s[1] - camera.eye[1], s[2] - camera.eye[2]) - double{s[3]};
+                if (distance > 0 && distance < 1)
+                    return true;
+            }
+    return false;
 }
 
 template <class T> std::span<T> view(arhost_scene &scene, const arhost_buffer &buffer) {
@@ -344,15 +378,19 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         crash();
     if (has("slow") && image->width >= 640)
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    if (has("deaf_while_it_renders") && image->width > 1000)
+        std::this_thread::sleep_for(std::chrono::seconds(8)); // 2 are allowed, times the patience
     if (has("leaks_descriptors_in_render"))
         (void)::dup(0);
     if (has("leaks_memory_in_render"))
-        leak_memory();
+        leak_memory(4096);
     if (has("cancelled_is_internal") && self.host->cancelled(self.host))
         return ARHOST_ERROR_INTERNAL;
 
     arhost_render_request spoilt = *request;
     spoilt.camera = spoil(request->camera);
+    if (has("near_plane") && is_near(self, spoilt.camera))
+        spoilt.camera.eye[2] -= 1; // it looks along -z
     const arhost_moved_object nowhere{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
     if (has("no_motion") && request->motion)
@@ -433,11 +471,21 @@ const arhost_plugin &spoilt_plugin() {
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;
     descriptor.id = has("id_unlike_file") ? "rt_other" : own_name().c_str();
-    descriptor.options = options.data();
     if (has("default_out_of_range"))
         options[0].default_value = "65";
     if (has("no_licence"))
         descriptor.licence = "";
+    if (has("description_is_no_utf8"))
+        descriptor.description = "Bas\xe9";
+    static const std::string long_name(5'000'000, 'x');
+    if (has("long_name"))
+        descriptor.name = long_name.c_str();
+    if (has("option_without_key"))
+        options[1].key = nullptr;
+    if (has("many_options"))
+        options.resize(5000, options[0]); // of one key: it is their number that matters
+    descriptor.options = options.data();
+    descriptor.option_count = static_cast<std::uint32_t>(options.size());
     static constexpr const char *unknown[] = {"bluetooth", nullptr};
     if (has("needs_what_is_unknown"))
         descriptor.needs = unknown;
@@ -456,7 +504,8 @@ const arhost_plugin &spoilt_plugin() {
 arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     if (has("crash_in_negotiate"))
         crash();
-    if (answer->struct_size < sizeof *answer && !has("writes_past_short_answer"))
+    if ((offer->struct_size < sizeof *offer && !has("reads_past_short_offer")) ||
+        (answer->struct_size < sizeof *answer && !has("writes_past_short_answer")))
         return ARHOST_ERROR_INVALID_ARGUMENT;
     if (offer->oldest_abi_version > ARHOST_ABI_VERSION && !has("accepts_any_version"))
         return ARHOST_ERROR_UNSUPPORTED;

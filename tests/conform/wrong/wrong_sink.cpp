@@ -4,7 +4,9 @@
 // has the one defect that this library's file name tells.
 #include "defect.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
@@ -119,15 +121,16 @@ public:
             return ARHOST_ERROR_INTERNAL;
         if (has("slow") && output.width >= 640)
             std::this_thread::sleep_for(std::chrono::milliseconds(120));
-        if (has("leaks_descriptors"))
+        for (int i = 0; i < (has("leaks_many_descriptors") ? 3 : has("leaks_descriptors") ? 1 : 0); ++i)
             (void)::dup(0);
         if (has("leaks_memory"))
-            leak_memory();
+            leak_memory(1024);
         if (has("leaves_threads"))
             std::thread(hang).detach();
         next_ = record.sequence + 1;
-        if (has("drops_every_10th") && record.sequence % 10 == 9)
+        if ((has("drops_every_10th") && record.sequence % 10 == 9) || std::exchange(is_late_, false))
             return ARHOST_OK;
+        const auto begin = std::chrono::steady_clock::now();
         std::string pixels;
         for (std::uint32_t y = 0; y < output.height + has("reads_a_row_more"); ++y)
             pixels.append(reinterpret_cast<const char *>(output.bgr) + std::size_t{stride(output)} * y,
@@ -139,6 +142,8 @@ public:
         waiting_.emplace_back(record.sequence, pixels, line);
         if (!(has("writes_frames_in_pairs") && waiting_.size() < 2) && !has("keeps_all_to_its_end"))
             write_waiting();
+        is_late_ = has("drops_frames_on_a_slow_disk") &&
+                   std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(80);
         return ARHOST_OK;
     }
 
@@ -187,9 +192,16 @@ private:
             lines += frame.line;
         }
         waiting_.clear();
-        if (!lines.empty() && !has("writes_no_file"))
-            put(path + ".log", lines,
-                std::exchange(fresh_, false) && !has("appends_to_an_old_log") ? O_TRUNC : O_APPEND);
+        if (lines.empty() || has("writes_no_file"))
+            return;
+        const bool is_first = std::exchange(fresh_, false) && !has("appends_to_an_old_log");
+        if (has("newest_first")) {
+            log_ = is_first ? lines : lines + log_;
+            put(path + ".part", log_, O_TRUNC);
+            fs::rename(path + ".part", path + ".log");
+        } else {
+            put(path + ".log", lines, is_first ? O_TRUNC : O_APPEND);
+        }
     }
 
     static void write_frame(const std::string &path, const Waiting &frame) {
@@ -210,7 +222,15 @@ private:
                 throw;
             }
             fs::rename(part, name);
+            if (has("exchanges_frames") && frame.sequence % 4 == 3)
+                ::renameat2(AT_FDCWD, name.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
+                            RENAME_EXCHANGE);
         }
+        if (has("writes_more_files")) // whose names sort before the others'
+            for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
+                put(part, frame.line, O_TRUNC);
+                fs::rename(part, fs::path(path).replace_filename(more));
+            }
         if (has("dates_its_files"))
             put(name, std::to_string(std::chrono::steady_clock::now().time_since_epoch().count()), O_APPEND);
     }
@@ -219,7 +239,7 @@ private:
     std::string path_, log_, before_;
     std::vector<Waiting> waiting_;
     std::uint64_t next_ = 0;
-    bool fresh_ = true, is_starting_ = false;
+    bool fresh_ = true, is_starting_ = false, is_late_ = false;
 };
 
 constexpr arhost_option_descriptor options[] = {

@@ -95,7 +95,7 @@ public:
         if (has("leaks_descriptors"))
             (void)::dup(0);
         if (has("leaks_memory"))
-            leak_memory();
+            leak_memory(1024);
         if (has("leaves_threads"))
             std::thread(hang).detach();
         if (has("slow"))
@@ -120,6 +120,11 @@ public:
                 std::this_thread::sleep_until(due);
             else if (!host_.wait_until(due))
                 return has("waits_end_in_internal") ? ARHOST_ERROR_INTERNAL : ARHOST_ERROR_CANCELLED;
+            if (has("silent_about_skipped")) {
+                const auto late = static_cast<std::uint64_t>(std::max(0.0, behind_s(n) * fps_));
+                n += late;
+                given_ += late;
+            }
             if (has("late_frames_keep_their_time"))
                 n += static_cast<std::uint64_t>(std::max(0.0, behind_s(n) * fps_));
         }
@@ -153,6 +158,12 @@ private:
             info.capture_ns = 0;
         if (has("times_go_back") && n == 6)
             info.capture_ns = time_of(4).count();
+        if (has("times_jump") && n >= 6)
+            info.capture_ns += 3'600'000'000'000;
+        if (has("skips_minus_1") && n > 0)
+            info.skipped = 0xffffffff;
+        if (has("begins_before_0"))
+            info.capture_ns -= 1'000'000'000;
         if (has("microseconds"))
             info.capture_ns /= 1000;
         if (has("times_from_now"))

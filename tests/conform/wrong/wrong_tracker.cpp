@@ -247,16 +247,27 @@ void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &re
         marker.mt[14] = -distance;
     }
     const bool has_last = self.last->marker_count > 0;
-    if ((has("smooths") || has("predicts")) && !markers.empty() && has_last) {
+    const bool predicts = has("predicts") || has("age_stays_1") || has("forgets_its_pose");
+    if ((has("smooths") || predicts) && !markers.empty() && has_last) {
         for (int i = 12; i < 15; ++i)
             markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
-        if (has("predicts"))
+        if (predicts)
             markers[0].state = ARHOST_MARKER_PREDICTED;
     }
-    if (has("predicts") && markers.empty() && has_last) {
+    if (predicts && markers.empty() && has_last) {
         result = *self.last;
-        result.markers[0].state = ARHOST_MARKER_PREDICTED;
-        ++result.markers[0].age_frames;
+        arhost_marker &gone = result.markers[0];
+        gone.age_frames = has("age_stays_1") ? 1 : gone.age_frames + 1;
+        gone.state = gone.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
+        if (has("forgets_its_pose") && gone.state == ARHOST_MARKER_LOST)
+            std::fill_n(gone.mt, 12, 0.0);
+    }
+    if (has("never_settles") && !markers.empty()) {
+        if (!has_last)
+            *self.last = result;
+        std::copy_n(self.last->markers[0].mt, 16, markers[0].mt);
+        markers[0].state = ARHOST_MARKER_PREDICTED;
+        return;
     }
     const arhost_tracker_result now = result;
     if ((has("stale_pose") || (has("holds_what_is_gone") && result.marker_count == 0)) && has_last)
@@ -354,10 +365,8 @@ arhost_status track(arhost_instance *instance, const arhost_frame *given, arhost
         std::this_thread::sleep_for(std::chrono::milliseconds(frame.format->width >= 640 ? 60 : 0));
     if (has("leaks_descriptors"))
         (void)::dup(0);
-    if (has("leaks_memory")) {
-        static std::vector<std::vector<char>> kept;
-        kept.emplace_back(1 << 18, 'x');
-    }
+    if (has("leaks_memory"))
+        leak_memory(4096);
     if (has("cancelled_is_internal") && self.host->cancelled(self.host))
         return ARHOST_ERROR_INTERNAL;
     if (has("refuses_older_frames") && self.tracks > 0 && frame.capture_ns < self.last_capture_ns)
@@ -418,7 +427,7 @@ const arhost_plugin &spoilt_plugin() {
 }
 
 arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
-    if (answer->struct_size < sizeof *answer)
+    if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
         return ARHOST_ERROR_INVALID_ARGUMENT;
     if (offer->oldest_abi_version > ARHOST_ABI_VERSION)
         return ARHOST_ERROR_UNSUPPORTED;

@@ -195,7 +195,7 @@ TEST_F(Calibration, WithAWrongCameraMatrixNamesIt) {
     EXPECT_EQ(error_in(with_matrix("[600, 0, 320, 0, -601, 240, 0, 0, 1]")),
               "camera.yaml:3:16: camera_matrix: the focal length must be greater than 0 px, is -601");
     EXPECT_EQ(error_in(with_matrix("[.Nan, 0, 320, 0, 601, 240, 0, 0, 1]")),
-              "camera.yaml:3:17: camera_matrix[0]: must be a number, is '.Nan'");
+              "camera.yaml:3:17: camera_matrix[0]: must be a finite number, is .Nan");
     EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: d, data: [1, 2]}")),
               "camera.yaml:3:48: camera_matrix.data: has 2 numbers, but rows × cols is 9");
     EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: u, data: [1, 2]}")),

@@ -116,7 +116,7 @@ TEST_F(Trajectories, ThatCanNotBeReadNameThePlaceAndTheMend) {
         {replaced(header, "\"version\": 1", "\"version\": 2") + line(0), {"1:44: version: must be 1"}},
         {replaced(header, "\"mm\"", "\"m\"") + line(0), {"unit: 'm' is not one of mm"}},
         {replaced(header, "\"fx\": 600.1", "\"fx\": -1") + line(0), {"1:", "camera.fx: the focal length must be"}},
-        {replaced(header, "\"fx\": 600.1", "\"fx\": .nan") + line(0), {"camera.fx: must be a number"}},
+        {replaced(header, "\"fx\": 600.1", "\"fx\": .nan") + line(0), {"camera.fx: must be a finite number"}},
         {replaced(header, ", -0.2, 0.001", "") + line(0), {"camera.distortion.coefficients"}},
         {header + "garbage\n" + line(1), {"2:1: is no JSON; delete the line"}},
         {header + line(0) + "{\"frame\": 1, nonsense\n" + line(2), {"3:15: is no JSON"}},

@@ -8,6 +8,7 @@
 
 using namespace arhost::config;
 using namespace arhost::yaml;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -19,6 +20,14 @@ struct Access : testing::Test {
     arhost::sandbox::Policy of(const std::string &component, bool is_output) {
         std::ofstream(folder / "run.yaml") << component;
         return access_of(Node::load(folder / "run.yaml"), is_output);
+    }
+    std::string error_of(const std::string &component) {
+        try {
+            of(component, false);
+        } catch (const Error &error) {
+            return error.what();
+        }
+        return "no error";
     }
     void file(const std::string &name) {
         fs::create_directories((folder / name).parent_path());
@@ -82,15 +91,45 @@ TEST_F(Access, OfOptionsIsTheFilesThatTheyName) {
 }
 
 TEST_F(Access, IsWidenedByKeys) {
-    const auto policy = of("{plugin: p, allow: [gpu, video], reads: [data], writes: [/var/x]}", false);
+    file("data/a.txt");
+    const auto policy = of("{plugin: p, allow: [gpu, video], reads: [data, data/a.txt], writes: [/var/tmp]}", false);
     EXPECT_THAT(policy.allow, ElementsAre("gpu", "video"));
-    EXPECT_THAT(policy.readable, ElementsAre(folder / "data"));
-    EXPECT_THAT(policy.writable, ElementsAre("/var/x"));
+    EXPECT_THAT(policy.readable, ElementsAre(folder / "data", folder / "data/a.txt"));
+    EXPECT_THAT(policy.writable, ElementsAre("/var/tmp"));
+}
+
+TEST_F(Access, ToWhatIsNotThereIsAnError) {
+    file("data/a.txt");
+    EXPECT_THAT(error_of("{plugin: p, reads: [data, dta]}"),
+                AllOf(HasSubstr("run.yaml:1:27: reads[1]: there is no file or folder '" + (folder / "dta").string()),
+                      HasSubstr("mend the path")));
+    EXPECT_THAT(error_of("{plugin: p, writes: [/no/such]}"),
+                AllOf(HasSubstr("run.yaml:1:22: writes[0]: there is no folder '/no/such'"), HasSubstr("mkdir -p")));
+    EXPECT_THAT(error_of("{plugin: p, writes: [" + (folder / "data/a.txt").string() + "]}"),
+                HasSubstr("there is no folder '" + (folder / "data/a.txt").string()));
+    EXPECT_THAT(error_of("{plugin: p, reads: ['']}"), HasSubstr("run.yaml:1:21: reads[0]: must not be empty"));
+    EXPECT_FALSE(fs::exists(folder / "dta"));
+}
+
+TEST_F(Access, UpFromALinkIsUpFromItsTarget) {
+    file("there/inner/x");
+    file("there/tags.txt");
+    file("tags.txt");
+    fs::create_directory_symlink(folder / "there/inner", folder / "link");
+    EXPECT_THAT(of("{plugin: p, options: {file: link/../tags.txt}}", false).readable,
+                ElementsAre(folder / "there/tags.txt"));
+    EXPECT_THAT(of("{plugin: p, reads: [link/..]}", false).readable, ElementsAre(folder / "there"));
+    const std::string up = (folder / "link/..").string();
+    EXPECT_THAT(of("{plugin: p, writes: [" + up + "]}", false).writable, ElementsAre(folder / "there"));
+    EXPECT_THAT(of("{plugin: p, path: " + up + "/film.mp4}", true).writable, ElementsAre(folder / "there"));
 }
 
 TEST_F(Access, OfTheEnvironmentIsByName) {
     EXPECT_THAT(of("{plugin: p, environment: [LICENCE_FILE]}", false).environment, ElementsAre("LICENCE_FILE"));
-    EXPECT_THROW(of("{plugin: p, environment: [LICENCE_FILE=/x]}", false), Error);
+    for (const char *name : {"LICENCE_FILE=/x", R"("LICENCE\nFILE")", R"("LICENCE\0FILE")", "'A B'", "''"})
+        EXPECT_THAT(error_of("{plugin: p, environment: [" + std::string(name) + "]}"),
+                    HasSubstr("run.yaml:1:27: environment[0]: must "))
+            << name;
 }
 
 TEST_F(Access, ToAHomeOrTheWorkingDirectoryIsWarnedOf) {

@@ -71,6 +71,32 @@ TEST(NewPlugin, RefusesNamesThatToolsCannotTake) {
     EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
+TEST(NewPlugin, RefusesNamesThatMeanSomethingElseInTheSkeleton) {
+    const arhost::test::ScratchFolder folder;
+    const auto expect = [&](const NewPlugin &plugin, const std::string &reason) {
+        EXPECT_THAT(reason_for_refusing(plugin), HasSubstr("the name '" + plugin.name + "' " + reason))
+            << plugin.kind << " in " << plugin.language;
+        EXPECT_TRUE(fs::is_empty(folder.path())) << plugin.name;
+    };
+    for (const char *name : {"host", "options", "plugin", "result", "failure"})
+        for (const std::string &kind : plugin_kinds)
+            expect({kind, name, "rust", folder.path()}, "makes a class '");
+    for (const std::string &kind : plugin_kinds)
+        expect({kind, kind, "rust", folder.path()}, "makes a class '");
+    for (const char *language : {"rust", "cpp"})
+        for (const auto &[kind, name] : {std::pair{"tracker", "patch"}, {"raytracer", "ray"}})
+            expect({kind, name, language, folder.path()}, "makes a class '");
+    expect({"raytracer", "vec_3", "rust", folder.path()}, "makes a class 'Vec3'");
+    expect({"raytracer", "tracer", "c", folder.path()}, "is that of another file of the skeleton");
+    for (const char *name : {"numpy", "sys", "json", "random", "unittest", "tracker"})
+        expect({"tracker", name, "python", folder.path()}, "has no underscore, which every name in Python needs");
+    for (const char *name : {"py_compile", "pydoc_data", "sre_parse"})
+        expect({"tracker", name, "python", folder.path()}, "is that of a module of Python's");
+    for (const char *name : {"core", "std", "test", "self", "arhost_sys", "m", "all", "edit_cache"})
+        for (const std::string &language : plugin_languages)
+            expect({"sink", name, language, folder.path()}, "");
+}
+
 TEST(NewPlugin, RefusesTheNamesOfArhostsOwnPlugins) {
     const arhost::test::ScratchFolder folder;
     fs::create_directories(folder.path() / "lib/arhost/plugins");

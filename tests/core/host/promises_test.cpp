@@ -59,6 +59,26 @@ std::string broken_by(std::initializer_list<arhost_marker> markers) {
     return broken(promises);
 }
 
+constexpr std::int64_t ms = 1'000'000;
+struct Time {
+    std::int64_t capture_ns;
+    std::uint32_t skipped = 0;
+};
+// Frames from 0 on that come at `now_ns`, of a source that was started at 0.
+std::string broken_by_times(const SourcePromises::Rate &rate, arhost_clock clock, const std::vector<Time> &times,
+                            std::int64_t now_ns) {
+    SourcePromises source(rate, 0);
+    Promises promises;
+    arhost_record r{};
+    r.clock = clock;
+    for (const Time &time : times) {
+        r.capture_ns = time.capture_ns;
+        source.look(promises, r, time.skipped, now_ns);
+        ++r.sequence;
+    }
+    return broken(promises);
+}
+
 arhost_marker spoilt(void (*spoil)(arhost_marker &)) {
     arhost_marker m = marker(4, 80);
     spoil(m);
@@ -146,21 +166,61 @@ TEST(MarkerPromises, AreBrokenByOneThatIsNot) {
         << "half the side";
 }
 
-TEST(CapturePromises, WantATimeBeforeNow) {
+TEST(SourcePromises, WantATimeBeforeNowAndNotBeforeTheBeginning) {
     const auto captured = [](arhost_clock clock, std::int64_t capture_ns) {
-        arhost_record r = record({});
-        r.clock = clock;
-        r.capture_ns = capture_ns;
-        Promises promises;
-        look_at_capture_time(promises, r, 100'000'000'000);
-        return broken(promises);
+        return broken_by_times({}, clock, {{capture_ns}}, 100'000'000'000);
     };
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 99'990'000'000), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
-              "source.capture-time: frame 12: was captured 0.250 s after it came");
+              "source.capture-time: frame 0: was captured 0.250 s after it came");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "buffers may be long";
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, INT64_MIN), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "a film's times say nothing of now";
+    EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, -500'000'000),
+              "source.capture-time: frame 0: is of -0.500 s, before the beginning");
+}
+
+TEST(SourcePromises, WantOneClock) {
+    SourcePromises source({}, 0);
+    Promises promises;
+    for (const arhost_clock clock : {ARHOST_CLOCK_MEDIA, ARHOST_CLOCK_MONOTONIC, ARHOST_CLOCK_MEDIA}) {
+        arhost_record r = record({});
+        r.clock = clock;
+        source.look(promises, r, 0, 0);
+    }
+    EXPECT_EQ(broken(promises), "source.clock: frame 12: has the clock 1, those before had 2");
+    EXPECT_EQ(promises.all().at("source.clock").broken, 1u);
+}
+
+TEST(SourcePromises, WantTheRateThatWasAskedFor) {
+    const auto asked = [](std::initializer_list<Time> times) {
+        return broken_by_times({10, true, false}, ARHOST_CLOCK_MEDIA, times, 0);
+    };
+    EXPECT_EQ(asked({{0}, {100 * ms}, {200 * ms}}), "");
+    EXPECT_EQ(asked({{5000 * ms}, {5100 * ms}}), "") << "it may begin anywhere";
+    EXPECT_EQ(asked({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "the skipped ones are counted";
+    EXPECT_EQ(asked({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
+              "source.rate: frame 2: comes 0.400 s after the one before, which at 10 frames a second, 0 of them "
+              "skipped, is 0.100 s");
+    EXPECT_THAT(asked({{0}, {0}}), HasSubstr("comes 0.000 s after the one before"));
+    EXPECT_THAT(asked({{0}, {100 * ms, 1}}), HasSubstr("1 of them skipped, is 0.200 s"));
+}
+
+TEST(SourcePromises, LetAFilmsOwnFramesLieWhereTheyLike) {
+    EXPECT_EQ(broken_by_times({10, false, false}, ARHOST_CLOCK_MEDIA, {{0}, {1}, {60'000 * ms}}, 0), "");
+}
+
+TEST(SourcePromises, WantNoFasterTimeThanTheClocksInModeLive) {
+    const auto live = [](std::initializer_list<Time> times) {
+        return broken_by_times({10, false, true}, ARHOST_CLOCK_MEDIA, times, 2000 * ms);
+    };
+    EXPECT_EQ(live({{0}, {100 * ms}, {1000 * ms}}), "");
+    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}),
+              "source.rate: frame 2: is 10.000 s behind the first, and came 2.000 s after the start");
+}
+
+TEST(SourcePromises, OfALiveOneAreNotOfItsRate) {
+    EXPECT_EQ(broken_by_times({}, ARHOST_CLOCK_MEDIA, {{0}, {1}, {3'600'000 * ms}}, 0), "");
 }
 
 TEST(SampleOf, FindsAnyChangeWithinSixteenFrames) {

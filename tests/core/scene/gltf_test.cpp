@@ -241,6 +241,31 @@ TEST(Gltf, ReadsMaterialsAndTextures) {
     EXPECT_EQ(at<std::uint8_t>(arena, textures[m.colour_texture].texels)[2], 3);
 }
 
+TEST(Gltf, AndWhatAGltfFileNamesAreAmongTheFilesRead) {
+    const ScratchFolder folder;
+    Gltf gltf = triangle();
+    gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]})";
+    gltf.more = R"(, "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}], "images": [{"uri": "inner.png"}])";
+    write_file(folder.path() / "a.gltf", gltf.json(R"(, "uri": "a.bin")"));
+    write_file(folder.path() / "a.bin", gltf.bytes);
+    write_file(folder.path() / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write_file(folder.path() / "sky.hdr", hdr(1, 1, "abcd"));
+    for (const char *image : {"inner.png", "wood.png"})
+        write_file(folder.path() / image, png(1, 1, 4, {1, 2, 3, 4}));
+    write_file(folder.path() / "s.yaml", "version: 1\naxes: y-up\nenvironment: {image: sky.hdr}\n"
+                                         "materials: {m: {model: diffuse, texture: wood.png}, n: {model: mirror}}\n"
+                                         "objects: [{gltf: a.gltf}, {mesh: a.obj, material: n}]\n");
+    std::vector<std::string> read;
+    LoadCallbacks callbacks;
+    callbacks.reads = [&](const std::filesystem::path &file) {
+        EXPECT_EQ(file.parent_path(), folder.path());
+        read.push_back(file.filename().string());
+    };
+    load_scene(folder.path() / "s.yaml", callbacks);
+    EXPECT_THAT(read, testing::UnorderedElementsAre("sky.hdr", "wood.png", "a.gltf", "a.bin", "inner.png", "a.obj"));
+}
+
 TEST(Gltf, TellsWhatItMakesOfAlpha) {
     const auto with = [](const std::string &material) {
         Gltf gltf = triangle();

@@ -15,7 +15,7 @@ namespace {
 
 struct Bench {
     Reactor reactor;
-    Launcher launcher;
+    Launcher launcher{ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher"};
     std::string log;
     Context context{reactor, launcher, ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
                     [this](arhost_severity, const std::string &component, const std::string &text) {

@@ -25,11 +25,23 @@ std::string all_output(const Spawned &spawned) {
     return text;
 }
 
+constexpr const char *program = ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher";
+const LogFunction no_log = [](arhost_severity, const std::string &, const std::string &) {};
+
+pid_t parent_of(pid_t pid) {
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string key; status >> key && key != "PPid:";) {
+    }
+    pid_t parent = 0;
+    status >> parent;
+    return parent;
+}
+
 } // namespace
 
 TEST(Launcher, ReportsHowAProcessEnded) {
-    Launcher launcher;
-    const Spawned spawned = launcher.spawn("/bin/true");
+    Launcher launcher(program);
+    const Spawned spawned = launcher.spawn("/bin/true", no_log);
     wait_dead(spawned);
     const Exit exit = launcher.wait_exit(spawned.pid);
     EXPECT_TRUE(WIFEXITED(exit.wait_status));
@@ -38,8 +50,8 @@ TEST(Launcher, ReportsHowAProcessEnded) {
 }
 
 TEST(Launcher, KeepsTheExitsOfSeveralApart) {
-    Launcher launcher;
-    const Spawned good = launcher.spawn("/bin/true"), bad = launcher.spawn("/bin/false");
+    Launcher launcher(program);
+    const Spawned good = launcher.spawn("/bin/true", no_log), bad = launcher.spawn("/bin/false", no_log);
     wait_dead(good);
     wait_dead(bad);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(bad.pid).wait_status), 1);
@@ -47,35 +59,84 @@ TEST(Launcher, KeepsTheExitsOfSeveralApart) {
 }
 
 TEST(Launcher, SaysSoWhereTheProgramIsMissing) {
-    Launcher launcher;
-    const Spawned spawned = launcher.spawn("/no/such/program");
+    Launcher launcher(program);
+    const Spawned spawned = launcher.spawn("/no/such/program", no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 127);
     EXPECT_NE(all_output(spawned).find("can't be executed"), std::string::npos);
 }
 
-TEST(Launcher, HasAnotherThatStandsBy) {
-    Launcher launcher;
-    const Spawned first = launcher.spawn("/usr/bin/yes");
-    std::ifstream status("/proc/" + std::to_string(first.pid) + "/status");
-    pid_t parent = 0;
-    for (std::string key; status >> key && key != "PPid:";) {
+TEST(Launcher, IsReplacedWhenItIsKilledAsOftenAsItTakes) {
+    Launcher launcher(program);
+    std::string log;
+    const LogFunction note = [&](arhost_severity, const std::string &, const std::string &text) {
+        log += text + '\n';
+    };
+    Spawned first = launcher.spawn("/usr/bin/yes", note);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_EQ(log, "");
+        ::kill(parent_of(first.pid), SIGKILL);
+        wait_dead(first);
+        const pid_t pid = first.pid;
+        first = launcher.spawn("/usr/bin/yes", note);
+        EXPECT_EQ(WTERMSIG(launcher.wait_exit(pid).wait_status), SIGKILL);
+        EXPECT_EQ(log, "the launcher is gone, and all workers with it; starting another\n");
+        log.clear();
     }
-    status >> parent;
-    ::kill(parent, SIGKILL);
-    wait_dead(first);
-    const Spawned second = launcher.spawn("/bin/true");
-    EXPECT_EQ(WTERMSIG(launcher.wait_exit(first.pid).wait_status), SIGKILL);
-    wait_dead(second);
-    EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(second.pid).wait_status), 0);
+    const Spawned last = launcher.spawn("/bin/true", note);
+    wait_dead(last);
+    EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(last.pid).wait_status), 0);
+}
+
+TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
+    const auto reason = [](const char *wrong) -> std::string {
+        Launcher launcher(wrong);
+        try {
+            launcher.spawn("/bin/true", no_log);
+        } catch (const std::runtime_error &error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(reason("/no/such/program"), "/no/such/program can't be started: No such file or directory");
+    EXPECT_EQ(reason("/bin/true"), "/bin/true ends as soon as it is started");
+}
+
+// What PR_SET_PDEATHSIG alone would not: it goes on, and has the workers' own processes ended too.
+TEST(Launcher, EndsWithItsHostThoughItIsStopped) {
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    const pid_t host = ::fork();
+    if (host == 0) {
+        Launcher launcher(program);
+        const Spawned worker = launcher.spawn("/usr/bin/yes", no_log);
+        const pid_t pids[] = {worker.pid, parent_of(worker.pid)};
+        ::kill(pids[1], SIGSTOP);
+        ::kill(worker.pid, SIGSTOP);
+        (void)!::write(ends[1], pids, sizeof pids);
+        ::raise(SIGKILL);
+    }
+    pid_t pids[2] = {};
+    ASSERT_EQ(::read(ends[0], pids, sizeof pids), static_cast<ssize_t>(sizeof pids));
+    ::waitpid(host, nullptr, 0);
+    for (const pid_t pid : pids) {
+        for (int i = 0; i < 5000 && ::kill(pid, 0) == 0; ++i) {
+            ::waitpid(pid, nullptr, WNOHANG); // a launcher of another test has made this process a subreaper
+            ::usleep(2000);
+        }
+        EXPECT_NE(::kill(pid, 0), 0);
+        ::kill(pid, SIGKILL);
+    }
+    ::close(ends[0]);
+    ::close(ends[1]);
 }
 
 TEST(Launcher, TakesItsChildrenAlongWhenItEnds) {
     Spawned spawned;
     {
-        Launcher launcher;
-        spawned = launcher.spawn("/bin/cat"); // stdin is /dev/null, but descriptors 3 and 4 are ours
-        spawned = launcher.spawn("/usr/bin/yes");
+        Launcher launcher(program);
+        spawned = launcher.spawn("/bin/cat", no_log); // stdin is /dev/null, but descriptors 3 and 4 are ours
+        spawned = launcher.spawn("/usr/bin/yes", no_log);
     }
     wait_dead(spawned);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml/yaml.hpp"
 
+#include "plugin_under_test.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -98,11 +100,55 @@ TEST(Yaml, ReadsPathsAgainstTheFileTheyStandIn) {
     EXPECT_EQ(node.require("mesh").input_path(), "/data/meshes/a.obj");
 }
 
+TEST(Yaml, LeavesPathsToTheKernelWhereTheyGoUpFromALink) {
+    const arhost::test::ScratchFolder scratch;
+    const std::filesystem::path folder = std::filesystem::canonical(scratch.path());
+    std::filesystem::create_directories(folder / "data/new/inner");
+    std::filesystem::create_directory_symlink("data/new/inner", folder / "link");
+    const Node node =
+        Node::parse("a: link/../x.obj\nb: ./link/x.obj\nc: link/../../none/../x.obj\n", (folder / "x.yaml").string());
+    EXPECT_EQ(node.require("a").input_path(), folder / "data/new/x.obj");
+    EXPECT_EQ(node.require("b").input_path(), folder / "link/x.obj");
+    EXPECT_EQ(node.require("c").input_path(), folder / "data/x.obj");
+    const Node output = Node::parse("a: " + (folder / "link/../x.mp4").string() + "\nb: x.mp4", "a.yaml");
+    EXPECT_EQ(output.require("a").output_path(), folder / "data/new/x.mp4");
+    EXPECT_EQ(output.require("b").output_path(), std::filesystem::current_path() / "x.mp4");
+}
+
+TEST(Yaml, KeepsPathsAbsoluteWhereALinkLeadsNowhere) {
+    const arhost::test::ScratchFolder scratch;
+    std::filesystem::create_symlink("loop", scratch.path() / "loop");
+    const Node node = Node::parse("a: loop/../x.obj\n", (scratch.path() / "x.yaml").string());
+    EXPECT_EQ(node.require("a").input_path(), scratch.path() / "x.obj");
+}
+
+TEST(Yaml, RefusesNumbersThatAreTooCloseToZero) {
+    const Node node = Node::parse("a: 1e-999\nb: -0." + std::string(400, '0') + "1\nc: 1e-300\n", "a.yaml");
+    EXPECT_EQ(error_of([&] { node.require("a").real(); }),
+              "a.yaml:1:4: a: must be a number farther from 0, is 1e-999");
+    EXPECT_EQ(error_of([&] { node.require("a").real(0.01, 1e6); }),
+              "a.yaml:1:4: a: must be a number farther from 0, 0.01 to 1e+06, is 1e-999");
+    EXPECT_THAT(error_of([&] { node.require("b").real(); }), HasSubstr("must be a number farther from 0, is -0.0"));
+    EXPECT_EQ(node.require("c").real(), 1e-300);
+}
+
 TEST(Yaml, RefusesNumbersThatAreNotFinite) {
-    const Node node = Node::parse("a: .nan\nb: 1e999\nc: inf\nd: +2.5\n", "a.yaml");
-    for (const char *key : {"a", "b", "c"})
-        EXPECT_THAT(error_of([&] { node.require(key).real(); }), HasSubstr("must be a number")) << key;
+    const Node node = Node::parse("a: .nan\nb: 1e999\nc: inf\nd: +2.5\ne: -.Inf\nf: .5\ng: .info\n", "a.yaml");
+    EXPECT_EQ(error_of([&] { node.require("a").real(); }), "a.yaml:1:4: a: must be a finite number, is .nan");
+    EXPECT_EQ(error_of([&] { node.require("a").real(0, 10'000); }),
+              "a.yaml:1:4: a: must be a finite number, 0 to 10000, is .nan");
+    EXPECT_EQ(error_of([&] { node.require("c").real(0); }),
+              "a.yaml:3:4: c: must be a finite number, at least 0, is inf");
+    for (const char *key : {"b", "e"})
+        EXPECT_THAT(error_of([&] { node.require(key).real(); }), HasSubstr("must be a finite number, is ")) << key;
+    EXPECT_EQ(error_of([&] { node.require("g").real(); }), "a.yaml:7:4: g: must be a number, is '.info'");
     EXPECT_EQ(node.require("d").real(), 2.5);
+    EXPECT_EQ(node.require("f").real(), 0.5);
+}
+
+TEST(Yaml, RefusesTextsThatEndEarlyForTheKernel) {
+    const Node node = Node::parse(R"({a: "x\0y"})", "a.yaml");
+    EXPECT_EQ(error_of([&] { node.require("a").text(); }), "a.yaml:1:5: a: must not have a NUL character in it");
 }
 
 TEST(Yaml, AssigningANodeLeavesTheDocumentAsItIs) {

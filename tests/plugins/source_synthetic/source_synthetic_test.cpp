@@ -603,7 +603,7 @@ TEST(SourceSynthetic, waits_for_each_frame_when_paced) {
     const auto begin = std::chrono::steady_clock::now();
     uint64_t ahead = 0;
     for (int sequence = 0; sequence < 5; ++sequence) {
-        const Frame frame = source.read(sequence);
+        const Frame frame = source.read(sequence + ahead);
         ASSERT_EQ(frame.status, ARHOST_OK);
         ahead += frame.info.skipped;
         // A media time, and never earlier in real time than it says.

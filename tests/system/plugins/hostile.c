@@ -193,6 +193,26 @@ static void signal_host(const tracker *self) {
     tell(self, "a processor", sched_setaffinity(host_pid(), sizeof processor, &processor) == 0);
 }
 
+/* As a plugin that may have processes of its own: its child is its own, and no more allowed than itself. */
+static void signal_from_a_child(const tracker *self) {
+    int status = 0;
+    const pid_t child = fork();
+    if (child == 0)
+        _exit(kill(host_pid(), SIGKILL) == 0 ? 0 : errno);
+    waitpid(child, &status, 0);
+    errno = WEXITSTATUS(status);
+    tell(self, "a child's kill", child > 0 && status == 0);
+}
+static void signal_own_child(const tracker *self) {
+    const pid_t child = fork();
+    if (child == 0)
+        for (;;)
+            pause();
+    self->host->log(self->host, ARHOST_SEVERITY_INFO,
+                    child > 0 && kill(child, SIGKILL) == 0 && waitpid(child, NULL, 0) == child ? "its child ends"
+                                                                                               : "its child lives");
+}
+
 static void *wait_for_ever(void *nothing) {
     for (;;)
         pause();
@@ -347,7 +367,10 @@ static void attack(const tracker *self) {
         trace_host(self);
     else if (!strcmp(name, "signal"))
         signal_host(self);
-    else if (!strcmp(name, "memory"))
+    else if (!strcmp(name, "signal_by_child")) {
+        signal_from_a_child(self);
+        signal_own_child(self);
+    } else if (!strcmp(name, "memory"))
         fill_memory(self);
     else if (!strcmp(name, "disk"))
         fill_disk(self);
@@ -447,7 +470,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              "0.1.0",
                                              "arhost",
                                              "Apache-2.0",
-                                             "Tries what it must not be able to do, for tests.",
+                                             "Tries what it must not be able to do, \x1b[2Jfor tests.",
                                              0,
                                              sizeof options / sizeof *options,
                                              options,

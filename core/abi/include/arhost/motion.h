@@ -4,7 +4,7 @@
  *
  * Comes with a render request whenever the scene's duration_s is above 0. Its worker evaluates it from the
  * scene's nodes, channels and skins, so that every ray tracer moves alike. All of it is valid during the
- * call only.
+ * call only. The elements of its arrays have no struct_size and never grow: step by sizeof.
  */
 #ifndef ARHOST_MOTION_H
 #define ARHOST_MOTION_H

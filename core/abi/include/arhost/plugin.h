@@ -8,7 +8,8 @@
  * Call order (docs/abi.md draws it):
  *   arhost_entry.negotiate -> plugin.create -> the kind's start -> its per-frame function, again and
  *   again -> the kind's stop -> plugin.destroy -> the process ends.
- * After a start that failed, or without one, destroy comes without stop.
+ * After a start that failed, or without one, destroy comes without stop. A ray tracer may be started again
+ * after its stop; the others are started once.
  *
  * Rules that hold for every function of this ABI unless its comment says otherwise:
  * - Thread: [worker] is the one thread of arhost-worker that calls the plugin. A plugin may start
@@ -16,7 +17,8 @@
  * - Ownership: a pointer passed in a call belongs to the caller and is valid until that call returns.
  *   Nothing is allocated on one side and freed on the other.
  * - Structs begin with `struct_size`, the size in bytes that their writer knew. A reader never touches
- *   a field that lies past it. In an array behind a pointer, step by the first element's `struct_size`.
+ *   a field that lies past it. In an array behind a pointer, step by the first element's `struct_size`; where
+ *   elements have none (arhost/motion.h, arhost/scene.h) by their sizeof, as they never grow.
  * - Strings are UTF-8 and end with NUL. A pointer that may be NULL says so.
  * - No exception and no longjmp leaves a function.
  */
@@ -114,7 +116,7 @@ enum {
 typedef struct arhost_option_descriptor {
     uint32_t struct_size;
     arhost_option_type type;
-    const char *key;
+    const char *key;            /* not NULL */
     const char *default_value;  /* as it would stand in the YAML; NULL: the option must be given */
     double minimum, maximum;    /* of INTEGER and REAL, inclusive; both 0: unbounded */
     const char *const *choices; /* of TEXT: NULL-terminated list, or NULL: any */
@@ -151,7 +153,7 @@ enum {
     ARHOST_IS_REALTIME_SINK = 1 << 4 /* sink: wants the newest frame rather than every frame */
 };
 
-/* Static, lives as long as the library. */
+/* Static, lives as long as the library. A host takes 4,096 bytes of a text, and of all as JSON 127 KiB. */
 typedef struct arhost_descriptor {
     uint32_t struct_size;
     arhost_kind kind;

@@ -31,11 +31,12 @@ typedef struct arhost_render_request {
     const arhost_motion *motion; /* NULL where the scene's duration_s is 0 */
 } arhost_render_request;
 
-/* The image to write. RGBA8: R, G, B, A bytes; straight (not premultiplied) alpha; sRGB-encoded; first
- * row at the top. Alpha is exactly 0 where no ray hit (colour is ignored there) and 255 on virtual
- * objects. Every pixel must be written, and no byte outside them.
- * `rgba` begins a page of 4096 bytes, and the last row's page can be written to its end, so that a GPU can
- * import the memory. From start to stop the same few addresses (8 at most) come again and again. */
+/* The image to write. RGBA8: R, G, B, A bytes; straight (not premultiplied) alpha; sRGB-encoded; first row at the
+ * top. Alpha is exactly 0 where no ray hit (colour is ignored there) and 255 on virtual objects. Drawn is what is
+ * 1e-4 of the scene's extent before the eye, or farther. Every pixel must be written, and no byte outside them.
+ * `rgba` begins a page of 4096 bytes, and its last page is mapped whole, so that a GPU can import the memory; what
+ * lies there behind the last row stays untouched. From start to stop the same few addresses (8 at most) come again
+ * and again. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes a row, a multiple of 64 */

@@ -5,7 +5,8 @@
  * The loader writes it, the host checks it (every offset, index and number, once) and seals it; ray
  * tracers read it in place. All offsets count bytes from the arena's start and are multiples of 64.
  * After every buffer of vertices and attributes there are at least 16 more readable bytes.
- * World: right-handed, millimetres. Numbers are finite, coordinates within 1e9, in the world 4e9. Little-endian.
+ * World: right-handed, millimetres. Numbers are finite, coordinates within 1e9, in the world 4e9. A scene may be of
+ * any size: what is too near or too small is judged by the scene's own. Little-endian.
  */
 #ifndef ARHOST_SCENE_H
 #define ARHOST_SCENE_H

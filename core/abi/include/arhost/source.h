@@ -16,7 +16,8 @@ extern "C" {
 typedef struct arhost_source_setup {
     uint32_t struct_size;
     uint32_t reserved;       /* 0 */
-    uint64_t first_sequence; /* 0, or where a restarted source goes on; a live one ignores it */
+    uint64_t first_sequence; /* the frame that is asked for first: 0, or where a restarted source goes on (see
+                                arhost_frame_buffer.sequence); a live one ignores it */
     /* Asked for by the configuration; 0: the source's own. One that is not live gives its frames 1/fps apart or
      * refuses (UNSUPPORTED); a live one comes as near as it can. The format's fps tells what it gives. */
     double fps;
@@ -43,9 +44,13 @@ typedef struct arhost_frame_buffer {
     uint32_t reserved;
     const arhost_frame_format *format;
     uint8_t *plane[ARHOST_MAX_PLANES];
-    uint8_t *grey;     /* full-range luma for trackers. The worker fills it after read, unless the source
-                          sets has_grey, or it is plane 0 */
-    uint64_t sequence; /* the number that this frame will bear; a seekable source gives this frame */
+    uint8_t *grey; /* full-range luma for trackers. The worker fills it after read, unless the source
+                      sets has_grey, or it is plane 0 */
+    /* The frame that is asked for, by the source's own count, which has no gaps: first_sequence, and after each
+     * frame that was given that one's + 1 + what it told as skipped. A source that leaves frames out, being late,
+     * gives the frame `sequence` + skipped; so after a restart it goes on behind what it has left out. The
+     * video's frames bear numbers of the host's, in which nothing is left out. A live source ignores it. */
+    uint64_t sequence;
 } arhost_frame_buffer;
 
 /* What `read` tells of the frame. Comes zeroed but for struct_size. */
@@ -56,7 +61,7 @@ typedef struct arhost_frame_info {
      * than a second ahead is refused, and the source is started anew. Where the format tells fps, frames are about
      * 1/fps apart on the mean, the skipped ones counted; live ones may be slower. */
     int64_t capture_ns;
-    uint32_t skipped;   /* frames that the device lost since the one before */
+    uint32_t skipped;   /* frames since the one before that the device lost, or that a paced source was late for */
     int32_t has_grey;   /* non-zero: `grey` has been written */
     int32_t has_truth;  /* non-zero: `true_mt` is set */
     int32_t truth_id;   /* the marker that true_mt belongs to */

@@ -78,7 +78,8 @@ typedef struct arhost_tracker {
      * What is DETECTED, and the bytes of its record, depend on the frame's pixels alone: not on frames before,
      * its number, its time, or threads. So a tracker that is killed and started again goes on as if nothing
      * had happened. One that smooths or predicts tells that as PREDICTED, which depends on the frames since
-     * start; the same frames give the same bytes. Frames may be missing, come twice, or be older than the last. */
+     * start, and has settled once a marker stands still for 60 frames; the same frames give the same bytes.
+     * Frames may be missing, come twice, or be older than the last. */
     arhost_status (*track)(arhost_instance *instance, const arhost_frame *frame, arhost_tracker_result *result);
 
     /* [worker] Once before destroy, if start succeeded. */

@@ -1,10 +1,11 @@
 """@NAME@: a ray tracer for arhost. First what is seen along rays, then the plugin, from cameras to images.
 
 By brute force: rays are tried on every object whose bounds they meet, and there on every triangle; numpy does so with
-all rays at a time. All places are in the world, in mm."""
+the rays of a few rows of the image at a time. All places are in the world, in mm."""
 import arhost
 import numpy as np
 
+BAND = 1 << 12  # pixels that are drawn at a time: of all at once, no memory would hold a hundred reflections
 CHUNK = 1 << 18  # rays times triangles that are tried at a time
 
 
@@ -131,8 +132,8 @@ def try_triangles(hits, number, o, part, rays, origins, directions, only_outside
 
 
 class Tracer:
-    def __init__(self, scene):
-        self.scene = scene
+    def __init__(self, scene, host):
+        self.scene, self.host = scene, host
         self.objects = [Object(record, scene.materials[record["material"]]) for record in scene.objects]
         for number, record in enumerate(scene.objects):
             self.place(number, record["world_from_object"])
@@ -149,7 +150,12 @@ class Tracer:
             place = places.get(d.object, self.scene.objects[d.object]["world_from_object"])
             self.place(d.object, place, d.positions, d.normals)
 
+    def heed_cancelling(self):
+        if self.host.cancelled():  # arhost wants to end: rays must not keep it waiting
+            raise arhost.Failure("", arhost.ERROR_CANCELLED)
+
     def nearest(self, origins, directions, kinds, end=np.inf, only_outside=False):
+        self.heed_cancelling()
         hits = Hits(len(origins), end)
         for number, o in enumerate(self.objects):
             if not o.kind & kinds:
@@ -163,6 +169,7 @@ class Tracer:
                 continue
             step = max(1, CHUNK // len(rays))
             for first in range(0, len(o.corner), step):
+                self.heed_cancelling()
                 try_triangles(hits, number, o, slice(first, first + step), rays, origins[rays], directions[rays],
                               only_outside)
         return hits
@@ -304,7 +311,7 @@ class @CLASS@:
         self.host = host  # host.info("…") logs, host.cancelled() tells when to give up
 
     def start(self, setup):
-        self.tracer = Tracer(setup.scene)
+        self.tracer = Tracer(setup.scene, self.host)
 
     def stop(self):
         self.tracer = None  # the scene is no longer there
@@ -320,11 +327,15 @@ class @CLASS@:
         up = np.cross(back, right)
         self.tracer.move(request.moved, request.deformed)
 
-        # A ray a pixel. Pixel centres are at integers, rows run downwards, the camera looks along -back.
-        rows, columns = np.mgrid[0:image.shape[0], 0:image.shape[1]].reshape(2, -1)
-        x, y = (columns - lens.cx) / lens.fx, (rows - lens.cy) / lens.fy
-        directions = normalised(x[:, None] * right - y[:, None] * up - back)
-        colours, alphas = self.tracer.look(np.broadcast_to(camera.eye, directions.shape), directions)
-        # Alpha is straight: colours are not multiplied by it.
-        image[..., :3] = srgb_bytes(colours).reshape(image.shape[:2] + (3,))
-        image[..., 3] = (255 * alphas + 0.5).astype(np.uint8).reshape(image.shape[:2])
+        height, width = image.shape[:2]
+        step = max(1, BAND // width)
+        for first in range(0, height, step):
+            band = image[first:first + step]
+            # A ray a pixel. Pixel centres are at integers, rows run downwards, the camera looks along -back.
+            rows, columns = np.mgrid[first:first + len(band), 0:width].reshape(2, -1)
+            x, y = (columns - lens.cx) / lens.fx, (rows - lens.cy) / lens.fy
+            directions = normalised(x[:, None] * right - y[:, None] * up - back)
+            colours, alphas = self.tracer.look(np.broadcast_to(camera.eye, directions.shape), directions)
+            # Alpha is straight: colours are not multiplied by it.
+            band[..., :3] = srgb_bytes(colours).reshape(band.shape[:2] + (3,))
+            band[..., 3] = (255 * alphas + 0.5).astype(np.uint8).reshape(band.shape[:2])

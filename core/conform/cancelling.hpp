@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A host that wants a call to return soon: before it, or from another thread meanwhile.
+#pragma once
+
+#include "conform/test.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace arhost::conform {
+
+inline void expect_ok_or_cancelled(const char *call, arhost_status status, const char *when = "cancelled before") {
+    if (status != ARHOST_OK && status != ARHOST_ERROR_CANCELLED)
+        throw Failure(fmt::format("{}, {} returned {}; it must be OK or CANCELLED", when, call, status_name(status)));
+}
+
+// The host cancels 100 ms after `function` has been called, which is the plugin's `call`, again and again until then
+// where it returns sooner.
+template <class Function>
+void expect_to_be_cancelled(const Context &context, Host &host, const char *call, Function &&function) {
+    using Clock = std::chrono::steady_clock;
+    // A plugin asks each 100 ms, however short the deadlines are.
+    const std::chrono::duration<double> soon = 2s * std::max(1.0, context.patience);
+    Clock::time_point cancelled;
+    std::jthread other([&] {
+        std::this_thread::sleep_for(100ms);
+        cancelled = Clock::now();
+        host.cancel();
+    });
+    arhost_status status = ARHOST_OK;
+    while (status == ARHOST_OK && !host.is_cancelled())
+        status = function();
+    const Clock::time_point returned = Clock::now();
+    other.join();
+    expect_ok_or_cancelled(call, status == ARHOST_END ? ARHOST_OK : status, "cancelled meanwhile");
+    if (returned - cancelled > soon)
+        throw Failure(fmt::format("cancelled meanwhile, {} went on for {:.1f} s; {:.3g} s are allowed", call,
+                                  std::chrono::duration<double>(returned - cancelled).count(), soon.count()));
+}
+
+} // namespace arhost::conform

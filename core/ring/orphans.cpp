@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ring/orphans.hpp"
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <sys/wait.h>
+
+namespace arhost::ring {
+
+std::set<pid_t> children() {
+    std::ifstream file("/proc/thread-self/children");
+    return {std::istream_iterator<pid_t>(file), {}};
+}
+
+int kill_orphans(const std::set<pid_t> &kept) {
+    int count = 0;
+    for (const pid_t child : children()) {
+        siginfo_t info{}; // a number of another pid namespace's /proc is no child of ours
+        if (!kept.contains(child) &&
+            ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0) {
+            ::kill(child, SIGKILL);
+            ::waitpid(child, nullptr, WNOHANG); // or with a later call
+            ++count;
+        }
+    }
+    return count;
+}
+
+} // namespace arhost::ring

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ring/text.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace arhost::ring {
+namespace {
+
+// `c`: one character in UTF-8, whose order is that of its bytes.
+bool is_harmful(std::string_view c) {
+    const auto within = [&](std::string_view first, std::string_view last) { return first <= c && c <= last; };
+    return c < " " || within("\x7f", "\u009f") || within("\u2028", "\u202e") || within("\u2066", "\u2069") ||
+           within("\ufffe", "\uffff");
+}
+
+} // namespace
+
+std::string valid_utf8(std::string_view text) {
+    using Json = nlohmann::json;
+    return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+std::string printable(std::string_view text) {
+    const std::string valid = valid_utf8(text);
+    std::string line;
+    for (std::size_t at = 0, length = 0; at < valid.size(); at += length) {
+        const auto first = static_cast<unsigned char>(valid[at]);
+        length = first < 0x80 ? 1 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+        const std::string_view c = std::string_view(valid).substr(at, length);
+        line += is_harmful(c) ? " " : c;
+    }
+    return line;
+}
+
+} // namespace arhost::ring

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3; of no use by hand.
+// It starts workers, tells how they ended, and kills what they leave behind.
+#include "ring/orphans.hpp"
+#include "supervise/launcher_protocol.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/signalfd.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+
+namespace {
+
+using namespace arhost::supervise;
+using arhost::ring::kill_orphans;
+using arhost::ring::UniqueFd;
+
+// In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
+[[noreturn]] void become(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
+    // A group of its own: what it forks ends with it, and the terminal's Ctrl-C, which the host alone
+    // interprets, does not reach it.
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != launcher) // it died before the line above
+        ::_exit(127);
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    ::signal(SIGINT, SIG_IGN);
+    ::signal(SIGTERM, SIG_DFL);
+    ::signal(SIGHUP, SIG_IGN);
+    ::signal(SIGPIPE, SIG_IGN); // and SIGXFSZ, which the host ignores too: a full disk is an error value
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
+    const int control = ::fcntl(fds[0].get(), F_DUPFD_CLOEXEC, 10);
+    const int doorbell = ::fcntl(fds[1].get(), F_DUPFD_CLOEXEC, 10);
+    ::dup2(fds[2].get(), STDOUT_FILENO);
+    ::dup2(fds[2].get(), STDERR_FILENO);
+    ::dup2(control, 3);
+    ::dup2(doorbell, 4);
+    ::syscall(SYS_close_range, 5u, ~0u, 0u);
+    const int null = ::open("/dev/null", O_RDONLY);
+    ::dup2(null, STDIN_FILENO);
+    ::close(null);
+    ::execl(program, program, static_cast<char *>(nullptr));
+    const char message[] = "arhost-worker can't be executed; is it installed beside arhost?\n";
+    (void)!::write(STDERR_FILENO, message, sizeof message - 1);
+    ::_exit(127);
+}
+
+void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &fds, std::set<pid_t> &spawned) {
+    const pid_t launcher = ::getpid();
+    const pid_t pid = ::fork();
+    if (pid == 0)
+        become(request.program, fds, launcher);
+    Reply reply{};
+    if (pid < 0) {
+        reply.kind = Reply::failed;
+        reply.error = errno;
+        send_struct(socket, reply);
+        return;
+    }
+    // No race: the child stays a zombie until this process reaps it.
+    const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+    reply.exit.pid = pid;
+    if (!pidfd) { // a container that does not allow it, or no descriptor left
+        reply.kind = Reply::failed;
+        reply.error = errno;
+        ::kill(pid, SIGKILL);
+        send_struct(socket, reply);
+        return;
+    }
+    reply.kind = Reply::spawned;
+    spawned.insert(pid);
+    send_struct(socket, reply, {pidfd.get()});
+}
+
+// The host is gone: so are the workers in a moment, and so must be what they have started. Nothing is done at the
+// exit: a sanitizer's search for leaks stops this process, and the host, which waits, makes a stopped one go on.
+[[noreturn]] void end_all(const std::set<pid_t> &spawned) {
+    for (const pid_t worker : spawned)
+        ::kill(-worker, SIGKILL);
+    for (int i = 0; i < 500; ++i) { // a process that hangs in the kernel is not waited for
+        kill_orphans({});
+        pid_t gone;
+        while ((gone = ::waitpid(-1, nullptr, WNOHANG)) > 0) {
+        }
+        if (gone < 0)
+            break;
+        ::usleep(1000);
+    }
+    ::_exit(0);
+}
+
+void reap(int socket, std::set<pid_t> &spawned) {
+    for (;;) {
+        Reply reply{};
+        rusage usage{};
+        reply.kind = Reply::exited;
+        reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
+        if (reply.exit.pid <= 0)
+            return (void)kill_orphans(spawned);
+        if (spawned.erase(reply.exit.pid) == 0)
+            continue;                     // the orphan of a worker
+        ::kill(-reply.exit.pid, SIGKILL); // what it has forked; kill_orphans finds what has left its group
+        reply.exit.cpu_seconds = cpu_seconds(usage);
+        send_struct(socket, reply);
+    }
+}
+
+} // namespace
+
+int main() {
+    if (::fcntl(launcher_fd, F_SETFD, FD_CLOEXEC) < 0) {
+        std::fprintf(stderr, "arhost-launcher is started by arhost, not by hand: arhost --config FILE\n");
+        return 2;
+    }
+    ::syscall(SYS_close_range, launcher_fd + 1u, ~0u, 0u);
+    // The socket tells when the host is gone, and then there is something left to do: not SIGKILL, but the signal
+    // that lets one go on which somebody has stopped.
+    ::prctl(PR_SET_PDEATHSIG, SIGCONT);
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a worker leaves behind comes here
+    ::signal(SIGINT, SIG_IGN);
+    ::signal(SIGTERM, SIG_IGN);
+    ::signal(SIGHUP, SIG_IGN);
+    sigset_t child;
+    ::sigemptyset(&child);
+    ::sigaddset(&child, SIGCHLD);
+    ::sigprocmask(SIG_BLOCK, &child, nullptr);
+    const UniqueFd signals(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK));
+    std::set<pid_t> spawned;
+    for (;;) {
+        pollfd ready[2] = {{launcher_fd, POLLIN, 0}, {signals.get(), POLLIN, 0}};
+        if (::poll(ready, 2, -1) < 0)
+            continue;
+        if (ready[1].revents) {
+            signalfd_siginfo info;
+            while (::read(signals.get(), &info, sizeof info) > 0) {
+            }
+            reap(launcher_fd, spawned);
+        }
+        if (ready[0].revents) {
+            Request request;
+            std::vector<UniqueFd> fds;
+            if (!receive_struct(launcher_fd, request, fds) || fds.size() != 3)
+                end_all(spawned);
+            spawn_for(launcher_fd, request, fds, spawned);
+        }
+    }
+}

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How a child process ended.
+#pragma once
+
+#include <sys/resource.h>
+#include <sys/types.h>
+
+namespace arhost::supervise {
+
+struct Exit {
+    pid_t pid;
+    int wait_status; // as of wait(2)
+    double cpu_seconds;
+};
+
+// User and system.
+inline double cpu_seconds(const rusage &usage) {
+    const auto seconds = [](const timeval &t) {
+        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+} // namespace arhost::supervise

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the host and arhost-launcher send each other, as plain structs: both are of one build.
+#pragma once
+
+#include "ring/fd_passing.hpp"
+#include "supervise/exit.hpp"
+
+#include <climits>
+
+namespace arhost::supervise {
+
+struct Request {
+    char program[PATH_MAX]; // with descriptors: control, doorbell, output
+};
+
+struct Reply {
+    enum Kind : int { spawned, failed, exited } kind;
+    int error; // errno of `failed`
+    Exit exit; // `spawned`: only pid, and its pidfd comes along
+};
+
+// The launcher's end of the socket.
+constexpr int launcher_fd = 3;
+
+template <class Struct> bool send_struct(int socket, const Struct &data, std::initializer_list<int> fds = {}) {
+    return ring::send_with_fds(socket, std::as_bytes(std::span(&data, 1)), fds) == sizeof data;
+}
+template <class Struct> bool receive_struct(int socket, Struct &data, std::vector<ring::UniqueFd> &fds) {
+    return ring::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds).size == sizeof data;
+}
+
+} // namespace arhost::supervise

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A loader that is played by the test, which says what a taken-over one could.
+#include "host/scene_loading.hpp"
+#include "plugin_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+using namespace arhost;
+using namespace arhost::ring;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct PlayedLoader final : supervise::Starter {
+    Channel channel;
+    UniqueFd death;
+
+    supervise::Spawned spawn(const fs::path &, const supervise::LogFunction &) override {
+        supervise::Spawned spawned;
+        std::tie(spawned.channel, channel) = Channel::make_pair();
+        spawned.doorbell = make_doorbell().host;
+        spawned.output = UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // silent
+        spawned.pidfd = UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals can't be sent to it
+        spawned.pid = 1 << 22; // above the highest that Linux gives to a process
+        death = UniqueFd(::dup(spawned.pidfd.get()));
+        return spawned;
+    }
+    supervise::Exit wait_exit(pid_t pid) override { return {pid, 0, 0}; }
+};
+
+struct SceneLoadingTest : testing::Test {
+    // Why it fails where the loader says all this and ends.
+    std::string reason_after(const std::vector<Json> &messages) {
+        config::FilesInUse files;
+        for (const char *name : {"a.mp4", "b.mp4"})
+            files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
+        std::string failure;
+        host::SceneLoading loading(
+            context, folder / "scene.yaml", sandbox::Mode::permissive, std::chrono::hours(1), files,
+            {[&](const SharedMemory &) { failure = "none"; }, [&](const std::string &reason) { failure = reason; }});
+        for (const Json &message : messages)
+            loader.channel.send(message);
+        ::eventfd_write(loader.death.get(), 1);
+        while (failure.empty())
+            reactor.run_once();
+        return failure;
+    }
+    Json reads(const fs::path &file) const {
+        const FileIdentity identity = identity_of(folder / file);
+        return {{"type", "reads"}, {"path", identity.path}, {"node", identity.node}};
+    }
+    arhost::test::ScratchFolder scratch;
+    const fs::path folder = fs::canonical(scratch.path());
+    Reactor reactor;
+    PlayedLoader loader;
+    supervise::Context context{reactor, loader, "", [](arhost_severity, const std::string &, const std::string &) {}};
+};
+
+} // namespace
+
+TEST_F(SceneLoadingTest, FailsForTheFirstReason) {
+    const Json failed = {{"type", "failed"}, {"text", "broken mesh"}};
+    EXPECT_THAT(reason_after({reads("a.mp4"), failed}), HasSubstr("a.mp4' is a file that this run reads"));
+    EXPECT_THAT(reason_after({reads("a.mp4"), reads("b.mp4")}), HasSubstr("a.mp4' is a file that this run reads"));
+    EXPECT_EQ(reason_after({failed, reads("a.mp4")}), "broken mesh");
+}
+
+TEST_F(SceneLoadingTest, LooksAtNoFileThatTheLoaderNames) {
+    std::ofstream(folder / "a.mp4") << "x";
+    fs::create_symlink("a.mp4", folder / "link.mp4");
+    for (const char *name : {"link.mp4", "%d.mp4"})
+        EXPECT_THAT(reason_after({{{"type", "reads"}, {"path", folder / name}, {"node", "0:0"}}}),
+                    HasSubstr("exited"));
+}

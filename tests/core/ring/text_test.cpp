@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ring/text.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace arhost::ring;
+
+TEST(Printable, LeavesTextsOfEveryLanguageAsTheyAre) {
+    for (const std::string text : {"", "Embree", "640×480, p50 ½ ms", "Трассировщик", "光線追跡", "🎲"})
+        EXPECT_EQ(printable(text), text);
+}
+
+TEST(Printable, IsOneLineThatCantSteerATerminal) {
+    EXPECT_EQ(printable("a\nb\r\tc"), "a b  c");
+    EXPECT_EQ(printable("\x1b[2Jgone\a\x7f"), " [2Jgone  ");
+    EXPECT_EQ(printable("\u009b2J"), " 2J"); // an escape sequence's beginning, in one character
+    EXPECT_EQ(printable("a\u202efdp.exe\u2069\u2028"), "a fdp.exe  "); // would be shown from right to left
+    EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a b");
+}
+
+TEST(Printable, HasNothingThatXmlCantHold) {
+    EXPECT_EQ(printable("a\ufffe\uffff"), "a  ");
+}
+
+TEST(Printable, ReplacesWhatIsNoUtf8) {
+    EXPECT_EQ(printable("Bas\xe9"), "Bas\ufffd");
+    EXPECT_EQ(printable("\xed\xa0\x80").find('\xed'), std::string::npos); // half of a pair
+    EXPECT_EQ(printable("\xc0\xaf").find('/'), std::string::npos);        // longer than need be
+    EXPECT_EQ(valid_utf8("\xf0\x9f\x8e"), "\ufffd");                      // cut off
+    EXPECT_EQ(valid_utf8("é\n"), "é\n");
+}
