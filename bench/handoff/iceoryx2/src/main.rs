@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //! One-way latency of a message of 128 bytes from one process to another and of the answer back, over iceoryx2: its
 //! samples, with a sleeping (events) and a polling receiver. The same rounds and figures as bench_handoff.cpp's.
-use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
+use iceoryx2::port::{
+    listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber,
+};
 use iceoryx2::prelude::*;
 use std::error::Error;
-use std::process::Command;
-use std::time::Duration;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// As many bytes as arhost's own results have, about.
 #[repr(C)]
@@ -17,51 +20,87 @@ struct Message {
 }
 
 fn now_ns() -> i64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    let mut time = libc::timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
     // SAFETY: `time` is valid for writing.
     unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
     time.tv_sec * 1_000_000_000 + time.tv_nsec
 }
 
-/// One direction: messages, and the event that wakes their receiver.
-struct Way {
+/// One direction's end that gives: messages, and the event that wakes who receives them.
+struct Sender {
     publisher: Publisher<ipc::Service, Message, ()>,
-    subscriber: Subscriber<ipc::Service, Message, ()>,
     notifier: Notifier<ipc::Service>,
+}
+
+/// Its end that takes.
+struct Receiver {
+    subscriber: Subscriber<ipc::Service, Message, ()>,
     listener: Listener<ipc::Service>,
 }
 
-impl Way {
-    fn open(node: &Node<ipc::Service>, name: &str, run: &str) -> Result<Way, Box<dyn Error>> {
-        let service: ServiceName = format!("arhost/handoff/{run}/{name}").as_str().try_into()?;
-        let messages = node.service_builder(&service).publish_subscribe::<Message>().open_or_create()?;
-        let events = node.service_builder(&service).event().open_or_create()?;
-        Ok(Way {
+type Messages =
+    iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, Message, ()>;
+type Events = iceoryx2::service::port_factory::event::PortFactory<ipc::Service>;
+
+fn open(
+    node: &Node<ipc::Service>,
+    name: &str,
+    run: &str,
+) -> Result<(Messages, Events), Box<dyn Error>> {
+    let service: ServiceName = format!("arhost/handoff/{run}/{name}").as_str().try_into()?;
+    Ok((
+        node.service_builder(&service)
+            .publish_subscribe::<Message>()
+            .open_or_create()?,
+        node.service_builder(&service).event().open_or_create()?,
+    ))
+}
+
+impl Sender {
+    fn open(node: &Node<ipc::Service>, name: &str, run: &str) -> Result<Sender, Box<dyn Error>> {
+        let (messages, events) = open(node, name, run)?;
+        Ok(Sender {
             publisher: messages.publisher_builder().create()?,
-            subscriber: messages.subscriber_builder().create()?,
             notifier: events.notifier_builder().create()?,
-            listener: events.listener_builder().create()?,
         })
     }
 
     fn send(&self, message: Message, polling: bool) -> Result<(), Box<dyn Error>> {
-        self.publisher.loan_uninit()?.write_payload(message).send()?;
+        self.publisher
+            .loan_uninit()?
+            .write_payload(message)
+            .send()?;
         if !polling {
             self.notifier.notify()?;
         }
         Ok(())
     }
+}
+
+impl Receiver {
+    fn open(node: &Node<ipc::Service>, name: &str, run: &str) -> Result<Receiver, Box<dyn Error>> {
+        let (messages, events) = open(node, name, run)?;
+        Ok(Receiver {
+            subscriber: messages.subscriber_builder().create()?,
+            listener: events.listener_builder().create()?,
+        })
+    }
 
     fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
-        // About ten seconds: the other side may have died.
-        for _ in 0..if polling { 1 << 28 } else { 10 } {
-            if let Some(sample) = self.subscriber.receive()? {
-                return Ok(*sample);
-            }
-            if polling {
-                std::hint::spin_loop();
-            } else {
+        let end = Instant::now() + Duration::from_secs(10); // the other side may have died
+        while Instant::now() < end {
+            // First the event, which comes after its message: one that is left would wake the next wait.
+            if !polling {
                 self.listener.timed_wait_one(Duration::from_secs(1))?;
+            }
+            for _ in 0..if polling { 1000 } else { 1 } {
+                if let Some(sample) = self.subscriber.receive()? {
+                    return Ok(*sample);
+                }
+                std::hint::spin_loop();
             }
         }
         Err("the other process does not answer".into())
@@ -70,11 +109,22 @@ impl Way {
 
 fn answer(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
     let node = NodeBuilder::new().create::<ipc::Service>()?;
-    let (there, back) = (Way::open(&node, "there", run)?, Way::open(&node, "back", run)?);
+    let (there, back) = (
+        Receiver::open(&node, "there", run)?,
+        Sender::open(&node, "back", run)?,
+    );
+    println!("ready"); // what was sent before a receiver was there would be lost
     for _ in 0..=rounds {
         let question = there.receive(polling)?;
         let way_there_ns = now_ns() - question.sent_ns;
-        back.send(Message { sent_ns: now_ns(), way_there_ns, more: [0; 14] }, polling)?;
+        back.send(
+            Message {
+                sent_ns: now_ns(),
+                way_there_ns,
+                more: [0; 14],
+            },
+            polling,
+        )?;
     }
     std::thread::sleep(Duration::from_millis(100)); // the last answer must outlive its being read
     Ok(())
@@ -88,15 +138,26 @@ fn percentile_us(samples: &mut [i64], share: f64) -> f64 {
 fn ask(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
     let run = format!("{}-{polling}", std::process::id());
     let node = NodeBuilder::new().create::<ipc::Service>()?;
-    let (way_there, way_back) = (Way::open(&node, "there", &run)?, Way::open(&node, "back", &run)?);
+    let (way_there, way_back) = (
+        Sender::open(&node, "there", &run)?,
+        Receiver::open(&node, "back", &run)?,
+    );
     let mut other = Command::new(std::env::current_exe()?)
         .args([rounds.to_string(), run, polling.to_string()])
+        .stdout(Stdio::piped())
         .spawn()?;
-    std::thread::sleep(Duration::from_millis(500)); // the other side opens its services
+    BufReader::new(other.stdout.take().ok_or("no pipe")?).read_line(&mut String::new())?;
     let (mut there, mut back) = (Vec::new(), Vec::new());
     for round in 0..=rounds {
         std::thread::sleep(Duration::from_micros(200)); // let the other side fall asleep
-        way_there.send(Message { sent_ns: now_ns(), way_there_ns: 0, more: [0; 14] }, polling)?;
+        way_there.send(
+            Message {
+                sent_ns: now_ns(),
+                way_there_ns: 0,
+                more: [0; 14],
+            },
+            polling,
+        )?;
         let reply = way_back.receive(polling)?;
         if round > 0 {
             back.push(now_ns() - reply.sent_ns);
@@ -104,10 +165,19 @@ fn ask(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
         }
     }
     other.wait()?;
-    let name = if polling { "iceoryx2, polling" } else { "iceoryx2, sleeping" };
+    let name = if polling {
+        "iceoryx2, polling"
+    } else {
+        "iceoryx2, sleeping"
+    };
     print!("{name:<28}");
     for samples in [&mut there, &mut back] {
-        print!("  {:8.1} {:8.1} {:8.1}", percentile_us(samples, 0.5), percentile_us(samples, 0.99), percentile_us(samples, 0.999));
+        print!(
+            "  {:8.1} {:8.1} {:8.1}",
+            percentile_us(samples, 0.5),
+            percentile_us(samples, 0.99),
+            percentile_us(samples, 0.999)
+        );
     }
     println!();
     Ok(())
