@@ -1,31 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Textures and environments.
-#include "tracer.hpp"
+#include "rich_scene.hpp"
 
 #include <arhost/shading/scalar.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 namespace arhost::test {
 namespace {
 
 using scene::ArenaBuilder;
-
-scene::Texture texture_of(std::uint32_t width, std::uint32_t height, const std::vector<Pixel> &pixels) {
-    scene::Texture texture;
-    texture.width = width;
-    texture.height = height;
-    texture.texels.size = 4 * pixels.size();
-    texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size);
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-        for (std::size_t c = 0; c < 4; ++c)
-            texture.texels.bytes[4 * i + c] = static_cast<std::byte>(pixels[i][c]);
-    return texture;
-}
 
 // Four texels, seen from above upright: red, green / blue, white.
 Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format format = ARHOST_TEXEL_SRGB8) {
@@ -50,39 +37,6 @@ bool is_nearly(const Pixel &pixel, const Pixel &colour) {
         if (std::abs(pixel[c] - colour[c]) > 48)
             return false;
     return true;
-}
-
-// An environment of 8×4 texels; `colour` gives one by its column.
-template <class Colour> void add_environment(ArenaBuilder &builder, Colour colour) {
-    constexpr std::uint32_t width = 8, height = 4;
-    scene::Texture texture;
-    texture.format = ARHOST_TEXEL_RGBA32F;
-    texture.width = width;
-    texture.height = height;
-    std::vector<float> texels;
-    scene::Environment environment;
-    double total = 0;
-    std::vector<double> row_sums;
-    for (std::uint32_t y = 0; y < height; ++y) {
-        double sum = 0;
-        std::vector<double> sums;
-        for (std::uint32_t x = 0; x < width; ++x) {
-            const glm::vec3 c = colour(x);
-            texels.insert(texels.end(), {c.x, c.y, c.z, 1});
-            sums.push_back(sum += 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z);
-        }
-        for (const double s : sums)
-            environment.columns.push_back(static_cast<float>(s / sum));
-        row_sums.push_back(total += sum * std::sin(std::numbers::pi * (y + 0.5) / height));
-    }
-    for (const double s : row_sums)
-        environment.rows.push_back(static_cast<float>(s / total));
-    texture.texels.size = texels.size() * sizeof(float);
-    texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size);
-    std::memcpy(texture.texels.bytes.get(), texels.data(), texture.texels.size);
-    environment.texture = builder.add_texture("sky", std::move(texture));
-    environment.environment_from_world = glm::mat3(1, 0, 0, 0, 0, -1, 0, 1, 0); // z is up
-    builder.environment = std::move(environment);
 }
 
 } // namespace
@@ -127,21 +81,6 @@ TEST(Texture, TimesTheEmissionGlowsInTheDark) {
 }
 
 // ---- Holes -----------------------------------------------------------------------------------------
-
-// A square of 60 mm half a side whose texture is solid on its left half and has a hole on its right one.
-arhost_material half_a_hole(ArenaBuilder &builder, float cutoff) {
-    scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
-    texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
-    arhost_material material = flat(1, 1, 1);
-    material.colour_texture = builder.add_texture("half", std::move(texture));
-    material.alpha_cutoff = cutoff;
-    return material;
-}
-scene::TriangleMesh textured_square(float half_side, float z) {
-    scene::TriangleMesh mesh = square(half_side, z);
-    mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
-    return mesh;
-}
 
 TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
     for (const bool instanced : {false, true}) {
@@ -191,41 +130,6 @@ TEST(Holes, OfACatcherTakeNoShadow) {
 }
 
 // ---- Everything at once ----------------------------------------------------------------------------
-
-// Whatever has random numbers, queues, textures or transcendental functions in it.
-ArenaBuilder rich_scene() {
-    ArenaBuilder builder;
-    builder.settings.max_depth = 6;
-    builder.settings.coloured_shadows = true;
-    add_environment(builder, [](std::uint32_t column) {
-        return glm::vec3(0.1f * static_cast<float>(column), 0.3f, 0.8f - 0.1f * static_cast<float>(column));
-    });
-    arhost_light bulb = scene::make_light(ARHOST_SPHERE_LIGHT);
-    set3(bulb.position, -60, -20, 200);
-    set3(bulb.intensity, 0.6f, 0.5f, 0.4f);
-    bulb.radius = 30;
-    builder.add_light(bulb);
-    builder.add_object("desk", builder.add_triangles(square(90)), builder.add_material(flat(0.7f, 0.6f, 0.5f)),
-                       ARHOST_CATCHER);
-    arhost_material glass = scene::make_material(ARHOST_GLASS);
-    glass.index = 1.5f;
-    set3(glass.extinction, 0.02f, 0.005f, 0.01f);
-    set3(glass.shadow_attenuation, 0.4f, 0.7f, 0.4f);
-    builder.add_object("glass", builder.add_spheres({{-25, 0, 25, 20}}), builder.add_material(glass));
-    arhost_material rough = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
-    set3(rough.diffuse, 0.9f, 0.7f, 0.4f);
-    rough.metallic = 0.8f;
-    rough.roughness = 0.35f;
-    rough.normal_texture = builder.add_texture(
-        "bumps",
-        texture_of(2, 2, {{128, 128, 255, 255}, {160, 128, 250, 255}, {128, 160, 250, 255}, {100, 110, 240, 255}}));
-    scene::TriangleMesh sheet = textured_square(25, 0);
-    const glm::mat4x3 upright(1, 0, 0, 0, 0.3f, 1, 0, -1, 0.3f, 30, 20, 26);
-    builder.add_object("rough", builder.add_triangles(sheet), builder.add_material(rough), ARHOST_VIRTUAL, upright);
-    builder.add_object("holed", builder.add_triangles(textured_square(15, 60)),
-                       builder.add_material(half_a_hole(builder, 0.5f)));
-    return builder;
-}
 
 TEST(RichScene, IsTheSameOnAnyNumberOfThreadsAndAgain) {
     for (const char *way : {"tree", "path"}) {

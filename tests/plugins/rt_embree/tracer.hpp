@@ -91,8 +91,8 @@ private:
 // The arena lies in memory that cannot be written: whoever tries, crashes.
 class Tracer {
 public:
-    explicit Tracer(scene::ArenaBuilder builder, const Options &options = {})
-        : plugin_("rt_embree"), size_(builder.byte_size()) {
+    explicit Tracer(scene::ArenaBuilder builder, const Options &options = {}, const std::string &plugin = "rt_embree")
+        : plugin_(plugin), size_(builder.byte_size()) {
         memory_ = mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         std::move(builder).write({static_cast<std::byte *>(memory_), size_});
         EXPECT_EQ(scene::validate({static_cast<std::byte *>(memory_), size_}), "");

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+#include <numeric>
+
+namespace rt_vulkan {
+namespace {
+
+constexpr int bin_count = 16;
+constexpr float box_cost = 1; // of a step down, by that of a primitive
+
+float half_area(const Box &box) {
+    const float x = box.high[0] - box.low[0], y = box.high[1] - box.low[1], z = box.high[2] - box.low[2];
+    return x < 0 ? 0 : x * y + y * z + z * x;
+}
+
+// Twice the middle, which is all that sorting needs.
+float middle(const Box &box, int axis) {
+    return box.low[axis] + box.high[axis];
+}
+
+struct Bin {
+    Box box = empty_box();
+    std::uint32_t count = 0;
+};
+
+class Builder {
+public:
+    Builder(std::span<const Box> boxes, std::uint32_t most_in_leaf, const std::function<void()> &look_up)
+        : boxes_(boxes), most_in_leaf_(most_in_leaf), look_up_(look_up) {
+        tree_.order.resize(boxes.size());
+        std::iota(tree_.order.begin(), tree_.order.end(), 0u);
+        tree_.nodes.reserve(2 * boxes.size());
+        tree_.nodes.emplace_back();
+    }
+
+    Tree build(int most_depth) {
+        struct Task {
+            std::uint32_t node, first, count;
+            int depth; // levels that are left below
+        };
+        std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(boxes_.size()), most_depth}};
+        std::uint32_t since_look_up = 0;
+        while (!tasks.empty()) {
+            const Task task = tasks.back();
+            tasks.pop_back();
+            if ((since_look_up += task.count) > 1u << 20) {
+                look_up_();
+                since_look_up = 0;
+            }
+            Box box = empty_box();
+            for (std::uint32_t i = 0; i < task.count; ++i)
+                include(box, boxes_[tree_.order[task.first + i]]);
+            const std::uint32_t left = split(task.first, task.count, task.depth, box);
+            Node &node = tree_.nodes[task.node];
+            std::copy_n(box.low, 3, node.low);
+            std::copy_n(box.high, 3, node.high);
+            node.first = left ? static_cast<std::uint32_t>(tree_.nodes.size()) : task.first;
+            node.count = left ? 0 : task.count;
+            if (!left)
+                continue;
+            tasks.push_back({node.first, task.first, left, task.depth - 1});
+            tasks.push_back({node.first + 1, task.first + left, task.count - left, task.depth - 1});
+            tree_.nodes.emplace_back();
+            tree_.nodes.emplace_back();
+        }
+        return std::move(tree_);
+    }
+
+private:
+    // Orders what belongs to a node and returns how many go to the left; 0: the node is a leaf.
+    std::uint32_t split(std::uint32_t first, std::uint32_t count, int depth, const Box &box) {
+        if (count <= 1)
+            return 0;
+        const auto begin = tree_.order.begin() + first, end = begin + count;
+        Box middles = empty_box();
+        for (auto i = begin; i != end; ++i) {
+            const float point[3] = {middle(boxes_[*i], 0), middle(boxes_[*i], 1), middle(boxes_[*i], 2)};
+            include(middles, point);
+        }
+        // Halves, where other shares could make the tree too deep.
+        const bool must_halve = static_cast<int>(std::bit_width(count - 1)) >= depth;
+        float best_cost = std::numeric_limits<float>::infinity();
+        int best_axis = -1, best_bin = 0;
+        for (int axis = 0; axis < 3 && !must_halve; ++axis) {
+            const float low = middles.low[axis], extent = middles.high[axis] - low;
+            if (!(extent > 0))
+                continue;
+            std::array<Bin, bin_count> bins;
+            for (auto i = begin; i != end; ++i) {
+                Bin &bin = bins[bin_of(boxes_[*i], axis, low, extent)];
+                include(bin.box, boxes_[*i]);
+                ++bin.count;
+            }
+            std::array<float, bin_count> cost_of_left{};
+            Bin left;
+            for (int i = 0; i + 1 < bin_count; ++i) {
+                include(left.box, bins[i].box);
+                left.count += bins[i].count;
+                cost_of_left[i] = half_area(left.box) * static_cast<float>(left.count);
+            }
+            Bin right;
+            for (int i = bin_count - 1; i > 0; --i) {
+                include(right.box, bins[i].box);
+                right.count += bins[i].count;
+                const float cost = cost_of_left[i - 1] + half_area(right.box) * static_cast<float>(right.count);
+                if (right.count < count && right.count > 0 && cost < best_cost) {
+                    best_cost = cost;
+                    best_axis = axis;
+                    best_bin = i;
+                }
+            }
+        }
+        const float area = half_area(box);
+        if (count <= most_in_leaf_ &&
+            !(best_axis >= 0 && best_cost + box_cost * area < area * static_cast<float>(count)))
+            return 0;
+        if (best_axis >= 0) {
+            const float low = middles.low[best_axis], extent = middles.high[best_axis] - low;
+            const auto right = std::partition(begin, end, [&](std::uint32_t i) {
+                return bin_of(boxes_[i], best_axis, low, extent) < static_cast<std::size_t>(best_bin);
+            });
+            return static_cast<std::uint32_t>(right - begin);
+        }
+        int longest = 0;
+        for (int axis = 1; axis < 3; ++axis)
+            if (middles.high[axis] - middles.low[axis] > middles.high[longest] - middles.low[longest])
+                longest = axis;
+        std::nth_element(begin, begin + count / 2, end, [&](std::uint32_t a, std::uint32_t b) {
+            return middle(boxes_[a], longest) < middle(boxes_[b], longest);
+        });
+        return count / 2;
+    }
+
+    static std::size_t bin_of(const Box &box, int axis, float low, float extent) {
+        const float place = (middle(box, axis) - low) / extent * bin_count;
+        return std::min<std::size_t>(static_cast<std::size_t>(place), bin_count - 1);
+    }
+
+    std::span<const Box> boxes_;
+    std::uint32_t most_in_leaf_;
+    const std::function<void()> &look_up_;
+    Tree tree_;
+};
+
+} // namespace
+
+Box empty_box() {
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+}
+
+void include(Box &box, const float *point) {
+    for (int axis = 0; axis < 3; ++axis) {
+        box.low[axis] = std::min(box.low[axis], point[axis]);
+        box.high[axis] = std::max(box.high[axis], point[axis]);
+    }
+}
+
+void include(Box &box, const Box &other) {
+    include(box, other.low);
+    include(box, other.high);
+}
+
+Tree build_tree(std::span<const Box> boxes, std::uint32_t most_in_leaf, int most_depth,
+                const std::function<void()> &look_up) {
+    return Builder(boxes, most_in_leaf, look_up).build(most_depth);
+}
+
+void refit(Tree &tree, std::span<const Box> boxes) {
+    for (auto node = tree.nodes.rbegin(); node != tree.nodes.rend(); ++node) {
+        Box box = empty_box();
+        for (std::uint32_t i = 0; i < node->count; ++i)
+            include(box, boxes[tree.order[node->first + i]]);
+        if (node->count == 0)
+            for (const std::uint32_t child : {node->first, node->first + 1}) {
+                include(box, tree.nodes[child].low);
+                include(box, tree.nodes[child].high);
+            }
+        std::copy_n(box.low, 3, node->low);
+        std::copy_n(box.high, 3, node->high);
+    }
+}
+
+double relative_area(const Tree &tree) {
+    double sum = 0;
+    for (const Node &node : tree.nodes) {
+        Box box;
+        std::copy_n(node.low, 3, box.low);
+        std::copy_n(node.high, 3, box.high);
+        sum += half_area(box);
+    }
+    Box root;
+    std::copy_n(tree.nodes[0].low, 3, root.low);
+    std::copy_n(tree.nodes[0].high, 3, root.high);
+    return half_area(root) > 0 ? sum / half_area(root) : 1;
+}
+
+} // namespace rt_vulkan

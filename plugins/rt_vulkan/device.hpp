@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A logical device with one queue, and what is made of it: buffers and the other handles that end themselves.
+#pragma once
+
+#include "instance.hpp"
+
+#include <cstddef>
+#include <span>
+#include <utility>
+
+namespace rt_vulkan {
+
+#define RT_VULKAN_DEVICE_FUNCTIONS(use)                                                                              \
+    use(vkDestroyDevice) use(vkGetDeviceQueue) use(vkDeviceWaitIdle) use(vkQueueSubmit) use(vkCreateBuffer)          \
+        use(vkDestroyBuffer) use(vkGetBufferMemoryRequirements) use(vkAllocateMemory) use(vkFreeMemory)              \
+            use(vkBindBufferMemory) use(vkMapMemory) use(vkCreateDescriptorSetLayout)                                \
+                use(vkDestroyDescriptorSetLayout) use(vkCreateDescriptorPool) use(vkDestroyDescriptorPool)           \
+                    use(vkAllocateDescriptorSets) use(vkUpdateDescriptorSets) use(vkCreatePipelineLayout)            \
+                        use(vkDestroyPipelineLayout) use(vkCreateShaderModule) use(vkDestroyShaderModule)            \
+                            use(vkCreatePipelineCache) use(vkDestroyPipelineCache) use(vkGetPipelineCacheData)       \
+                                use(vkCreateComputePipelines) use(vkDestroyPipeline) use(vkCreateCommandPool)        \
+                                    use(vkDestroyCommandPool) use(vkAllocateCommandBuffers)                          \
+                                        use(vkFreeCommandBuffers) use(vkBeginCommandBuffer) use(vkEndCommandBuffer)  \
+                                            use(vkCmdBindPipeline) use(vkCmdBindDescriptorSets) use(vkCmdDispatch)   \
+                                                use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer)                          \
+                                                    use(vkCmdPipelineBarrier) use(vkCmdResetQueryPool)               \
+                                                        use(vkCmdWriteTimestamp) use(vkCreateQueryPool)              \
+                                                            use(vkDestroyQueryPool) use(vkGetQueryPoolResults)       \
+                                                                use(vkCreateFence) use(vkDestroyFence)               \
+                                                                    use(vkWaitForFences) use(vkResetFences)
+
+struct DeviceFunctions {
+    RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_DECLARE)
+    PFN_vkGetMemoryHostPointerPropertiesEXT vkGetMemoryHostPointerPropertiesEXT; // NULL: it can't import
+};
+
+class Device {
+public:
+    Device(const Instance &instance, const PhysicalDevice &physical);
+    ~Device();
+    Device(const Device &) = delete;
+    Device &operator=(const Device &) = delete;
+
+    VkDevice handle() const { return device_; }
+    VkQueue queue() const { return queue_; }
+    const DeviceFunctions &functions() const { return functions_; }
+    const PhysicalDevice &physical() const { return physical_; }
+    // Of those in `allowed` one that has all of `needed`, and of `wished` if there is such a one; −1: none has.
+    int memory_type(std::uint32_t allowed, VkMemoryPropertyFlags needed, VkMemoryPropertyFlags wished) const;
+
+private:
+    PhysicalDevice physical_;
+    VkPhysicalDeviceMemoryProperties memory_{};
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkQueue queue_ = VK_NULL_HANDLE;
+    DeviceFunctions functions_{};
+};
+
+// A handle that `Destroy` ends with the device.
+template <class Handle, auto destroy> class Owned {
+public:
+    Owned() = default;
+    Owned(const Device &device, Handle handle) : device_(&device), handle_(handle) {}
+    Owned(Owned &&other) noexcept
+        : device_(other.device_), handle_(std::exchange(other.handle_, Handle{VK_NULL_HANDLE})) {}
+    Owned &operator=(Owned &&other) noexcept {
+        std::swap(device_, other.device_);
+        std::swap(handle_, other.handle_);
+        return *this;
+    }
+    ~Owned() {
+        if (handle_)
+            (device_->functions().*destroy)(device_->handle(), handle_, nullptr);
+    }
+    Handle get() const { return handle_; }
+
+private:
+    const Device *device_ = nullptr;
+    Handle handle_ = VK_NULL_HANDLE;
+};
+
+using Memory = Owned<VkDeviceMemory, &DeviceFunctions::vkFreeMemory>;
+using Fence = Owned<VkFence, &DeviceFunctions::vkDestroyFence>;
+using QueryPool = Owned<VkQueryPool, &DeviceFunctions::vkDestroyQueryPool>;
+using CommandPool = Owned<VkCommandPool, &DeviceFunctions::vkDestroyCommandPool>;
+using DescriptorSetLayout = Owned<VkDescriptorSetLayout, &DeviceFunctions::vkDestroyDescriptorSetLayout>;
+using DescriptorPool = Owned<VkDescriptorPool, &DeviceFunctions::vkDestroyDescriptorPool>;
+using PipelineLayout = Owned<VkPipelineLayout, &DeviceFunctions::vkDestroyPipelineLayout>;
+using ShaderModule = Owned<VkShaderModule, &DeviceFunctions::vkDestroyShaderModule>;
+using PipelineCache = Owned<VkPipelineCache, &DeviceFunctions::vkDestroyPipelineCache>;
+using Pipeline = Owned<VkPipeline, &DeviceFunctions::vkDestroyPipeline>;
+
+// Calls a vkCreate… and owns what it makes.
+template <class Owner, class Handle, class Create, class Info>
+Owner make(const Device &device, Create create, const Info &info, const char *what) {
+    Handle handle = VK_NULL_HANDLE;
+    check(create(device.handle(), &info, nullptr, &handle), what);
+    return Owner(device, handle);
+}
+
+// A buffer and its memory.
+class Buffer {
+public:
+    enum class Place {
+        device,       // fastest for the device
+        host_written, // mapped, for what the host writes and the device reads
+        host_read     // mapped, for what the device writes and the host reads
+    };
+    Buffer() = default;
+    Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place);
+    // Memory of the host's as a buffer to copy to; empty where the device does not take it.
+    static Buffer imported(const Device &device, void *memory, VkDeviceSize size);
+
+    VkBuffer get() const { return buffer_.get(); }
+    VkDeviceSize size() const { return size_; }
+    explicit operator bool() const { return memory_.get() != VK_NULL_HANDLE; }
+    std::span<std::byte> mapped() const { return {mapped_, static_cast<std::size_t>(size_)}; }
+
+private:
+    // In this order: the buffer ends before its memory.
+    Memory memory_;
+    Owned<VkBuffer, &DeviceFunctions::vkDestroyBuffer> buffer_;
+    VkDeviceSize size_ = 0; // bytes
+    std::byte *mapped_ = nullptr;
+};
+
+// Records commands, runs them and waits for their end.
+class Submission {
+public:
+    explicit Submission(const Device &device);
+    VkCommandBuffer new_commands() const;
+    void free(VkCommandBuffer commands) const;
+    void begin(VkCommandBuffer commands, VkCommandBufferUsageFlags flags = 0) const;
+    void end(VkCommandBuffer commands) const;
+    void run(VkCommandBuffer commands) const;
+
+private:
+    const Device &device_;
+    CommandPool pool_;
+    Fence fence_;
+};
+
+// Writes parts, one behind the other, to a device buffer by way of a small one that the host can write.
+void upload(const Device &device, const Submission &submission, const Buffer &to,
+            std::span<const std::span<const std::byte>> parts);
+
+} // namespace rt_vulkan

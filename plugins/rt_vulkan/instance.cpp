@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "instance.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <dlfcn.h>
+
+namespace rt_vulkan {
+namespace {
+
+using arhost::Failure;
+
+constexpr const char *validation_layer = "VK_LAYER_KHRONOS_validation";
+constexpr const char *get_driver = "install the GPU's driver or Mesa's (Debian: mesa-vulkan-drivers), or use "
+                                   "rt_embree";
+
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                                          const VkDebugUtilsMessengerCallbackDataEXT *data, void *host) {
+    static_cast<const arhost::Host *>(host)->error(std::string("Vulkan validation: ") + data->pMessage);
+    return VK_FALSE;
+}
+
+VkDebugUtilsMessengerCreateInfoEXT messenger_info(arhost::Host &host) {
+    VkDebugUtilsMessengerCreateInfoEXT info{};
+    info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    info.pfnUserCallback = on_message;
+    info.pUserData = &host;
+    return info;
+}
+
+std::string lower(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
+    std::string text;
+    for (const std::uint8_t byte : bytes)
+        for (const int shift : {4, 0})
+            text += "0123456789abcdef"[byte >> shift & 15];
+    return text;
+}
+
+std::string list_of(const std::vector<PhysicalDevice> &devices) {
+    std::string text;
+    for (std::size_t i = 0; i < devices.size(); ++i)
+        text += (i ? ", " : "") + std::to_string(i) + " '" + devices[i].name + "' (" + devices[i].uuid + ")";
+    return text;
+}
+
+// The better, the higher.
+int rank(VkPhysicalDeviceType type) {
+    switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+        return 4;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+        return 3;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+        return 2;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+        return 1;
+    default:
+        return 0;
+    }
+}
+
+} // namespace
+
+void check(VkResult result, const char *what) {
+    if (result >= 0)
+        return;
+    const std::string text = std::string(what) + ": Vulkan reports ";
+    switch (result) {
+    case VK_ERROR_DEVICE_LOST:
+        throw Failure(ARHOST_ERROR_DEVICE_LOST, text + "that the device is lost (VK_ERROR_DEVICE_LOST)");
+    case VK_ERROR_OUT_OF_HOST_MEMORY:
+        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory");
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory: use smaller meshes and "
+                                                         "textures, or rt_embree");
+    default:
+        throw Failure(ARHOST_ERROR_INTERNAL, text + "error " + std::to_string(result));
+    }
+}
+
+void Instance::CloseLibrary::operator()(void *library) const {
+    dlclose(library);
+}
+
+Instance::Instance(const arhost::Host &host, bool validate, const std::string &loader)
+    : host_(host), library_(dlopen(loader.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+    if (!library_)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan loader: ") + dlerror() +
+                                                    "; install it (Debian: libvulkan1), or use rt_embree");
+    get_ = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_.get(), "vkGetInstanceProcAddr"));
+    if (!get_)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, loader + " is no Vulkan loader: it lacks vkGetInstanceProcAddr");
+    create(validate);
+#define RT_VULKAN_LOAD(name) functions_.name = reinterpret_cast<PFN_##name>(get_(instance_, #name));
+    RT_VULKAN_INSTANCE_FUNCTIONS(RT_VULKAN_LOAD)
+#undef RT_VULKAN_LOAD
+    if (validate)
+        add_messenger();
+}
+
+Instance::~Instance() {
+    if (messenger_)
+        reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(get_(instance_, "vkDestroyDebugUtilsMessengerEXT"))(
+            instance_, messenger_, nullptr);
+    functions_.vkDestroyInstance(instance_, nullptr);
+}
+
+void Instance::create(bool validate) {
+    if (validate) {
+        const auto enumerate = reinterpret_cast<PFN_vkEnumerateInstanceLayerProperties>(
+            get_(nullptr, "vkEnumerateInstanceLayerProperties"));
+        std::uint32_t count = 0;
+        enumerate(&count, nullptr);
+        std::vector<VkLayerProperties> layers(count);
+        enumerate(&count, layers.data());
+        if (std::none_of(layers.begin(), layers.end(), [](const VkLayerProperties &layer) {
+                return !std::strcmp(layer.layerName, validation_layer);
+            }))
+            throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                          "option 'validate': Vulkan's validation layers are not installed (Debian: "
+                          "vulkan-validationlayers); install them or leave the option out");
+    }
+    // Of the loader itself, whose 1.0 knows no 1.1 to ask for.
+    const auto version =
+        reinterpret_cast<PFN_vkEnumerateInstanceVersion>(get_(nullptr, "vkEnumerateInstanceVersion"));
+    if (!version)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      "the Vulkan loader is of version 1.0; 1.1 is needed: install a newer");
+    VkApplicationInfo application{};
+    application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+    application.pApplicationName = "arhost";
+    application.apiVersion = VK_API_VERSION_1_1;
+    VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_);
+    const VkValidationFeatureEnableEXT feature = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
+    VkValidationFeaturesEXT features{};
+    features.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT;
+    features.pNext = &messenger; // for what is said while the instance is made
+    features.enabledValidationFeatureCount = 1;
+    features.pEnabledValidationFeatures = &feature;
+    const char *const extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    VkInstanceCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    info.pApplicationInfo = &application;
+    if (validate) {
+        info.pNext = &features;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &validation_layer;
+        info.enabledExtensionCount = 2;
+        info.ppEnabledExtensionNames = extensions;
+    }
+    const auto create_instance = reinterpret_cast<PFN_vkCreateInstance>(get_(nullptr, "vkCreateInstance"));
+    const VkResult result = create_instance(&info, nullptr, &instance_);
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER || result == VK_ERROR_INITIALIZATION_FAILED)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan driver: ") + get_driver);
+    check(result, "making a Vulkan instance");
+}
+
+void Instance::add_messenger() {
+    const VkDebugUtilsMessengerCreateInfoEXT info = messenger_info(host_);
+    check(reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(get_(instance_, "vkCreateDebugUtilsMessengerEXT"))(
+              instance_, &info, nullptr, &messenger_),
+          "asking for the validation layers' messages");
+}
+
+std::vector<PhysicalDevice> Instance::devices() const {
+    std::uint32_t count = 0;
+    VkResult result = functions_.vkEnumeratePhysicalDevices(instance_, &count, nullptr);
+    std::vector<VkPhysicalDevice> handles(count);
+    if (result == VK_SUCCESS && count > 0)
+        result = functions_.vkEnumeratePhysicalDevices(instance_, &count, handles.data());
+    if (result == VK_ERROR_INITIALIZATION_FAILED || count == 0)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan device: ") + get_driver);
+    check(result, "listing the Vulkan devices");
+    handles.resize(count);
+    std::vector<PhysicalDevice> devices;
+    for (const VkPhysicalDevice handle : handles) {
+        VkPhysicalDeviceExternalMemoryHostPropertiesEXT import{};
+        import.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT;
+        VkPhysicalDeviceIDProperties id{};
+        id.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES;
+        VkPhysicalDeviceProperties2 properties{};
+        properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+        properties.pNext = &id;
+
+        std::uint32_t extension_count = 0;
+        functions_.vkEnumerateDeviceExtensionProperties(handle, nullptr, &extension_count, nullptr);
+        std::vector<VkExtensionProperties> extensions(extension_count);
+        functions_.vkEnumerateDeviceExtensionProperties(handle, nullptr, &extension_count, extensions.data());
+        PhysicalDevice device{};
+        device.imports_host_memory =
+            std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties &extension) {
+                return !std::strcmp(extension.extensionName, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+            });
+        if (device.imports_host_memory)
+            id.pNext = &import;
+        functions_.vkGetPhysicalDeviceProperties2(handle, &properties);
+        device.handle = handle;
+        device.name = properties.properties.deviceName;
+        device.uuid = hexadecimal(id.deviceUUID);
+        device.properties = properties.properties;
+        device.import_alignment = import.minImportedHostPointerAlignment;
+
+        std::uint32_t family_count = 0;
+        functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, nullptr);
+        std::vector<VkQueueFamilyProperties> families(family_count);
+        functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, families.data());
+        const auto computes =
+            std::find_if(families.begin(), families.end(), [](const VkQueueFamilyProperties &family) {
+                return family.queueFlags & VK_QUEUE_COMPUTE_BIT;
+            });
+        device.queue_family = VK_QUEUE_FAMILY_IGNORED;
+        if (computes != families.end()) {
+            device.queue_family = static_cast<std::uint32_t>(computes - families.begin());
+            device.timestamp_bits = computes->timestampValidBits;
+        }
+        devices.push_back(device);
+    }
+    return devices;
+}
+
+const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted) {
+    if (wanted == "auto")
+        return *std::max_element(devices.begin(), devices.end(),
+                                 [](const PhysicalDevice &a, const PhysicalDevice &b) {
+                                     return rank(a.properties.deviceType) < rank(b.properties.deviceType);
+                                 });
+    const auto refuse = [&](const std::string &why) {
+        throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'device': " + why + " '" + wanted +
+                                                      "'; there are: " + list_of(devices) +
+                                                      "; give a number, a UUID, a part of a name, or auto");
+    };
+    std::string uuid = lower(wanted);
+    std::erase(uuid, '-');
+    const bool is_number = !wanted.empty() && wanted.size() < 10 &&
+                           std::all_of(wanted.begin(), wanted.end(), [](unsigned char c) { return std::isdigit(c); });
+    const PhysicalDevice *chosen = nullptr;
+    for (std::size_t i = 0; i < devices.size(); ++i) {
+        const bool is_meant =
+            is_number ? std::stoul(wanted) == i
+                      : devices[i].uuid == uuid ||
+                            (!wanted.empty() && lower(devices[i].name).find(lower(wanted)) != std::string::npos);
+        if (is_meant && chosen)
+            refuse("more than one device is called");
+        if (is_meant)
+            chosen = &devices[i];
+    }
+    if (!chosen)
+        refuse("no device is");
+    return *chosen;
+}
+
+} // namespace rt_vulkan

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the shaders read, as shaders/scene.glsl declares it: std430, the frame std140. Offsets count elements.
+#pragma once
+
+#include <arhost/scene.h>
+
+#include <cstdint>
+
+namespace rt_vulkan {
+
+enum RoleMask : std::uint32_t { opaque_mask = 1, glass_mask = 2, catcher_mask = 4, occluder_mask = 8 };
+enum ObjectFlag : std::uint32_t { has_transform = 1, is_spheres = 2, has_holes = 4 };
+
+struct Object {
+    float object_from_world[4][4]; // columns
+    float transform[3][4], normal_transform[3][4];
+    std::uint32_t material, role, mask, flags;
+    std::uint32_t root, first_index, first_normal, first_texcoord;
+};
+
+struct Material {
+    float ambient[3];
+    std::uint32_t model;
+    float diffuse[3];
+    std::uint32_t colour_texture;
+    float specular[3];
+    float exponent;
+    float reflectivity[3];
+    float alpha_cutoff;
+    float emission[3];
+    float metallic;
+    float refraction[3];
+    float roughness;
+    float extinction[3];
+    float index;
+    float shadow_attenuation[3];
+    float fresnel_exponent;
+    float cutoff_colour[3];
+    float importance_cutoff;
+    float fresnel_minimum, fresnel_maximum;
+    std::uint32_t reflection_depth, refraction_depth;
+    std::uint32_t metallic_roughness_texture, normal_texture, emission_texture, unused;
+};
+
+struct Light {
+    float position[3];
+    std::uint32_t type;
+    float direction[3];
+    std::uint32_t falloff;
+    float intensity[3];
+    float radius;
+    float axis_u[3];
+    float cosine_inner;
+    float axis_v[3];
+    float cosine_outer;
+};
+
+struct Texture {
+    std::uint32_t format, first_texel, wrap_u, wrap_v; // first_texel: in words
+    std::int32_t width, height, unused[2];
+};
+
+struct Node {
+    float low[3];
+    std::uint32_t first;
+    float high[3];
+    std::uint32_t count; // 0: `first` and the one after it are nodes
+};
+
+struct Primitive {
+    float corner[3];
+    std::uint32_t number;
+    float edge_1[3], unused;
+    float edge_2[3], unused_2;
+};
+
+inline constexpr std::uint32_t most_samples = 64; // a pixel and frame
+
+struct Frame {
+    float eye[3];
+    std::uint32_t object_count;
+    float world_from_camera[3][4]; // columns
+    std::uint32_t width, height, sample_count, first_sample;
+    std::uint32_t light_samples, light_count, max_depth, one_path;
+    float ambient[3];
+    std::uint32_t coloured_shadows;
+    float background[3];
+    std::uint32_t accumulates;
+    float shadow_alpha_opaque, shadow_alpha_translucent;
+    std::uint32_t environment_texture;
+    float environment_intensity;
+    float environment_from_world[3][4];
+    std::uint32_t environment_rows, environment_columns, unused[2];
+    float samples[most_samples][4];
+};
+
+static_assert(sizeof(Object) == 192 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
+              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * most_samples);
+
+// The frame is binding 0.
+enum Binding : std::uint32_t {
+    frame_binding,
+    objects_binding,
+    materials_binding,
+    lights_binding,
+    nodes_binding,
+    primitives_binding,
+    indices_binding,
+    attributes_binding,
+    textures_binding,
+    texels_binding,
+    tables_binding,
+    rays_binding,
+    history_binding,
+    image_binding,
+    drawn_binding,
+    binding_count
+};
+
+// The shaders' specialization constants, by their numbers.
+struct Specialization {
+    std::int32_t waiting_capacity;
+    std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
+    std::uint32_t ray_dimensions, has_slopes;
+};
+
+} // namespace rt_vulkan

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plugin: options in, images out.
+#include "renderer.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <dlfcn.h>
+
+#include <cstdio>
+#include <optional>
+
+namespace rt_vulkan {
+namespace {
+
+// Shaders lie beside the plugin's own file.
+std::filesystem::path own_folder() {
+    static const char in_this_library = 0;
+    Dl_info info{};
+    if (!dladdr(&in_this_library, &info) || !info.dli_fname)
+        throw arhost::Failure(ARHOST_ERROR_INTERNAL, "the plugin's own file can't be found");
+    return std::filesystem::weakly_canonical(info.dli_fname).parent_path();
+}
+
+class Plugin {
+public:
+    Plugin(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), shader_(read_shader(own_folder() / "rt_vulkan_plain.spv")),
+          instance_(host, options.boolean("validate")),
+          physical_(choose_device(instance_.devices(), options.text("device"))) {
+        settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
+        settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
+        settings_.accumulate = options.boolean("accumulate");
+        settings_.one_path = options.text("glass") == "path";
+    }
+
+    void start(const arhost_raytracer_setup &setup) {
+        renderer_.emplace(setup, settings_, host_, instance_, physical_, shader_);
+        host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path plain, " +
+                   std::to_string(setup.scene->objects.count) + " objects" +
+                   (instance_.validates() ? ", with the validation layers" : ""));
+    }
+
+    void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
+        const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
+        info.has_region = 1;
+        info.region_x = drawn.x;
+        info.region_y = drawn.y;
+        info.region_width = drawn.width;
+        info.region_height = drawn.height;
+    }
+
+    void stop() {
+        if (const std::uint64_t count = renderer_->image_count(); count && renderer_->gpu_ms() > 0) {
+            char text[128];
+            std::snprintf(text, sizeof text, "%llu images, %.3f ms each by the GPU's clock, %s",
+                          static_cast<unsigned long long>(count), renderer_->gpu_ms() / static_cast<double>(count),
+                          renderer_->wrote_in_place() ? "written in place" : "copied by the host");
+            host_.info(text);
+        }
+        renderer_.reset();
+    }
+
+private:
+    arhost::Host host_;
+    std::vector<std::uint32_t> shader_;
+    Instance instance_;
+    PhysicalDevice physical_;
+    Settings settings_;
+    std::optional<Renderer> renderer_;
+};
+
+constexpr const char *glass[] = {"tree", "path", nullptr};
+constexpr const char *paths[] = {"auto", "plain", nullptr};
+constexpr const char *needs[] = {"gpu", nullptr};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_TEXT, "device", "auto",
+                   "Which Vulkan device: its number, its UUID or a part of its name; auto: the fastest kind."),
+    arhost::option(ARHOST_OPTION_TEXT, "path", "auto",
+                   "How rays find what they hit: 'plain' walks trees in a compute shader; auto: the fastest that the "
+                   "device has.",
+                   0, 0, paths),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, most_samples),
+    arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
+                   "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "accumulate", "false",
+        "Average over frames while the camera and the scene stand still: an image then depends on the ones "
+        "before."),
+    arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
+                   "Rays that glass sends on: 'tree' follows both, 'path' one that is chosen at random.", 0, 0,
+                   glass),
+    arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
+                   "Let Vulkan's validation layers watch, and log what they say: slow.")};
+
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_RAYTRACER,
+                                          "rt_vulkan",
+                                          "Vulkan ray tracer",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Ray tracer on any Vulkan 1.1 device, with rt_embree's picture.",
+                                          ARHOST_TRACES_LENS,
+                                          std::size(options),
+                                          options,
+                                          needs};
+
+} // namespace
+} // namespace rt_vulkan
+
+ARHOST_RAYTRACER(rt_vulkan::Plugin, rt_vulkan::descriptor)

@@ -1,0 +1,477 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+namespace rt_vulkan {
+namespace {
+
+using arhost::Failure;
+
+constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
+constexpr std::uint32_t group_side = 8; // of the shader's invocations
+// Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
+constexpr std::uint32_t enough_samples = 1u << 16;
+constexpr std::size_t most_targets = 8; // places that images come to again (arhost/raytracer.h)
+
+std::string mebibytes(std::uint64_t size) {
+    return std::to_string((size + (1u << 20) - 1) >> 20) + " MiB";
+}
+
+const char *what_is_in(Binding binding) {
+    switch (binding) {
+    case nodes_binding:
+    case primitives_binding:
+    case indices_binding:
+    case attributes_binding:
+        return "the scene's meshes";
+    case texels_binding:
+        return "the scene's textures";
+    case tables_binding:
+        return "the scene's environment";
+    case rays_binding:
+    case history_binding:
+    case image_binding:
+        return "images of this size";
+    default:
+        return "the scene's objects, materials or lights";
+    }
+}
+
+PhysicalDevice checked(const PhysicalDevice &device) {
+    const auto refuse = [&](const std::string &why) {
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      "the Vulkan device '" + device.name + "' " + why + "; choose another with option 'device'");
+    };
+    const VkPhysicalDeviceLimits &limits = device.properties.limits;
+    if (device.properties.apiVersion < VK_API_VERSION_1_1)
+        refuse("knows Vulkan 1.0 only, and 1.1 is needed");
+    if (device.queue_family == VK_QUEUE_FAMILY_IGNORED)
+        refuse("can't compute");
+    if (limits.maxPerStageDescriptorStorageBuffers < binding_count - 1)
+        refuse("reads " + std::to_string(limits.maxPerStageDescriptorStorageBuffers) + " buffers at once, and " +
+               std::to_string(binding_count - 1) + " are needed");
+    if (limits.maxUniformBufferRange < sizeof(Frame) ||
+        limits.maxComputeWorkGroupInvocations < group_side * group_side)
+        refuse("has too small uniform buffers or work groups");
+    return device;
+}
+
+void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
+             VkPipelineStageFlags to, VkAccessFlags used) {
+    VkMemoryBarrier memory{};
+    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+    memory.srcAccessMask = written;
+    memory.dstAccessMask = used;
+    vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
+}
+
+// Tells the host that a driver is at work, which says nothing itself; but not for ever, as it may hang.
+class Heartbeat {
+public:
+    Heartbeat(const arhost::Host &host, const char *what)
+        : thread_([host, what](const std::stop_token &stop) {
+              constexpr std::chrono::seconds beat(2), patience(300);
+              std::mutex mutex;
+              std::condition_variable_any ended;
+              std::unique_lock lock(mutex);
+              for (auto passed = std::chrono::seconds(0); passed < patience && !stop.stop_requested();
+                   passed += beat) {
+                  host.progress(-1, what);
+                  ended.wait_for(lock, stop, beat, [] { return false; });
+              }
+          }) {}
+
+private:
+    std::jthread thread_;
+};
+
+// Where the driver's compiled shaders are kept; empty: nowhere.
+std::filesystem::path pipeline_cache_file() {
+    const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
+    return caches && *caches ? std::filesystem::path(caches) / "rt_vulkan.pipelines" : std::filesystem::path();
+}
+
+std::vector<char> contents(const std::filesystem::path &file) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(file, ignored)) // reading a folder would throw
+        return {};
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+PipelineCache read_pipeline_cache(const Device &device) {
+    std::vector<char> data;
+    if (const auto file = pipeline_cache_file(); !file.empty())
+        data = contents(file);
+    VkPipelineCacheCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO;
+    info.initialDataSize = data.size(); // the driver looks at its header, and ignores another driver's
+    info.pInitialData = data.data();
+    return make<PipelineCache, VkPipelineCache>(device, device.functions().vkCreatePipelineCache, info,
+                                                "making a pipeline cache");
+}
+
+// Renamed into place, so that no one reads half of it. A cache that can't be written is no fault.
+void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
+    const auto file = pipeline_cache_file();
+    if (file.empty())
+        return;
+    std::size_t size = 0;
+    const auto get = device.functions().vkGetPipelineCacheData;
+    if (get(device.handle(), cache.get(), &size, nullptr) != VK_SUCCESS)
+        return;
+    std::vector<char> data(size);
+    if (get(device.handle(), cache.get(), &size, data.data()) != VK_SUCCESS || data == contents(file))
+        return;
+    std::filesystem::path temporary = file;
+    temporary += ".new";
+    std::ofstream stream(temporary, std::ios::binary);
+    stream.write(data.data(), static_cast<std::streamsize>(size));
+    stream.close();
+    std::error_code ignored;
+    if (stream)
+        std::filesystem::rename(temporary, file, ignored);
+}
+
+} // namespace
+
+std::vector<std::uint32_t> read_shader(const std::filesystem::path &file) {
+    constexpr std::uint32_t magic = 0x07230203, header_words = 5, end_of_function = 56;
+    const std::vector<char> bytes = contents(file);
+    if (bytes.empty())
+        throw Failure(ARHOST_ERROR_CONFIGURATION,
+                      "the shader '" + file.string() + "' is missing or can't be read; install arhost again");
+    std::vector<std::uint32_t> words(bytes.size() / 4);
+    std::memcpy(words.data(), bytes.data(), words.size() * 4);
+    // Drivers crash on what is no SPIR-V: its instructions must follow one another up to the last function's end.
+    std::size_t at = header_words;
+    std::uint32_t last = 0;
+    bool sound = bytes.size() % 4 == 0 && words.size() > header_words && words[0] == magic;
+    while (sound && at < words.size()) {
+        const std::uint32_t length = words[at] >> 16;
+        last = words[at] & 0xffff;
+        sound = length > 0 && length <= words.size() - at;
+        at += length;
+    }
+    if (!sound || last != end_of_function)
+        throw Failure(ARHOST_ERROR_CONFIGURATION,
+                      "the shader '" + file.string() + "' is damaged: no whole SPIR-V; install arhost again");
+    return words;
+}
+
+Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
+                   const Instance &instance, const PhysicalDevice &physical, std::span<const std::uint32_t> shader)
+    : host_(host), settings_(settings), intrinsics_((check_setup(setup), *setup.intrinsics)),
+      scene_(*setup.scene, host), device_(instance, checked(physical)), submission_(device_) {
+    make_buffers(intrinsics_);
+    make_pipeline(shader, setup.scene->max_depth);
+    if (host_.cancelled())
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the shader was compiled");
+    if (physical.timestamp_bits) {
+        VkQueryPoolCreateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
+        info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+        info.queryCount = 2;
+        clock_ = make<QueryPool, VkQueryPool>(device_, device_.functions().vkCreateQueryPool, info,
+                                              "making the GPU's clock");
+    }
+    frame_ = scene_.frame();
+    frame_.width = intrinsics_.width;
+    frame_.height = intrinsics_.height;
+    frame_.light_samples = settings.light_samples;
+    frame_.one_path = settings.one_path;
+    frame_.accumulates = settings.accumulate;
+    scene_.forget_still_parts();
+}
+
+Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size) {
+    std::size_t size = std::max<std::size_t>(least_size, 16); // none may be empty
+    std::size_t filled = 0;
+    for (const Bytes &part : parts)
+        filled += part.size();
+    size = std::max(size, filled);
+    const std::uint64_t most = device_.physical().properties.limits.maxStorageBufferRange;
+    if (size > most)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string(what_is_in(binding)) + " take " + mebibytes(size) +
+                                                    " at once, and the Vulkan device '" + device_.physical().name +
+                                                    "' reads " + mebibytes(most) +
+                                                    " at most: use smaller ones, another device or rt_embree");
+    Buffer buffer(device_, size,
+                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                  Buffer::Place::device);
+    upload(device_, submission_, buffer, parts);
+    return buffer;
+}
+
+void Renderer::make_buffers(const arhost_intrinsics &intrinsics) {
+    const bool has_slopes = settings_.samples > 1 || settings_.accumulate;
+    const std::size_t pixels = std::size_t{intrinsics.width} * intrinsics.height;
+    std::size_t moving_size = 0;
+    for (std::uint32_t i = objects_binding; i <= tables_binding; ++i) {
+        const auto binding = static_cast<Binding>(i);
+        buffers_[binding] = make_buffer(binding, scene_.parts(binding), 0);
+        moving_size += scene_.moving_size(binding);
+    }
+    {
+        const RayTable table = make_ray_table(intrinsics, has_slopes);
+        ray_dimensions_ = table.dimensions;
+        const Bytes part = std::as_bytes(std::span(table.numbers));
+        buffers_[rays_binding] = make_buffer(rays_binding, {&part, 1}, 0);
+    }
+    buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? 16 * pixels : 0);
+    buffers_[image_binding] = make_buffer(image_binding, {}, 4 * pixels);
+    buffers_[drawn_binding] = make_buffer(drawn_binding, {}, sizeof(std::int32_t) * 4);
+    buffers_[frame_binding] =
+        Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
+    if (moving_size)
+        moving_ = Buffer(device_, moving_size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::host_written);
+    read_ = Buffer(device_, sizeof(std::int32_t) * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
+}
+
+void Renderer::make_pipeline(std::span<const std::uint32_t> shader, std::uint32_t max_depth) {
+    const DeviceFunctions &vk = device_.functions();
+    std::array<VkDescriptorSetLayoutBinding, binding_count> bindings{};
+    std::array<VkDescriptorBufferInfo, binding_count> infos{};
+    std::array<VkWriteDescriptorSet, binding_count> writes{};
+    for (std::uint32_t i = 0; i < binding_count; ++i) {
+        bindings[i].binding = i;
+        bindings[i].descriptorType =
+            i == frame_binding ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+        bindings[i].descriptorCount = 1;
+        bindings[i].stageFlags = VK_SHADER_STAGE_COMPUTE_BIT;
+    }
+    VkDescriptorSetLayoutCreateInfo set_info{};
+    set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+    set_info.bindingCount = binding_count;
+    set_info.pBindings = bindings.data();
+    set_layout_ = make<DescriptorSetLayout, VkDescriptorSetLayout>(device_, vk.vkCreateDescriptorSetLayout, set_info,
+                                                                   "describing the shader's buffers");
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
+                                          {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, binding_count - 1}};
+    VkDescriptorPoolCreateInfo pool_info{};
+    pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+    pool_info.maxSets = 1;
+    pool_info.poolSizeCount = 2;
+    pool_info.pPoolSizes = sizes;
+    pool_ = make<DescriptorPool, VkDescriptorPool>(device_, vk.vkCreateDescriptorPool, pool_info,
+                                                   "describing the shader's buffers");
+    const VkDescriptorSetLayout layout = set_layout_.get();
+    VkDescriptorSetAllocateInfo allocation{};
+    allocation.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+    allocation.descriptorPool = pool_.get();
+    allocation.descriptorSetCount = 1;
+    allocation.pSetLayouts = &layout;
+    check(vk.vkAllocateDescriptorSets(device_.handle(), &allocation, &set_), "describing the shader's buffers");
+    for (std::uint32_t i = 0; i < binding_count; ++i) {
+        infos[i] = {buffers_[i].get(), 0, VK_WHOLE_SIZE};
+        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[i].dstSet = set_;
+        writes[i].dstBinding = i;
+        writes[i].descriptorCount = 1;
+        writes[i].descriptorType = bindings[i].descriptorType;
+        writes[i].pBufferInfo = &infos[i];
+    }
+    vk.vkUpdateDescriptorSets(device_.handle(), binding_count, writes.data(), 0, nullptr);
+
+    VkPipelineLayoutCreateInfo layout_info{};
+    layout_info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+    layout_info.setLayoutCount = 1;
+    layout_info.pSetLayouts = &layout;
+    layout_ = make<PipelineLayout, VkPipelineLayout>(device_, vk.vkCreatePipelineLayout, layout_info,
+                                                     "describing the shader's buffers");
+    VkShaderModuleCreateInfo module_info{};
+    module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+    module_info.codeSize = shader.size_bytes();
+    module_info.pCode = shader.data();
+    const auto module =
+        make<ShaderModule, VkShaderModule>(device_, vk.vkCreateShaderModule, module_info, "reading the shader");
+
+    // Where glass sends two rays on, one waits at each depth.
+    const bool branches = scene_.has_glass() && !settings_.one_path;
+    const Specialization constants{branches ? static_cast<std::int32_t>(max_depth) + 1 : 1,
+                                   scene_.has_glass(),
+                                   scene_.has_catchers(),
+                                   scene_.has_holes(),
+                                   ray_dimensions_,
+                                   settings_.samples > 1 || settings_.accumulate};
+    std::array<VkSpecializationMapEntry, sizeof constants / 4> entries;
+    for (std::uint32_t i = 0; i < entries.size(); ++i)
+        entries[i] = {i, 4 * i, 4};
+    const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
+                                              sizeof constants, &constants};
+    VkComputePipelineCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+    info.stage.module = module.get();
+    info.stage.pName = "main";
+    info.stage.pSpecializationInfo = &specialization;
+    info.layout = layout_.get();
+    const PipelineCache cache = read_pipeline_cache(device_);
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    {
+        const Heartbeat heartbeat(host_, "compiling the shader");
+        check(vk.vkCreateComputePipelines(device_.handle(), cache.get(), 1, &info, nullptr, &pipeline),
+              "compiling the shader");
+    }
+    pipeline_ = Pipeline(device_, pipeline);
+    keep_pipeline_cache(device_, cache);
+}
+
+// The commands for the place that an image goes to. Where memory can't be imported, all share one of ours.
+Renderer::Target &Renderer::target_of(const arhost_image &image) {
+    for (Target &target : targets_)
+        if (target.rgba == image.rgba && target.stride == image.stride)
+            return target;
+    Target target;
+    target.buffer = Buffer::imported(device_, image.rgba, std::size_t{image.stride} * image.height);
+    if (target.buffer) {
+        target.rgba = image.rgba;
+        target.stride = image.stride;
+    } else {
+        for (Target &known : targets_)
+            if (!known.rgba)
+                return known;
+        target.stride = 4 * image.width;
+        target.buffer = Buffer(device_, std::size_t{target.stride} * image.height, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                               Buffer::Place::host_read);
+    }
+    target.commands = submission_.new_commands();
+    record(target);
+    if (targets_.size() > most_targets) { // the oldest goes: nothing is under way here
+        submission_.free(targets_.front().commands);
+        targets_.erase(targets_.begin());
+    }
+    return targets_.emplace_back(std::move(target));
+}
+
+void Renderer::record(const Target &target) const {
+    const DeviceFunctions &vk = device_.functions();
+    const VkCommandBuffer commands = target.commands;
+    submission_.begin(commands);
+    if (clock_.get()) {
+        vk.vkCmdResetQueryPool(commands, clock_.get(), 0, 2);
+        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), 0);
+    }
+    VkDeviceSize offset = 0;
+    for (const Binding binding : moving_bindings)
+        if (const VkDeviceSize size = scene_.moving_size(binding)) {
+            const VkBufferCopy copy{offset, 0, size};
+            vk.vkCmdCopyBuffer(commands, moving_.get(), buffers_[binding].get(), 1, &copy);
+            offset += size;
+        }
+    const std::int32_t nothing[4] = {std::numeric_limits<std::int32_t>::max(),
+                                     std::numeric_limits<std::int32_t>::max(), 0, 0};
+    vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, sizeof nothing, nothing);
+    barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+            VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_.get());
+    vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_.get(), 0, 1, &set_, 0, nullptr);
+    vk.vkCmdDispatch(commands, (intrinsics_.width + group_side - 1) / group_side,
+                     (intrinsics_.height + group_side - 1) / group_side, 1);
+    barrier(vk, commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
+            VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT);
+    // Row by row where there is room between them, which stays as it is.
+    const VkDeviceSize row = VkDeviceSize{4} * intrinsics_.width;
+    std::vector<VkBufferCopy> rows;
+    if (target.stride == row)
+        rows.push_back({0, 0, row * intrinsics_.height});
+    else
+        for (std::uint32_t y = 0; y < intrinsics_.height; ++y)
+            rows.push_back({row * y, VkDeviceSize{target.stride} * y, row});
+    vk.vkCmdCopyBuffer(commands, buffers_[image_binding].get(), target.buffer.get(),
+                       static_cast<std::uint32_t>(rows.size()), rows.data());
+    const VkBufferCopy drawn{0, 0, sizeof nothing};
+    vk.vkCmdCopyBuffer(commands, buffers_[drawn_binding].get(), read_.get(), 1, &drawn);
+    barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
+            VK_ACCESS_HOST_READ_BIT);
+    if (clock_.get())
+        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_.get(), 1);
+    submission_.end(commands);
+}
+
+void Renderer::write_moving_parts() {
+    if (!moving_)
+        return;
+    std::byte *to = moving_.mapped().data();
+    for (const Binding binding : moving_bindings)
+        if (const std::size_t size = scene_.moving_size(binding)) {
+            std::memcpy(to, scene_.parts(binding)[0].data(), size);
+            to += size;
+        }
+}
+
+Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
+    if (!same(camera.intrinsics, intrinsics_))
+        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
+    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
+        image.stride < 4 * image.width || image.stride % 4)
+        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
+    look(camera, frame_);
+    if (motion)
+        scene_.move(*motion);
+    if (motion || image_count_ == 0)
+        write_moving_parts();
+    frame_.object_count = scene_.frame().object_count;
+
+    std::vector<Sample> samples = sample_positions(settings_.samples);
+    if (settings_.accumulate) {
+        if (motion || !still_camera_ || !same_view(*still_camera_, camera))
+            history_samples_ = 0;
+        still_camera_ = camera;
+        samples = sample_positions(history_samples_, history_samples_ < enough_samples ? settings_.samples : 0);
+    }
+    frame_.first_sample = history_samples_;
+    frame_.sample_count = static_cast<std::uint32_t>(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        frame_.samples[i][0] = samples[i].x;
+        frame_.samples[i][1] = samples[i].y;
+    }
+    std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
+
+    const Target &target = target_of(image);
+    if (host_.cancelled()) {
+        still_camera_.reset();
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
+    }
+    submission_.run(target.commands);
+    history_samples_ += settings_.accumulate ? frame_.sample_count : 0;
+    return read_back(target, image);
+}
+
+Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
+    wrote_in_place_ = target.rgba != nullptr;
+    if (!wrote_in_place_)
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            std::memcpy(image.rgba + std::size_t{image.stride} * y,
+                        target.buffer.mapped().data() + std::size_t{target.stride} * y, target.stride);
+    ++image_count_;
+    std::uint64_t ticks[2];
+    if (clock_.get() &&
+        device_.functions().vkGetQueryPoolResults(device_.handle(), clock_.get(), 0, 2, sizeof ticks, ticks,
+                                                  sizeof *ticks, VK_QUERY_RESULT_64_BIT) == VK_SUCCESS) {
+        const std::uint32_t bits = device_.physical().timestamp_bits;
+        const std::uint64_t passed =
+            (ticks[1] - ticks[0]) & (bits < 64 ? (std::uint64_t{1} << bits) - 1 : ~std::uint64_t{0});
+        gpu_ms_ += static_cast<double>(passed) * double{device_.physical().properties.limits.timestampPeriod} * 1e-6;
+    }
+    std::int32_t drawn[4];
+    std::memcpy(drawn, read_.mapped().data(), sizeof drawn);
+    if (drawn[0] >= drawn[2])
+        return {};
+    return {static_cast<std::uint32_t>(drawn[0]), static_cast<std::uint32_t>(drawn[1]),
+            static_cast<std::uint32_t>(drawn[2] - drawn[0]), static_cast<std::uint32_t>(drawn[3] - drawn[1])};
+}
+
+} // namespace rt_vulkan

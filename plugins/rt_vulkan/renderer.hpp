@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// From a camera to an image: one dispatch, whose commands are recorded once for each place that images go to.
+#pragma once
+
+#include "device.hpp"
+#include "scene_data.hpp"
+#include "view.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace rt_vulkan {
+
+struct Settings {
+    std::uint32_t samples = 1;       // a pixel
+    std::uint32_t light_samples = 4; // shadow rays to an extended light, from each sample
+    bool accumulate = false;         // average over frames while the camera stands still
+    bool one_path = false;           // glass sends one ray on, chosen at random, in place of two
+};
+
+// A shader's words; throws, naming the file, where it is missing or no SPIR-V.
+std::vector<std::uint32_t> read_shader(const std::filesystem::path &file);
+
+struct Rectangle {
+    std::uint32_t x, y, width, height; // px
+};
+
+class Renderer {
+public:
+    Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
+             const Instance &instance, const PhysicalDevice &physical, std::span<const std::uint32_t> shader);
+
+    // Returns the part of the image that holds all alpha above 0; empty: width 0. `motion` may be NULL.
+    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
+
+    const SceneData &scene() const { return scene_; }
+    // Whether the last image was written to its place by the device itself.
+    bool wrote_in_place() const { return wrote_in_place_; }
+    std::uint64_t image_count() const { return image_count_; }
+    double gpu_ms() const { return gpu_ms_; } // of all images; 0 where the device has no clock
+
+private:
+    // Where images go: an image's memory itself, or memory of ours (rgba NULL).
+    struct Target {
+        std::uint8_t *rgba = nullptr;
+        std::uint32_t stride = 0;
+        Buffer buffer;
+        VkCommandBuffer commands = VK_NULL_HANDLE;
+    };
+    void make_buffers(const arhost_intrinsics &intrinsics);
+    Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size);
+    void make_pipeline(std::span<const std::uint32_t> shader, std::uint32_t max_depth);
+    Target &target_of(const arhost_image &image);
+    void record(const Target &target) const;
+    void write_moving_parts();
+    Rectangle read_back(const Target &target, const arhost_image &image);
+
+    arhost::Host host_;
+    Settings settings_;
+    arhost_intrinsics intrinsics_;
+    SceneData scene_;
+    Device device_;
+    Submission submission_;
+    std::uint32_t ray_dimensions_ = 2;
+    Frame frame_{};
+    std::array<Buffer, binding_count> buffers_;
+    Buffer moving_;   // what the host writes of what moves, part by part
+    Buffer read_;     // the part that is drawn
+    QueryPool clock_; // none where the device has none
+    DescriptorSetLayout set_layout_;
+    DescriptorPool pool_;
+    VkDescriptorSet set_ = VK_NULL_HANDLE;
+    PipelineLayout layout_;
+    Pipeline pipeline_;
+    std::vector<Target> targets_;
+    bool wrote_in_place_ = false;
+    std::uint64_t image_count_ = 0;
+    double gpu_ms_ = 0;
+
+    // Of accumulation: how much has been summed up so far, and for which camera.
+    std::uint32_t history_samples_ = 0;
+    std::optional<arhost_camera> still_camera_;
+};
+
+} // namespace rt_vulkan

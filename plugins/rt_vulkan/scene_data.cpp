@@ -1,0 +1,505 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene_data.hpp"
+
+#include <arhost/shading/srgb8.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace rt_vulkan {
+namespace {
+
+using arhost::Failure;
+
+// From here on a refitted tree costs rays more than building a new one does.
+constexpr double tolerable_decay = 1.3;
+constexpr std::uint32_t most_in_leaf = 4;
+
+const std::byte *bytes(const arhost_scene &arena) {
+    return reinterpret_cast<const std::byte *>(&arena);
+}
+
+template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
+}
+
+bool is_identity(const float *m) {
+    constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    return std::equal(m, m + 12, identity);
+}
+
+template <std::size_t count> void copy(const float (&from)[count], float (&to)[count]) {
+    std::copy_n(from, count, to);
+}
+
+Material material_of(const arhost_material &from) {
+    Material to{};
+    to.model = static_cast<std::uint32_t>(from.model);
+    copy(from.ambient, to.ambient);
+    copy(from.diffuse, to.diffuse);
+    copy(from.specular, to.specular);
+    copy(from.reflectivity, to.reflectivity);
+    copy(from.emission, to.emission);
+    copy(from.refraction, to.refraction);
+    copy(from.extinction, to.extinction);
+    copy(from.shadow_attenuation, to.shadow_attenuation);
+    copy(from.cutoff_colour, to.cutoff_colour);
+    to.colour_texture = from.colour_texture;
+    to.exponent = from.exponent;
+    to.alpha_cutoff = from.alpha_cutoff;
+    to.metallic = from.metallic;
+    to.roughness = from.roughness;
+    to.index = from.index;
+    to.fresnel_exponent = from.fresnel_exponent;
+    to.fresnel_minimum = from.fresnel_minimum;
+    to.fresnel_maximum = from.fresnel_maximum;
+    to.importance_cutoff = from.importance_cutoff;
+    to.reflection_depth = from.reflection_depth;
+    to.refraction_depth = from.refraction_depth;
+    to.metallic_roughness_texture = from.metallic_roughness_texture;
+    to.normal_texture = from.normal_texture;
+    to.emission_texture = from.emission_texture;
+    return to;
+}
+
+Light light_of(const arhost_light &from) {
+    Light to{};
+    to.type = static_cast<std::uint32_t>(from.type);
+    to.falloff = static_cast<std::uint32_t>(from.falloff);
+    copy(from.position, to.position);
+    copy(from.direction, to.direction);
+    copy(from.intensity, to.intensity);
+    copy(from.axis_u, to.axis_u);
+    copy(from.axis_v, to.axis_v);
+    to.radius = from.radius;
+    to.cosine_inner = from.cosine_inner;
+    to.cosine_outer = from.cosine_outer;
+    return to;
+}
+
+// As an 8-bit code has it: the mean over several samples then rounds to that code.
+float alpha_of_code(float alpha) {
+    return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
+}
+
+// The box in the world round a transformed one (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990),
+// with room for what single precision loses on a ray's way to the object's axes.
+Box in_world(const Box &local, const float *m) {
+    Box world;
+    for (int row = 0; row < 3; ++row) {
+        double low = m[9 + row], high = low, size = std::abs(low);
+        for (int axis = 0; axis < 3; ++axis) {
+            const double a = double{m[3 * axis + row]} * local.low[axis],
+                         b = double{m[3 * axis + row]} * local.high[axis];
+            low += std::min(a, b);
+            high += std::max(a, b);
+            size += std::max(std::abs(a), std::abs(b));
+        }
+        world.low[row] = static_cast<float>(low - 2e-6 * size);
+        world.high[row] = static_cast<float>(high + 2e-6 * size);
+    }
+    return world;
+}
+
+Bytes bytes_of(const auto &vector) {
+    return std::as_bytes(std::span(vector));
+}
+
+} // namespace
+
+SceneData::SceneData(const arhost_scene &arena, const arhost::Host &host) : arena_(arena), host_(host) {
+    for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
+        materials_.push_back(material_of(material));
+    for (const arhost_light &light : elements<arhost_light>(arena, arena.lights))
+        lights_.push_back(light_of(light));
+    add_textures();
+    add_tables();
+
+    look_up();
+    const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
+    const auto objects = elements<arhost_object>(arena, arena.objects);
+    for (const arhost_object &object : objects)
+        anything_moves_ |= object.moves || object.deforms;
+    nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top tree's
+    for (const arhost_object &object : objects)
+        if (object.deforms)
+            add_normals(mesh_of(object.geometry, true), geometries[object.geometry]);
+    moving_nodes_ = nodes_.size();
+    moving_primitives_ = primitives_.size();
+    moving_attributes_ = attributes_.size();
+    for (auto &[geometry, mesh] : meshes_)
+        add_texcoords(mesh, geometries[geometry]);
+    for (const arhost_object &object : objects) {
+        if (!meshes_.contains(object.geometry)) {
+            look_up();
+            Mesh &mesh = mesh_of(object.geometry, false);
+            add_normals(mesh, geometries[object.geometry]);
+            add_texcoords(mesh, geometries[object.geometry]);
+        }
+        add_object(object, meshes_.at(object.geometry));
+    }
+    build_top();
+}
+
+void SceneData::look_up() const {
+    if (host_.cancelled())
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the trees were built");
+    host_.progress(-1, "building the trees");
+}
+
+std::vector<Box> SceneData::boxes_of(const arhost_geometry &geometry, Points points) const {
+    std::vector<Box> boxes;
+    if (geometry.type == ARHOST_SPHERES) {
+        boxes.reserve(geometry.positions.count);
+        for (std::uint32_t i = 0; i < geometry.positions.count; ++i) {
+            float sphere[4];
+            std::memcpy(sphere, points.first + std::size_t{points.stride} * i, sizeof sphere);
+            Box box;
+            for (int axis = 0; axis < 3; ++axis) {
+                const float margin = 1e-6f * (std::abs(sphere[axis]) + sphere[3]);
+                box.low[axis] = sphere[axis] - sphere[3] - margin;
+                box.high[axis] = sphere[axis] + sphere[3] + margin;
+            }
+            boxes.push_back(box);
+        }
+        return boxes;
+    }
+    boxes.reserve(geometry.indices.count);
+    const std::byte *corners = bytes(arena_) + geometry.indices.offset;
+    for (std::uint32_t i = 0; i < geometry.indices.count; ++i, corners += geometry.indices.stride) {
+        std::uint32_t corner[3];
+        std::memcpy(corner, corners, sizeof corner);
+        Box box = empty_box();
+        for (const std::uint32_t vertex : corner) {
+            float position[3];
+            std::memcpy(position, points.first + std::size_t{points.stride} * vertex, sizeof position);
+            include(box, position);
+        }
+        boxes.push_back(box);
+    }
+    return boxes;
+}
+
+SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[number];
+    const Points points{bytes(arena_) + geometry.positions.offset, geometry.positions.stride};
+    const std::vector<Box> boxes = boxes_of(geometry, points);
+    Mesh &mesh = meshes_[number];
+    mesh.root = static_cast<std::uint32_t>(nodes_.size());
+    mesh.first_primitive = static_cast<std::uint32_t>(primitives_.size());
+    mesh.first_index = static_cast<std::uint32_t>(indices_.size());
+    mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
+    mesh.local = empty_box();
+    mesh.is_empty = boxes.empty();
+    if (boxes.empty())
+        return mesh;
+    for (const Box &box : boxes)
+        include(mesh.local, box);
+    mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
+    mesh.built_area = relative_area(mesh.tree);
+    nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.tree.nodes.size()));
+    primitives_.resize(primitives_.size() + boxes.size());
+    write_tree(mesh, geometry, points);
+    if (!deforms)
+        mesh.tree = {};
+    const std::byte *corners = bytes(arena_) + geometry.indices.offset;
+    for (std::uint32_t i = 0; i < geometry.indices.count; ++i, corners += geometry.indices.stride) {
+        std::uint32_t corner[3];
+        std::memcpy(corner, corners, sizeof corner);
+        indices_.insert(indices_.end(), corner, corner + 3);
+    }
+    return mesh;
+}
+
+void SceneData::add_normals(Mesh &mesh, const arhost_geometry &geometry) {
+    if (geometry.normals.count == 0)
+        return;
+    mesh.first_normal = static_cast<std::uint32_t>(attributes_.size());
+    for (std::uint32_t i = 0; i < geometry.normals.count; ++i) {
+        float normal[3];
+        std::memcpy(normal, bytes(arena_) + geometry.normals.offset + std::size_t{geometry.normals.stride} * i,
+                    sizeof normal);
+        attributes_.insert(attributes_.end(), normal, normal + 3);
+    }
+}
+
+void SceneData::add_texcoords(Mesh &mesh, const arhost_geometry &geometry) {
+    if (geometry.texcoords.count == 0)
+        return;
+    mesh.first_texcoord = static_cast<std::uint32_t>(attributes_.size());
+    for (std::uint32_t i = 0; i < geometry.texcoords.count; ++i) {
+        float place[2];
+        std::memcpy(place, bytes(arena_) + geometry.texcoords.offset + std::size_t{geometry.texcoords.stride} * i,
+                    sizeof place);
+        attributes_.insert(attributes_.end(), place, place + 2);
+    }
+}
+
+// The nodes and the primitives, leaf by leaf.
+void SceneData::write_tree(const Mesh &mesh, const arhost_geometry &geometry, Points points) {
+    for (std::size_t i = 0; i < mesh.tree.nodes.size(); ++i) {
+        Node node = mesh.tree.nodes[i];
+        node.first += node.count ? mesh.first_primitive : mesh.root;
+        nodes_[mesh.root + i] = node;
+    }
+    const auto position = [&](std::uint32_t vertex) {
+        std::array<float, 3> p;
+        std::memcpy(p.data(), points.first + std::size_t{points.stride} * vertex, sizeof p);
+        return p;
+    };
+    for (std::size_t i = 0; i < mesh.tree.order.size(); ++i) {
+        const std::uint32_t number = mesh.tree.order[i];
+        Primitive primitive{};
+        primitive.number = number;
+        if (geometry.type == ARHOST_SPHERES) {
+            std::memcpy(primitive.corner, points.first + std::size_t{points.stride} * number, 12);
+            std::memcpy(primitive.edge_1, points.first + std::size_t{points.stride} * number + 12, 4);
+        } else {
+            std::uint32_t corner[3];
+            std::memcpy(corner,
+                        bytes(arena_) + geometry.indices.offset + std::size_t{geometry.indices.stride} * number,
+                        sizeof corner);
+            const auto a = position(corner[0]), b = position(corner[1]), c = position(corner[2]);
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                primitive.corner[axis] = a[axis];
+                primitive.edge_1[axis] = a[axis] - b[axis];
+                primitive.edge_2[axis] = c[axis] - a[axis];
+            }
+        }
+        primitives_[mesh.first_primitive + i] = primitive;
+    }
+}
+
+void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
+    const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[from.material];
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[from.geometry];
+    const bool is_glass = material.model == ARHOST_GLASS;
+    Object object{};
+    object.material = from.material;
+    object.role = static_cast<std::uint32_t>(from.role);
+    object.mask = from.role == ARHOST_CATCHER    ? catcher_mask
+                  : from.role == ARHOST_OCCLUDER ? occluder_mask
+                  : is_glass                     ? glass_mask
+                                                 : opaque_mask;
+    object.root = mesh.root;
+    object.first_index = mesh.first_index;
+    object.first_normal = mesh.first_normal;
+    object.first_texcoord = mesh.first_texcoord;
+    if (geometry.type == ARHOST_SPHERES)
+        object.flags |= is_spheres;
+    if (!is_glass && material.model != ARHOST_MIRROR && material.alpha_cutoff > 0 &&
+        material.colour_texture != ARHOST_NONE && mesh.first_texcoord != ARHOST_NONE)
+        object.flags |= rt_vulkan::has_holes;
+    if (from.moves || !is_identity(from.world_from_object))
+        object.flags |= has_transform;
+    place(object, from.world_from_object);
+    has_glass_ |= is_glass;
+    has_catchers_ |= from.role == ARHOST_CATCHER;
+    has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
+    objects_.push_back(object);
+    auto &at = places_.emplace_back();
+    std::copy_n(from.world_from_object, 12, at.begin());
+}
+
+void SceneData::place(Object &object, const float *m) const {
+    double cofactor[9];
+    for (int column = 0; column < 3; ++column) {
+        const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
+        for (int row = 0; row < 3; ++row) {
+            const int i = (row + 1) % 3, j = (row + 2) % 3;
+            cofactor[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
+        }
+    }
+    double largest = 0;
+    for (const double value : cofactor)
+        largest = std::max(largest, std::abs(value));
+    const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
+    for (int column = 0; column < 3; ++column)
+        for (int row = 0; row < 3; ++row) {
+            object.transform[column][row] = m[3 * column + row];
+            // Normals get their length later: of the inverse transposed only the sign of the determinant counts.
+            object.normal_transform[column][row] =
+                static_cast<float>(cofactor[3 * column + row] / (determinant < 0 ? -largest : largest));
+            object.object_from_world[column][row] = static_cast<float>(cofactor[3 * row + column] / determinant);
+        }
+    for (int row = 0; row < 3; ++row) {
+        double sum = 0;
+        for (int i = 0; i < 3; ++i)
+            sum -= cofactor[3 * row + i] / determinant * m[9 + i];
+        object.object_from_world[3][row] = static_cast<float>(sum);
+    }
+}
+
+void SceneData::build_top() {
+    std::vector<Box> boxes;
+    std::vector<std::uint32_t> numbers;
+    const auto from = elements<arhost_object>(arena_, arena_.objects);
+    for (std::uint32_t i = 0; i < from.size(); ++i) {
+        const Mesh &mesh = meshes_.at(from[i].geometry);
+        if (mesh.is_empty)
+            continue;
+        boxes.push_back(objects_[i].flags & has_transform ? in_world(mesh.local, places_[i].data()) : mesh.local);
+        numbers.push_back(i);
+    }
+    objects_in_top_ = static_cast<std::uint32_t>(boxes.size());
+    if (boxes.empty())
+        return;
+    const Tree tree = build_tree(boxes, 1, top_depth, [this] { look_up(); });
+    for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+        nodes_[i] = tree.nodes[i];
+        if (nodes_[i].count)
+            nodes_[i].first = numbers[tree.order[nodes_[i].first]];
+    }
+}
+
+void SceneData::move(const arhost_motion &motion) {
+    for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
+        const arhost_moved_object &moved = motion.moved[i];
+        place(objects_[moved.object], moved.world_from_object);
+        std::copy_n(moved.world_from_object, 12, places_[moved.object].begin());
+    }
+    for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
+        deform(motion.deformed[i]);
+    build_top();
+}
+
+void SceneData::deform(const arhost_deformed_geometry &deformed) {
+    const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[deformed.object];
+    const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
+    Mesh &mesh = meshes_.at(object.geometry);
+    if (mesh.is_empty)
+        return;
+    const Points points{reinterpret_cast<const std::byte *>(deformed.positions), 3 * sizeof(float)};
+    const std::vector<Box> boxes = boxes_of(geometry, points);
+    refit(mesh.tree, boxes);
+    if (relative_area(mesh.tree) > tolerable_decay * mesh.built_area) {
+        mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
+        mesh.built_area = relative_area(mesh.tree);
+        ++rebuilds_;
+    }
+    std::copy_n(mesh.tree.nodes[0].low, 3, mesh.local.low);
+    std::copy_n(mesh.tree.nodes[0].high, 3, mesh.local.high);
+    write_tree(mesh, geometry, points);
+    if (mesh.first_normal != ARHOST_NONE && deformed.normals)
+        std::copy_n(deformed.normals, std::size_t{3} * geometry.normals.count,
+                    attributes_.begin() + mesh.first_normal);
+}
+
+void SceneData::add_textures() {
+    std::size_t words = 0;
+    for (const arhost_texture &from : elements<arhost_texture>(arena_, arena_.textures)) {
+        Texture to{};
+        to.format = static_cast<std::uint32_t>(from.format);
+        to.first_texel = static_cast<std::uint32_t>(words);
+        to.wrap_u = static_cast<std::uint32_t>(from.wrap_u);
+        to.wrap_v = static_cast<std::uint32_t>(from.wrap_v);
+        to.width = static_cast<std::int32_t>(from.width);
+        to.height = static_cast<std::int32_t>(from.height);
+        textures_.push_back(to);
+        const std::size_t size = std::size_t{from.texels.stride} * from.texels.count;
+        texels_.emplace_back(bytes(arena_) + from.texels.offset, size);
+        words += size / 4;
+    }
+}
+
+// In the order of scene.glsl.
+void SceneData::add_tables() {
+    const arhost::shading::Srgb8Table codes = arhost::shading::make_srgb8_table();
+    tables_.assign(std::begin(codes.cells), std::end(codes.cells));
+    const auto add = [&](float number) { tables_.push_back(std::bit_cast<std::uint32_t>(number)); };
+    for (int code = 0; code < 256; ++code)
+        add(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));
+    if (arena_.environment.texture == ARHOST_NONE)
+        return;
+    environment_rows_ = static_cast<std::uint32_t>(tables_.size());
+    for (const float sum : elements<float>(arena_, arena_.environment.rows))
+        add(sum);
+    environment_columns_ = static_cast<std::uint32_t>(tables_.size());
+    for (const float sum : elements<float>(arena_, arena_.environment.columns))
+        add(sum);
+}
+
+std::vector<Bytes> SceneData::parts(Binding binding) const {
+    switch (binding) {
+    case objects_binding:
+        return {bytes_of(objects_)};
+    case materials_binding:
+        return {bytes_of(materials_)};
+    case lights_binding:
+        return {bytes_of(lights_)};
+    case nodes_binding:
+        return {bytes_of(nodes_)};
+    case primitives_binding:
+        return {bytes_of(primitives_)};
+    case indices_binding:
+        return {bytes_of(indices_)};
+    case attributes_binding:
+        return {bytes_of(attributes_)};
+    case textures_binding:
+        return {bytes_of(textures_)};
+    case texels_binding:
+        return texels_;
+    case tables_binding:
+        return {bytes_of(tables_)};
+    default:
+        return {};
+    }
+}
+
+std::size_t SceneData::moving_size(Binding binding) const {
+    if (!anything_moves_)
+        return 0;
+    switch (binding) {
+    case objects_binding:
+        return objects_.size() * sizeof(Object);
+    case nodes_binding:
+        return moving_nodes_ * sizeof(Node);
+    case primitives_binding:
+        return moving_primitives_ * sizeof(Primitive);
+    case attributes_binding:
+        return moving_attributes_ * sizeof(float);
+    default:
+        return 0;
+    }
+}
+
+void SceneData::forget_still_parts() {
+    const auto keep = [](auto &vector, std::size_t count) {
+        vector.resize(count);
+        vector.shrink_to_fit();
+    };
+    keep(nodes_, moving_nodes_);
+    keep(primitives_, moving_primitives_);
+    keep(attributes_, moving_attributes_);
+    keep(indices_, 0);
+    keep(texels_, 0);
+    keep(tables_, 0);
+}
+
+Frame SceneData::frame() const {
+    Frame frame{};
+    frame.object_count = objects_in_top_;
+    frame.light_count = static_cast<std::uint32_t>(lights_.size());
+    frame.max_depth = arena_.max_depth;
+    copy(arena_.ambient, frame.ambient);
+    copy(arena_.background, frame.background);
+    frame.coloured_shadows = arena_.coloured_shadows != 0;
+    frame.shadow_alpha_opaque = alpha_of_code(arena_.shadow_alpha_opaque);
+    frame.shadow_alpha_translucent = alpha_of_code(arena_.shadow_alpha_translucent);
+    const arhost_environment &environment = arena_.environment;
+    frame.environment_texture = environment.texture;
+    if (environment.texture != ARHOST_NONE) {
+        frame.environment_intensity = environment.intensity;
+        for (int column = 0; column < 3; ++column)
+            std::copy_n(environment.environment_from_world + std::size_t{3} * column, 3,
+                        frame.environment_from_world[column]);
+        frame.environment_rows = environment_rows_;
+        frame.environment_columns = environment_columns_;
+    }
+    return frame;
+}
+
+} // namespace rt_vulkan

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plain path: a compute shader that walks the trees itself, for any device of Vulkan 1.1.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "arhost/shading/glsl.h"
+
+#include "scene.glsl"
+#include "random.glsl"
+#include "texture.glsl"
+#include "trace_plain.glsl"
+#include "surface.glsl"
+#include "lights.glsl"
+#include "scatter.glsl"
+#include "integrator.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void main() {
+    write_pixel(gl_GlobalInvocationID.xy);
+}

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the shader is given: the buffers, as layout.hpp writes them. Offsets count elements.
+
+const uint NONE = 0xffffffffu;
+#define INFINITY uintBitsToFloat(0x7f800000u)
+
+// As in arhost/scene.h.
+const uint DIFFUSE = 1u, SPECULAR = 2u, MIRROR = 3u, METAL = 4u, GLASS = 5u, METALLIC_ROUGHNESS = 6u;
+const uint VIRTUAL = 1u, CATCHER = 2u, OCCLUDER = 3u;
+const uint DIRECTIONAL_LIGHT = 2u, SPOT_LIGHT = 3u, RECTANGLE_LIGHT = 4u, SPHERE_LIGHT = 5u;
+const uint FALLOFF_INVERSE_SQUARE = 2u;
+const uint TEXEL_SRGB8 = 1u, TEXEL_RGBA8 = 2u, TEXEL_RGBA32F = 3u;
+const uint WRAP_CLAMP = 2u, WRAP_MIRROR = 3u;
+
+// Which objects a ray can hit.
+const uint OPAQUE_MASK = 1u, GLASS_MASK = 2u, CATCHER_MASK = 4u, OCCLUDER_MASK = 8u, ALL_MASKS = 15u;
+// Object.flags
+const uint HAS_TRANSFORM = 1u, IS_SPHERES = 2u, HAS_HOLES = 4u;
+
+layout(constant_id = 0) const int waiting_capacity = 1; // rays that can wait at once, of a pixel
+layout(constant_id = 1) const bool has_glass = true;
+layout(constant_id = 2) const bool has_catchers = true;
+layout(constant_id = 3) const bool has_holes = true; // any object
+layout(constant_id = 4) const uint ray_dimensions = 2u;
+layout(constant_id = 5) const bool has_slopes = false;
+
+struct Object {
+    mat4x3 object_from_world;
+    mat3 transform, normal_transform; // from the object to the world: of directions, and of normals
+    uint material, role, mask, flags;
+    uint root;                                      // of its tree, among the nodes
+    uint first_index, first_normal, first_texcoord; // NONE where there are none
+};
+
+struct Material {
+    vec3 ambient;
+    uint model;
+    vec3 diffuse;
+    uint colour_texture;
+    vec3 specular;
+    float exponent;
+    vec3 reflectivity;
+    float alpha_cutoff;
+    vec3 emission;
+    float metallic;
+    vec3 refraction;
+    float roughness;
+    vec3 extinction;
+    float index;
+    vec3 shadow_attenuation;
+    float fresnel_exponent;
+    vec3 cutoff_colour;
+    float importance_cutoff;
+    float fresnel_minimum, fresnel_maximum;
+    uint reflection_depth, refraction_depth;
+    uint metallic_roughness_texture, normal_texture, emission_texture, unused;
+};
+
+struct Light {
+    vec3 position;
+    uint type;
+    vec3 direction;
+    uint falloff;
+    vec3 intensity;
+    float radius;
+    vec3 axis_u;
+    float cosine_inner;
+    vec3 axis_v;
+    float cosine_outer;
+};
+
+struct Texture {
+    uint format, first_texel, wrap_u, wrap_v; // first_texel: in words
+    int width, height, unused, unused_2;
+};
+
+// A box round two nodes (count 0: `first` and the one after it), or round primitives. Of the top tree, whose leaves
+// are objects.
+struct Node {
+    vec3 low;
+    uint first;
+    vec3 high;
+    uint count;
+};
+
+// A triangle: a corner, from its second corner to it, and from it to its third. A sphere: its centre, and edge_1.x
+// its radius.
+struct Primitive {
+    vec3 corner;
+    uint number; // in the geometry
+    vec3 edge_1;
+    float unused;
+    vec3 edge_2;
+    float unused_2;
+};
+
+layout(std140, set = 0, binding = 0) uniform FrameBlock {
+    vec3 eye;
+    uint object_count;
+    mat3 world_from_camera;
+    uint width, height, sample_count, first_sample;
+    uint light_samples, light_count, max_depth, one_path;
+    vec3 ambient;
+    uint coloured_shadows;
+    vec3 background;
+    uint accumulates;
+    float shadow_alpha_opaque, shadow_alpha_translucent;
+    uint environment_texture;
+    float environment_intensity;
+    mat3 environment_from_world;
+    uint environment_rows, environment_columns, unused, unused_2; // among the tables
+    vec4 samples[64];                                             // x, y: where they lie in a pixel, −½ to ½
+}
+frame;
+
+layout(std430, set = 0, binding = 1) readonly buffer Objects {
+    Object objects[];
+};
+layout(std430, set = 0, binding = 2) readonly buffer Materials {
+    Material materials[];
+};
+layout(std430, set = 0, binding = 3) readonly buffer Lights {
+    Light lights[];
+};
+layout(std430, set = 0, binding = 4) readonly buffer Nodes {
+    Node nodes[];
+};
+layout(std430, set = 0, binding = 5) readonly buffer Primitives {
+    Primitive primitives[];
+};
+layout(std430, set = 0, binding = 6) readonly buffer Indices {
+    uint indices[];
+};
+layout(std430, set = 0, binding = 7) readonly buffer Attributes {
+    float attributes[]; // vertices' normals and texcoords
+};
+layout(std430, set = 0, binding = 8) readonly buffer Textures {
+    Texture textures[];
+};
+layout(std430, set = 0, binding = 9) readonly buffer Texels {
+    uint texels[];
+};
+layout(std430, set = 0, binding = 10) readonly buffer Tables {
+    uint tables[]; // sRGB codes, their light, the environment's sums
+};
+layout(std430, set = 0, binding = 11) readonly buffer Rays {
+    float rays[]; // a pixel's direction in the camera's axes, and its slopes
+};
+layout(std430, set = 0, binding = 12) buffer History {
+    vec4 history[]; // sums of the samples before, premultiplied
+};
+layout(std430, set = 0, binding = 13) writeonly buffer Image {
+    uint image_pixels[];
+};
+layout(std430, set = 0, binding = 14) coherent buffer Drawn {
+    int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // the part that holds all alpha above 0
+};
+
+const uint FIRST_SRGB_CELL = 0u, FIRST_LIGHT_OF_CODE = 1665u;

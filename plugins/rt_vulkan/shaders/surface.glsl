@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where a ray has hit, all that shading needs (rt_embree's kernel/surface.inl).
+
+struct Surface {
+    vec3 position;
+    vec3 geometric_normal, normal; // of the facet, and interpolated over it: length 1, to the ray's origin
+    bool from_behind;              // the ray came from where the facet's own normal does not point
+    float offset;                  // mm; how far above the facet secondary rays start
+    float way;                     // mm, of the ray
+    bool is_real;                  // a catcher or occluder
+    // Of what lamps make bright, by shaded().
+    vec3 ambient, diffuse, specular, emission;
+    float exponent; // Phong's
+    float alpha;    // GGX's, where `is_rough`
+    bool is_rough;  // metallic-roughness: `specular` is the reflectance at a right angle
+};
+
+vec3 normal_at(uint object, uint number, vec2 at) {
+    uint first = objects[object].first_index + 3u * number, base = objects[object].first_normal;
+    vec3 share = vec3(1.0 - at.x - at.y, at.x, at.y), sum = vec3(0.0);
+    for (int i = 0; i < 3; ++i) {
+        uint from = base + 3u * indices[first + uint(i)];
+        sum += vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * share[i];
+    }
+    return sum;
+}
+
+vec3 textured(Hit hit, uint number) {
+    if (objects[hit.object].first_texcoord == NONE)
+        return vec3(1.0);
+    return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.at)).rgb;
+}
+
+// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own.
+vec3 bent(Hit hit, vec3 facet, vec3 normal) {
+    uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
+    vec2 place[3];
+    for (int i = 0; i < 3; ++i) {
+        uint from = objects[hit.object].first_texcoord + 2u * indices[first + uint(i)];
+        place[i] = vec2(attributes[from], attributes[from + 1u]);
+    }
+    vec3 edge_1 = -primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
+    vec2 by_1 = place[1] - place[0], by_2 = place[2] - place[0];
+    vec3 along_u = tangent_along_u(edge_1, edge_2, by_1.x, by_2.x, by_1.y, by_2.y);
+    vec3 along_v = tangent_along_v(edge_1, edge_2, by_1.x, by_2.x, by_1.y, by_2.y);
+    if ((objects[hit.object].flags & HAS_TRANSFORM) != 0u) {
+        along_u = objects[hit.object].transform * along_u;
+        along_v = objects[hit.object].transform * along_v;
+    }
+    return bent_normal(normal, facet, along_u, along_v,
+                       textured(hit, materials[objects[hit.object].material].normal_texture));
+}
+
+Surface surface_at(Ray ray, Hit hit) {
+    uint object = hit.object, material = objects[object].material;
+    precise vec3 ahead = ray.direction * hit.way;
+    vec3 geometric = hit.facet, normal = hit.facet;
+    if (objects[object].first_normal != NONE)
+        normal = normal_at(object, primitives[hit.primitive].number, hit.at);
+    if ((objects[object].flags & HAS_TRANSFORM) != 0u) {
+        geometric = objects[object].normal_transform * geometric;
+        normal = objects[object].normal_transform * normal;
+    }
+    if (materials[material].model == METALLIC_ROUGHNESS && materials[material].normal_texture != NONE &&
+        objects[object].first_texcoord != NONE)
+        normal = bent(hit, geometric, normal);
+
+    Surface s;
+    s.position = ray.origin + ahead;
+    s.way = length(ahead);
+    s.offset = offset_from_surface(s.position, ahead);
+    s.is_real = objects[object].role != VIRTUAL;
+    s.geometric_normal = unit_or(geometric, -normalize(ray.direction));
+    s.from_behind = dot(s.geometric_normal, ray.direction) > 0.0;
+    s.geometric_normal = facing(s.geometric_normal, -ray.direction);
+    s.normal = shading_normal(normal, s.geometric_normal);
+    s.ambient = s.diffuse = s.specular = s.emission = vec3(0.0);
+    s.exponent = s.alpha = 0.0;
+    s.is_rough = false;
+    return s;
+}
+
+// Adds the material's colours; the material is not a mirror, nor glass.
+void shaded(inout Surface s, Hit hit) {
+    uint material = objects[hit.object].material, model = materials[material].model;
+    s.ambient = materials[material].ambient;
+    s.diffuse = materials[material].diffuse;
+    if (materials[material].colour_texture != NONE) {
+        vec3 colour = textured(hit, materials[material].colour_texture);
+        s.ambient *= colour;
+        s.diffuse *= colour;
+    }
+    if (model == SPECULAR || model == METAL) {
+        s.specular = materials[material].specular;
+        s.exponent = materials[material].exponent;
+    }
+    if (model == METALLIC_ROUGHNESS) {
+        float metallic = materials[material].metallic, roughness = materials[material].roughness;
+        if (materials[material].metallic_roughness_texture != NONE) {
+            vec3 factors = textured(hit, materials[material].metallic_roughness_texture);
+            metallic *= factors.z;
+            roughness *= factors.y;
+        }
+        s.specular = metallic_reflectance(s.diffuse, metallic);
+        s.alpha = ggx_alpha(roughness);
+        s.is_rough = true;
+        s.ambient = metallic_diffuse(s.ambient, metallic);
+        s.diffuse = metallic_diffuse(s.diffuse, metallic);
+    }
+    vec3 emission = materials[material].emission;
+    if (emission.x + emission.y + emission.z > 0.0) {
+        if (materials[material].emission_texture != NONE)
+            emission *= textured(hit, materials[material].emission_texture);
+        s.emission = emission;
+    }
+}

@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plugin on the device that is here, and what it says where there is none.
+#include "renderer.hpp"
+#include "rich_scene.hpp"
+#include "scene/loader.hpp"
+#include "scene/motion.hpp"
+#include "two_tracers.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <optional>
+
+namespace arhost::test {
+namespace {
+
+using testing::HasSubstr;
+
+// Keeps what is logged.
+struct LoggingHost {
+    std::string text;
+    arhost_host host{sizeof host,
+                     ARHOST_ABI_VERSION,
+                     "arhost-test",
+                     "0",
+                     this,
+                     [](const arhost_host *self, arhost_severity, const char *message) {
+                         static_cast<LoggingHost *>(self->context)->text += std::string(message) + "\n";
+                     },
+                     [](const arhost_host *, double, const char *) {},
+                     [](const arhost_host *) { return 0; },
+                     [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+};
+
+class EnvironmentVariable {
+public:
+    EnvironmentVariable(const char *name, const std::string &value) : name_(name) {
+        if (const char *before = std::getenv(name))
+            before_ = before;
+        ::setenv(name, value.c_str(), 1);
+    }
+    ~EnvironmentVariable() {
+        if (before_)
+            ::setenv(name_, before_->c_str(), 1);
+        else
+            ::unsetenv(name_);
+    }
+    EnvironmentVariable(const EnvironmentVariable &) = delete;
+    EnvironmentVariable &operator=(const EnvironmentVariable &) = delete;
+
+private:
+    const char *name_;
+    std::optional<std::string> before_;
+};
+
+template <class Call> std::string refusal(arhost_status status, Call call) {
+    try {
+        call();
+    } catch (const Failure &failure) {
+        EXPECT_EQ(failure.status(), status) << failure.what();
+        return failure.what();
+    }
+    ADD_FAILURE() << "nothing was refused";
+    return "";
+}
+
+const arhost_intrinsics small = pinhole(96, 72, 96);
+
+arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> coefficients) {
+    arhost_intrinsics in = small;
+    in.distortion = distortion;
+    in.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
+    std::copy(coefficients.begin(), coefficients.end(), in.coefficients);
+    return in;
+}
+
+void expect_same_picture(const arhost_camera &view, const Options &options) {
+    const Picture got = picture_by("rt_vulkan", rich_scene(), view, options);
+    const Likeness like = likeness(got, picture_by("rt_embree", rich_scene(), view, options));
+    EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
+    EXPECT_EQ(like.alphas_off_inside, 0) << like;
+    EXPECT_GE(like.psnr, 45) << like;
+    EXPECT_GT(like.inside, 300) << like;
+    std::cout << like << std::endl;
+}
+
+} // namespace
+
+// ---- The same picture ------------------------------------------------------------------------------
+
+class RichScene : public testing::Test {
+protected:
+    void SetUp() override { ARHOST_REQUIRE_VULKAN(); }
+};
+
+TEST_F(RichScene, IsRtEmbrees) {
+    expect_same_picture(from_the_side(small), {});
+}
+TEST_F(RichScene, WithSeveralSamplesIsRtEmbrees) {
+    expect_same_picture(from_the_side(small), {{"samples", "3"}, {"light_samples", "2"}});
+}
+TEST_F(RichScene, WithOnePathThroughGlassIsRtEmbrees) {
+    expect_same_picture(from_the_side(small), {{"glass", "path"}});
+}
+TEST_F(RichScene, ThroughALensIsRtEmbrees) {
+    expect_same_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
+    expect_same_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})), {{"samples", "2"}});
+}
+TEST_F(RichScene, AccumulatedIsRtEmbrees) {
+    const Options options{{"accumulate", "true"}, {"samples", "2"}};
+    Tracer vulkan(rich_scene(), options, "rt_vulkan"), embree(rich_scene(), options);
+    ASSERT_EQ(vulkan.start(small), ARHOST_OK);
+    ASSERT_EQ(embree.start(small), ARHOST_OK);
+    Picture got(small), expected(small);
+    std::vector<Pixel> first;
+    for (int frame = 0; frame < 3; ++frame) {
+        got = Picture(small);
+        ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+        ASSERT_EQ(embree.try_render(from_the_side(small), expected), ARHOST_OK);
+        if (frame == 0)
+            first = got.pixels();
+    }
+    const Likeness like = likeness(got, expected);
+    EXPECT_EQ(like.alphas_off, 0) << like;
+    EXPECT_GE(like.psnr, 45) << like;
+    // Another camera begins anew, and back again is the first picture.
+    ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_OK);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+    EXPECT_EQ(got.pixels(), first);
+}
+TEST_F(RichScene, AgainAndAgainIsTheSameBytes) {
+    Tracer tracer(rich_scene(), {}, "rt_vulkan");
+    const auto first = tracer.render(from_the_side(small)).pixels();
+    tracer.render(from_the_side(pinhole(64, 48, 64)));
+    EXPECT_EQ(tracer.render(from_the_side(small)).pixels(), first);
+}
+
+// ---- Where images go -------------------------------------------------------------------------------
+
+// Page-aligned memory, as that of slots, goes to the device itself; what is beside the rows stays as it is.
+TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
+    ARHOST_REQUIRE_VULKAN();
+    LoggingHost logging;
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, false);
+    const auto devices = instance.devices();
+    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
+    if (!device.imports_host_memory)
+        GTEST_SKIP() << device.name << " lacks VK_EXT_external_memory_host";
+    const auto shader = rt_vulkan::read_shader(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv");
+    scene::Arena arena = rich_scene().build();
+    const arhost_camera view = from_the_side(small);
+    const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
+    rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shader);
+
+    const std::uint32_t stride = 4 * small.width + 64;
+    const std::size_t size = std::size_t{stride} * small.height, pages = (size + 4095) / 4096 * 4096;
+    auto *memory =
+        static_cast<std::uint8_t *>(mmap(nullptr, pages, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+    std::memset(memory, 0xa5, pages);
+    Picture copied(small);
+    const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory};
+    const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
+    EXPECT_TRUE(renderer.wrote_in_place());
+    const arhost_image elsewhere = copied.image(); // 64 bytes aligned
+    renderer.render(view, elsewhere);
+    EXPECT_FALSE(renderer.wrote_in_place());
+    EXPECT_TRUE(copied.only_pixels_written());
+    std::size_t differ = 0, touched = 0;
+    for (std::uint32_t y = 0; y < small.height; ++y) {
+        const std::uint8_t *row = memory + std::size_t{stride} * y;
+        differ += std::memcmp(row, elsewhere.rgba + std::size_t{elsewhere.stride} * y, 4 * small.width) != 0;
+        for (std::uint32_t i = 4 * small.width; i < stride; ++i)
+            touched += row[i] != 0xa5;
+    }
+    for (std::size_t i = size; i < pages; ++i)
+        touched += memory[i] != 0xa5;
+    EXPECT_EQ(differ, 0u) << "rows";
+    EXPECT_EQ(touched, 0u) << "bytes that are not the image's";
+    munmap(memory, pages);
+
+    // The region is the smallest that holds all alpha.
+    rt_vulkan::Rectangle tight{small.width, small.height, 0, 0};
+    std::uint32_t x1 = 0, y1 = 0;
+    for (std::uint32_t y = 0; y < small.height; ++y)
+        for (std::uint32_t x = 0; x < small.width; ++x)
+            if (copied.alpha(x, y)) {
+                tight.x = std::min(tight.x, x);
+                tight.y = std::min(tight.y, y);
+                x1 = std::max(x1, x + 1);
+                y1 = std::max(y1, y + 1);
+            }
+    EXPECT_EQ(std::tuple(drawn.x, drawn.y, drawn.x + drawn.width, drawn.y + drawn.height),
+              std::tuple(tight.x, tight.y, x1, y1));
+}
+
+// ---- What it is made from --------------------------------------------------------------------------
+
+TEST(Loader, ThatIsMissingIsToldOf) {
+    LoggingHost logging;
+    EXPECT_THAT(
+        refusal(ARHOST_ERROR_UNSUPPORTED,
+                [&] { rt_vulkan::Instance(Host(&logging.host), false, "libvulkan-none.so.1"); }),
+        testing::AllOf(HasSubstr("no Vulkan loader"), HasSubstr("libvulkan-none.so.1"), HasSubstr("libvulkan1")));
+    EXPECT_THAT(
+        refusal(ARHOST_ERROR_UNSUPPORTED, [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
+        HasSubstr("libm.so.6 is no Vulkan loader"));
+}
+
+TEST(Device, ThatIsMissingIsToldOf) {
+    const EnvironmentVariable drivers("VK_DRIVER_FILES", "/nonexistent/none.json"),
+        old_name("VK_ICD_FILENAMES", "/nonexistent/none.json");
+    PluginUnderTest plugin("rt_vulkan");
+    EXPECT_EQ(plugin.create(), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_THAT(plugin.log(), testing::AnyOf(HasSubstr("no Vulkan driver: install"),
+                                             HasSubstr("no Vulkan device: install"), HasSubstr("no Vulkan loader")));
+}
+
+TEST(Device, IsChosenByNumberNameOrUuid) {
+    using rt_vulkan::PhysicalDevice;
+    std::vector<PhysicalDevice> devices(3);
+    devices[0].name = "llvmpipe (LLVM 15)";
+    devices[0].uuid = "6d657361000000000000000000000000";
+    devices[0].properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_CPU;
+    devices[1].name = "Big GPU";
+    devices[1].uuid = "00112233445566778899aabbccddeeff";
+    devices[1].properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    devices[2].name = "Little GPU";
+    devices[2].uuid = "0f112233445566778899aabbccddeeff";
+    devices[2].properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU;
+    const auto chosen = [&](const char *wanted) { return rt_vulkan::choose_device(devices, wanted).name; };
+    EXPECT_EQ(chosen("auto"), "Big GPU");
+    EXPECT_EQ(chosen("0"), "llvmpipe (LLVM 15)");
+    EXPECT_EQ(chosen("2"), "Little GPU");
+    EXPECT_EQ(chosen("LLVMPIPE"), "llvmpipe (LLVM 15)");
+    EXPECT_EQ(chosen("little"), "Little GPU");
+    EXPECT_EQ(chosen("0F112233-4455-6677-8899-aabbccddeeff"), "Little GPU");
+    for (const char *none : {"3", "radeon", "", "0011"})
+        EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen(none); }),
+                    testing::AllOf(HasSubstr("option 'device': no device is"), HasSubstr("1 'Big GPU'"),
+                                   HasSubstr("6d657361")))
+            << none;
+    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
+}
+
+TEST(Device, OptionThatNamesNoneIsRefused) {
+    ARHOST_REQUIRE_VULKAN();
+    PluginUnderTest plugin("rt_vulkan");
+    EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_THAT(plugin.log(), HasSubstr("there are: 0 '"));
+    EXPECT_EQ(plugin.create({{"device", "0"}}), ARHOST_OK);
+}
+
+TEST(Device, WithoutWhatIsNeededIsRefused) {
+    ARHOST_REQUIRE_VULKAN();
+    LoggingHost logging;
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, false);
+    const rt_vulkan::PhysicalDevice sound = instance.devices()[0];
+    const auto shader = rt_vulkan::read_shader(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv");
+    scene::Arena arena = rich_scene().build();
+    const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &small};
+    const auto complaint = [&](auto spoil) {
+        rt_vulkan::PhysicalDevice device = sound;
+        spoil(device);
+        return refusal(ARHOST_ERROR_UNSUPPORTED,
+                       [&] { rt_vulkan::Renderer(setup, {}, host, instance, device, shader); });
+    };
+    EXPECT_THAT(complaint([](auto &device) { device.properties.apiVersion = VK_API_VERSION_1_0; }),
+                testing::AllOf(HasSubstr(sound.name), HasSubstr("1.1 is needed"), HasSubstr("option 'device'")));
+    EXPECT_THAT(complaint([](auto &device) { device.queue_family = VK_QUEUE_FAMILY_IGNORED; }),
+                HasSubstr("can't compute"));
+    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 4; }),
+                HasSubstr("reads 4 buffers at once"));
+    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxStorageBufferRange = 64; }),
+                HasSubstr("reads 1 MiB at most: use smaller"));
+}
+
+TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
+    const ScratchFolder folder;
+    const auto plugin_file = folder.path() / "rt_vulkan.so", shader_file = folder.path() / "rt_vulkan_plain.spv";
+    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan.so", plugin_file);
+    const auto relative = std::filesystem::relative(folder.path() / "rt_vulkan", ARHOST_PLUGIN_DIRECTORY).string();
+    const auto complaint = [&] {
+        PluginUnderTest plugin(relative);
+        EXPECT_EQ(plugin.create(), ARHOST_ERROR_CONFIGURATION);
+        return plugin.log();
+    };
+    EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is missing")));
+    std::ofstream(shader_file) << "This is no shader, but long enough to be taken for one.";
+    EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is damaged")));
+    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv", shader_file,
+                               std::filesystem::copy_options::overwrite_existing);
+    const auto whole = std::filesystem::file_size(shader_file);
+    for (const auto size : {whole - 4, whole - 1, whole / 2, std::uintmax_t{20}}) {
+        std::filesystem::resize_file(shader_file, size);
+        EXPECT_THAT(complaint(), HasSubstr("is damaged")) << size;
+    }
+}
+
+TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
+    ARHOST_REQUIRE_VULKAN();
+    const ScratchFolder folder;
+    const EnvironmentVariable caches("XDG_CACHE_HOME", folder.path().string());
+    const auto file = folder.path() / "rt_vulkan.pipelines";
+    Tracer tracer(rich_scene(), {}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_TRUE(std::filesystem::exists(file));
+    const auto size = std::filesystem::file_size(file);
+    std::ofstream(file) << "garbage";
+    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "written anew";
+    std::filesystem::remove(file);
+    std::filesystem::create_directory(file); // can't be replaced
+    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+}
+
+// ---- Validation ------------------------------------------------------------------------------------
+
+class Validation : public testing::Test {
+protected:
+    void SetUp() override {
+        ARHOST_REQUIRE_VULKAN();
+        try {
+            rt_vulkan::Instance(Host(&logging.host), true);
+        } catch (const Failure &failure) {
+            GTEST_SKIP() << failure.what();
+        }
+    }
+    LoggingHost logging;
+};
+
+TEST_F(Validation, HearsOfAMistake) {
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, true);
+    const auto devices = instance.devices();
+    const rt_vulkan::Device device(instance, devices[0]);
+    ASSERT_EQ(logging.text, "");
+    const rt_vulkan::Submission submission(device);
+    const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, rt_vulkan::Buffer::Place::device);
+    const VkCommandBuffer commands = submission.new_commands();
+    submission.begin(commands);
+    const std::int32_t zeros[4] = {};
+    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros); // not made to be written to
+    submission.end(commands);
+    EXPECT_THAT(logging.text, HasSubstr("Vulkan validation: "));
+}
+
+TEST_F(Validation, HearsOfAHazard) {
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, true);
+    const auto devices = instance.devices();
+    const rt_vulkan::Device device(instance, devices[0]);
+    const rt_vulkan::Submission submission(device);
+    const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, rt_vulkan::Buffer::Place::device);
+    const VkCommandBuffer commands = submission.new_commands();
+    submission.begin(commands);
+    const std::int32_t zeros[4] = {};
+    for (int twice = 0; twice < 2; ++twice)
+        device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros);
+    submission.end(commands);
+    EXPECT_THAT(logging.text, HasSubstr("HAZARD"));
+}
+
+TEST_F(Validation, HasNothingToSay) {
+    Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    for (int frame = 0; frame < 3; ++frame) {
+        Picture picture(small);
+        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
+    }
+    tracer.render(from_the_side(pinhole(65, 47, 65))); // stops, which leaves nothing behind, and starts
+    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
+    EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
+}
+
+TEST_F(Validation, HasNothingToSayOfMotion) {
+    const std::filesystem::path file = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
+    Tracer tracer(scene::load_scene(file), {{"validate", "true"}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    scene::MotionEvaluator evaluator(tracer.scene());
+    std::vector<std::vector<Pixel>> pictures;
+    for (const double time_s : {0.0, 0.7, 0.0}) {
+        const arhost_motion motion = evaluator.at(time_s);
+        Picture picture(small);
+        EXPECT_EQ(tracer.try_render(from_the_side(small), picture, &motion), ARHOST_OK);
+        pictures.push_back(picture.pixels());
+    }
+    EXPECT_NE(pictures[0], pictures[1]);
+    EXPECT_EQ(pictures[0], pictures[2]);
+    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
+}
+
+// ---- Refusals --------------------------------------------------------------------------------------
+
+class Refusal : public testing::Test {
+protected:
+    void SetUp() override {
+        ARHOST_REQUIRE_VULKAN();
+        tracer.emplace(rich_scene(), Options{}, "rt_vulkan");
+    }
+    arhost_status render(const arhost_camera &view) {
+        EXPECT_EQ(tracer->start(small), ARHOST_OK);
+        Picture picture(small);
+        return tracer->try_render(view, picture);
+    }
+    std::optional<Tracer> tracer;
+};
+
+TEST_F(Refusal, OfCamerasThatCannotBe) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
+    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({1e13, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_ERROR_INVALID_ARGUMENT) << "other intrinsics";
+    Picture other(pinhole(72, 96));
+    EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
+    arhost_intrinsics in = small;
+    in.fx = 0;
+    EXPECT_EQ(tracer->start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->start(with_lens(ARHOST_DISTORTION_BROWN, {1, 2, 3})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->start(pinhole(0, 10)), ARHOST_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Refusal, ToGoOnOnceCancelled) {
+    ASSERT_EQ(tracer->start(small), ARHOST_OK);
+    tracer->plugin().cancel();
+    Picture picture(small);
+    EXPECT_EQ(tracer->try_render(from_the_side(small), picture), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(tracer->start(small), ARHOST_ERROR_CANCELLED);
+}
+
+TEST(Plugin, DeclaresTheLensAndTheGpu) {
+    const PluginUnderTest plugin("rt_vulkan");
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_TRACES_LENS);
+    ASSERT_NE(plugin.descriptor().needs, nullptr);
+    EXPECT_STREQ(plugin.descriptor().needs[0], "gpu");
+}
+
+} // namespace arhost::test

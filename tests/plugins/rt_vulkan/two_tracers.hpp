@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The same image by rt_vulkan and by rt_embree, and how alike the two are.
+#pragma once
+
+#include "tracer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace arhost::test {
+
+// What rt_vulkan says against making it here, "" where there is a device.
+inline std::string no_vulkan() {
+    PluginUnderTest plugin("rt_vulkan");
+    return plugin.create() == ARHOST_OK ? "" : plugin.log();
+}
+#define ARHOST_REQUIRE_VULKAN()                                                                                      \
+    if (const std::string missing = ::arhost::test::no_vulkan(); !missing.empty())                                   \
+    GTEST_SKIP() << missing
+
+struct Likeness {
+    int pixels = 0, alphas_off = 0;
+    int alphas_off_inside = 0; // where the reference has one alpha class for a pixel round
+    int inside = 0;            // pixels of alpha 255 amid others, which PSNR is of
+    double psnr = 0;           // dB; infinite where they are the same
+};
+inline std::ostream &operator<<(std::ostream &stream, const Likeness &like) {
+    return stream << like.pixels << " px, " << like.alphas_off << " alphas off (" << like.alphas_off_inside
+                  << " of them inside), " << like.psnr << " dB over " << like.inside << " px inside";
+}
+
+// Nothing is inside at the picture's border.
+inline Likeness likeness(const Picture &got, const Picture &reference) {
+    Likeness like;
+    double squares = 0;
+    for (std::uint32_t y = 0; y < got.height; ++y)
+        for (std::uint32_t x = 0; x < got.width; ++x) {
+            const Pixel a = got.at(x, y), b = reference.at(x, y);
+            bool is_inside = x > 0 && y > 0 && x + 1 < got.width && y + 1 < got.height;
+            for (std::uint32_t v = y - 1; is_inside && v <= y + 1; ++v)
+                for (std::uint32_t u = x - 1; is_inside && u <= x + 1; ++u)
+                    is_inside = std::abs(reference.alpha(u, v) - b[3]) <= 1;
+            ++like.pixels;
+            // A code apart is how means round, not another class.
+            const bool off = std::abs(a[3] - b[3]) > 1;
+            like.alphas_off += off;
+            like.alphas_off_inside += off && is_inside;
+            if (!is_inside || b[3] != 255 || a[3] != 255)
+                continue;
+            ++like.inside;
+            for (std::size_t i = 0; i < 3; ++i)
+                squares += (a[i] - b[i]) * (a[i] - b[i]);
+        }
+    like.psnr = squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * like.inside / squares)
+                            : std::numeric_limits<double>::infinity();
+    return like;
+}
+
+// Both tracers take these options.
+inline Picture picture_by(const std::string &plugin, scene::ArenaBuilder scene, const arhost_camera &view,
+                          const Options &options = {}) {
+    return Tracer(std::move(scene), options, plugin).render(view);
+}
+
+} // namespace arhost::test
