@@ -34,7 +34,12 @@ void expect_to_be_cancelled(const Context &context, Host &host, const char *call
     while (status == ARHOST_OK && !host.is_cancelled())
         status = function();
     const Clock::time_point returned = Clock::now();
+    const bool was_cancelled = host.is_cancelled();
     other.join();
+    if (!was_cancelled && status == ARHOST_END)
+        throw Skip(fmt::format("{} came to its end before it could be cancelled", call));
+    if (!was_cancelled)
+        throw Failure(fmt::format("{} returned {} before anything was cancelled", call, status_name(status)));
     expect_ok_or_cancelled(call, status == ARHOST_END ? ARHOST_OK : status, "cancelled meanwhile");
     if (returned - cancelled > soon)
         throw Failure(fmt::format("cancelled meanwhile, {} went on for {:.1f} s; {:.3g} s are allowed", call,

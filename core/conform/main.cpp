@@ -2,16 +2,19 @@
 //
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
 #include "conform/report.hpp"
-#include "conform/report_file.hpp"
+#include "ring/file_identity.hpp"
 #include "ring/text.hpp"
+#include "ring/whole_file.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <fnmatch.h>
 #include <set>
 #include <sys/signalfd.h>
@@ -170,6 +173,12 @@ std::string wrong_with_reference(std::span<const Test> tests, const RunSettings 
     return {};
 }
 
+// At once, for whoever reads along. A full disk, and a reader who has gone, end the run.
+void print(const std::string &text) {
+    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+        throw std::runtime_error(std::string("can't write what the tests told: ") + std::strerror(errno));
+}
+
 Report run(const RunSettings &settings, const std::string &pattern, bool quiet) {
     Report report{settings, all_tests(), {}, {}};
     const auto wanted = [&](const char *test) { return ::fnmatch(pattern.c_str(), test, 0) == 0; };
@@ -178,8 +187,7 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
     };
     const auto tell = [&](const Result &result) {
         if (!is_fine(result) || (wanted(result.test.c_str()) && !quiet))
-            fmt::print("{}", as_line(report, result));
-        std::fflush(stdout);
+            print(as_line(report, result));
     };
     const auto give = [&](const Test &test, Verdict verdict, const std::string &why) {
         report.results.push_back({test.name, verdict, why});
@@ -213,6 +221,34 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
     return report;
 }
 
+// A report replaces what is there, unless that is a pipe or a device.
+void expect_files_of_their_own(const std::vector<std::string> &reports, const Subject &subject) {
+    using arhost::ring::identity_of;
+    std::set<std::string> read, written; // paths, and nodes: a file may have several names
+    const auto add = [](std::set<std::string> &files, const fs::path &file) {
+        const auto [path, node] = identity_of(file);
+        files.insert({path, node});
+    };
+    add(read, subject.plugin);
+    add(read, subject.reference);
+    for (const auto &[id, file] : subject.prints)
+        add(read, file);
+    for (const fs::path &path : subject.policy.readable)
+        add(read, path);
+    for (const std::string &report : reports) {
+        std::error_code ignored;
+        const fs::file_status status = fs::status(report, ignored);
+        if (report.empty() || (fs::exists(status) && !fs::is_regular_file(status)))
+            continue;
+        const auto [path, node] = identity_of(report);
+        if (read.contains(path) || read.contains(node))
+            throw std::runtime_error("can't write " + report + ": it is a file that this run reads; choose another");
+        if (written.contains(path) || written.contains(node))
+            throw std::runtime_error("can't write " + report + ": another report is written there");
+        add(written, report);
+    }
+}
+
 // Those that end a program, but for what whoever started this one wants ignored (nohup): taken from here on by who
 // reads the descriptor.
 arhost::ring::UniqueFd take_signals() {
@@ -232,6 +268,7 @@ arhost::ring::UniqueFd take_signals() {
 int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // as where a plugin runs: a full disk, and who reads no more, are errors
     std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGCHLD, SIG_DFL); // whoever started this may ignore it, and then no child can be waited for
     CLI::App app("Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
                  "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell.",
                  "arhost conform");
@@ -294,11 +331,12 @@ int main(int argc, char **argv) {
         settings.subject.policy_options = policy_options.texts();
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
-        ReportFile json_file(json), junit_file(junit), html_file(html);
         const arhost::ring::UniqueFd signals = take_signals();
+        expect_files_of_their_own({json, junit, html}, settings.subject);
+        arhost::ring::WholeFile json_file(json), junit_file(junit), html_file(html);
         settings.signals = signals.get();
         const Report report = run(settings, pattern, quiet);
-        fmt::print("{}", as_summary(report));
+        print(as_summary(report));
         if (report.results.empty())
             throw std::runtime_error("--only " + pattern + ": no test of this kind of plugin has such a name");
         json_file.write(as_json(report));

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -18,7 +20,10 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
+#include <unistd.h>
+#include <utility>
 
 namespace arhost::conform {
 namespace {
@@ -74,7 +79,20 @@ private:
 };
 
 // In the child, after fork.
-[[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, pid_t parent) {
+// A pipe: its end to read from, which does not wait, and its end to write to.
+struct Pipe {
+    Pipe() {
+        int ends[2];
+        if (::pipe2(ends, O_CLOEXEC) != 0)
+            ring::throw_errno("pipe2");
+        to_read.reset(ends[0]);
+        to_write.reset(ends[1]);
+        ::fcntl(to_read.get(), F_SETFL, O_NONBLOCK);
+    }
+    UniqueFd to_read, to_write;
+};
+
+[[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
     ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) // it died before the line above
@@ -84,11 +102,20 @@ private:
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
-    const int high_pipe = ::fcntl(pipe, F_DUPFD_CLOEXEC, 10), high_page = ::fcntl(page, F_DUPFD_CLOEXEC, 10);
-    ::dup2(high_pipe, result_fd);
-    ::dup2(high_page, call_page_fd);
-    ::dup2(STDERR_FILENO, STDOUT_FILENO); // what a plugin prints is no part of the report
+    // First out of the way of 0 to 4, then into place; dup2 clears close-on-exec. Nothing else of whoever started
+    // this comes along: no terminal, and no descriptor that a plugin could write to.
+    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    const std::pair<int, int> places[] = {{nothing, STDIN_FILENO},
+                                          {output, STDOUT_FILENO},
+                                          {output, STDERR_FILENO},
+                                          {pipe, result_fd},
+                                          {page, call_page_fd}};
+    std::array<int, std::size(places)> high;
+    std::ranges::transform(places, high.begin(), [](auto place) { return ::fcntl(place.first, F_DUPFD_CLOEXEC, 10); });
+    for (std::size_t i = 0; i < high.size(); ++i)
+        if (high[i] < 0 || ::dup2(high[i], places[i].second) < 0)
+            ::_exit(127);
+    ::syscall(SYS_close_range, call_page_fd + 1u, ~0u, 0u);
     std::vector<char *> argv;
     argv.reserve(arguments.size() + 1);
     for (const std::string &argument : arguments)
@@ -98,6 +125,36 @@ private:
     ::_exit(127);
 }
 
+// What a plugin prints: no part of the report, and shown as lines that can't steer a terminal, as many as one reads.
+class Printed {
+public:
+    explicit Printed(std::string test) : test_(std::move(test)) {}
+    ~Printed() {
+        if (!line_.empty())
+            show();
+        if (left_out_ > 0)
+            fmt::print(stderr, "{}: and {} bytes more\n", test_, left_out_);
+    }
+    Printed(const Printed &) = delete;
+    Printed &operator=(const Printed &) = delete;
+
+    void take(std::string_view bytes) {
+        for (const char c : bytes.substr(0, room_))
+            if (c == '\n')
+                show();
+            else
+                line_ += c;
+        left_out_ += bytes.size() - std::min(bytes.size(), room_);
+        room_ -= std::min(bytes.size(), room_);
+    }
+
+private:
+    void show() { fmt::print(stderr, "{}\n", ring::printable(std::exchange(line_, {}))); }
+
+    std::string test_, line_;
+    std::size_t room_ = 64 << 10, left_out_ = 0;
+};
+
 class Child {
 public:
     // `alive`: all of its kind; what has been orphaned meanwhile ends with each of them.
@@ -106,11 +163,6 @@ public:
           deadline_(begin_ + std::chrono::duration_cast<Clock::duration>(test.deadline * settings.subject.patience)),
           memory_(ring::SharedMemory::create("arhost-conform-call", sizeof(Call))),
           calls_(memory_.map(ring::Access::read_only)) {
-        int ends[2];
-        if (::pipe2(ends, O_CLOEXEC) != 0)
-            ring::throw_errno("pipe2");
-        pipe_.reset(ends[0]);
-        const UniqueFd write_end(ends[1]);
         const Subject &subject = settings.subject;
         std::vector<std::string> arguments = {"arhost-conform", subject.plugin,
                                               "--run",          test.name,
@@ -126,9 +178,11 @@ public:
         const pid_t parent = ::getpid();
         pid_ = ::fork();
         if (pid_ == 0)
-            become(arguments, write_end.get(), memory_.fd(), parent);
+            become(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
         if (pid_ < 0)
             ring::throw_errno("fork");
+        result_.to_write.reset();
+        output_.to_write.reset();
         ::setpgid(pid_, pid_); // here too: who comes first is open
         alive_.insert(pid_);
     }
@@ -139,7 +193,8 @@ public:
     Child(const Child &) = delete;
     Child &operator=(const Child &) = delete;
 
-    int fd() const { return closed_ ? -1 : pipe_.get(); }
+    // To be waited for; -1: closed, which poll passes over.
+    std::array<int, 2> fds() const { return {result_.to_read.get(), output_.to_read.get()}; }
     Clock::time_point deadline() const { return deadline_; }
 
     // Takes what has come. True once the test is over: it ended, or its time is up, or it tells more than a test can.
@@ -199,13 +254,19 @@ private:
     }
     // Not all, of who writes without end: others are waited for, and time goes by.
     void take() {
+        take(result_.to_read, [&](std::string_view bytes) { text_ += bytes; });
+        take(output_.to_read, [&](std::string_view bytes) { printed_.take(bytes); });
+    }
+    static void take(UniqueFd &from, const std::function<void(std::string_view)> &to) {
         char buffer[1 << 16];
-        pollfd ready{pipe_.get(), POLLIN, 0};
-        for (int i = 0; i < 16 && !closed_ && ::poll(&ready, 1, 0) > 0; ++i) { // its children may keep it open
-            const ssize_t count = ::read(pipe_.get(), buffer, sizeof buffer);
+        for (int i = 0; i < 16 && from; ++i) {
+            const ssize_t count = ::read(from.get(), buffer, sizeof buffer);
             if (count > 0)
-                text_.append(buffer, static_cast<std::size_t>(count));
-            closed_ = count <= 0;
+                to({buffer, static_cast<std::size_t>(count)});
+            else if (count < 0 && errno == EAGAIN)
+                break; // its children may keep it open
+            else
+                from.reset();
         }
     }
     void end() {
@@ -214,8 +275,7 @@ private:
             ::waitpid(pid_, &status_, 0);
         alive_.erase(pid_);
         pid_ = 0;
-        for (int i = 0; i < 500 && ring::kill_orphans(alive_) > 0; ++i) // not for ever: one may hang in the kernel
-            ::usleep(1000);
+        ring::end_orphans(alive_);
     }
 
     const Test &test_;
@@ -224,10 +284,11 @@ private:
     ScratchFolder scratch_; // goes once the process is gone
     ring::SharedMemory memory_;
     CallPage calls_;
-    UniqueFd pipe_;
+    Pipe result_, output_;
+    Printed printed_{test_.name};
     pid_t pid_ = 0;
     std::string text_;
-    bool closed_ = false, ended_ = false;
+    bool ended_ = false;
     int status_ = 0;
 };
 
@@ -240,7 +301,8 @@ const Result *find(const std::vector<Result> &results, const std::string &test) 
 int wait(const std::list<Child> &running, int signals) {
     std::vector<pollfd> fds = {{signals, POLLIN, 0}};
     for (const Child &child : running)
-        fds.push_back({child.fd(), POLLIN, 0}); // -1, which poll passes over, once it is closed
+        for (const int fd : child.fds())
+            fds.push_back({fd, POLLIN, 0});
     ::poll(fds.data(), fds.size(), 2);          // an end of a process closes no pipe that its children hold
     signalfd_siginfo taken{};
     if (fds.front().revents != 0 && ::read(signals, &taken, sizeof taken) == sizeof taken)

@@ -15,6 +15,7 @@ public:
     static void under(const std::function<void(SlowDisk &)> &work);
 
     void hold_up_next_write() { is_due_ = true; } // by 100 ms
+    bool has_held_up() const { return !is_due_; }
 
 private:
     // Until the work is done; false: this kernel does not let those go on who wait.

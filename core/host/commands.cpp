@@ -4,6 +4,7 @@
 #include "config/schema.hpp"
 #include "host/probe.hpp"
 #include "ring/text.hpp"
+#include "ring/whole_file.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -175,27 +176,16 @@ double cpu_seconds_of_host() {
     return supervise::cpu_seconds(usage);
 }
 
-// Whole under its name, or not there: written beside it and renamed.
 bool write_whole(const fs::path &file, const char *key, Console &console, const std::string &text) {
-    std::error_code ignored;
-    if (fs::is_character_file(file, ignored)) { // /dev/null, say
-        std::ofstream stream(file);
-        if (stream << text << std::flush)
-            return true;
-        console.log(ARHOST_SEVERITY_ERROR, key, "can't write " + file.string() + ": " + std::strerror(errno));
+    try {
+        std::error_code ignored; // the file tells
+        fs::create_directories(file.parent_path(), ignored);
+        ring::WholeFile(file).write(text);
+        return true;
+    } catch (const std::runtime_error &error) {
+        console.log(ARHOST_SEVERITY_ERROR, key, error.what());
         return false;
     }
-    fs::create_directories(file.parent_path(), ignored);
-    const fs::path temporary = file.string() + ".tmp";
-    // A new file, whatever lies there: an output may share the folder, and leave a link or a pipe under this name.
-    fs::remove(temporary, ignored);
-    std::FILE *stream = std::fopen(temporary.c_str(), "wx");
-    const bool complete = stream && std::fwrite(text.data(), 1, text.size(), stream) == text.size();
-    if (stream && std::fclose(stream) == 0 && complete && ::rename(temporary.c_str(), file.c_str()) == 0)
-        return true;
-    console.log(ARHOST_SEVERITY_ERROR, key, "can't write " + file.string() + ": " + std::strerror(errno));
-    fs::remove(temporary, ignored);
-    return false;
 }
 
 void tell_of_promises(const Promises &promises, Console &console) {

@@ -15,8 +15,8 @@
 
 namespace {
 
-// What the shell may have handed over: closed standard streams, whose numbers a socket must not get, and
-// signals that would end the run where an error message is meant.
+// What the shell may have handed over: closed standard streams, whose numbers a socket must not get, signals that are
+// ignored, and signals that would end the run where an error message is meant.
 void prepare_process() {
     int fd = ::open("/dev/null", O_RDWR);
     while (fd >= 0 && fd <= 2)
@@ -24,6 +24,7 @@ void prepare_process() {
     ::close(fd);
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGCHLD, SIG_DFL); // or no child could be waited for
 }
 
 // One line, which no name of a file makes two.

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <sys/wait.h>
+#include <unistd.h>
 
 namespace arhost::ring {
 
@@ -25,6 +26,11 @@ int kill_orphans(const std::set<pid_t> &kept) {
         }
     }
     return count;
+}
+
+void end_orphans(const std::set<pid_t> &kept) {
+    for (int i = 0; i < 500 && kill_orphans(kept) > 0; ++i)
+        ::usleep(1000);
 }
 
 } // namespace arhost::ring

@@ -15,4 +15,7 @@ std::set<pid_t> children();
 // (PR_SET_CHILD_SUBREAPER) comes what a worker leaves behind, and what that has left behind with the next call.
 int kill_orphans(const std::set<pid_t> &kept);
 
+// Until there are none, or for half a second: one may hang in the kernel.
+void end_orphans(const std::set<pid_t> &kept);
+
 } // namespace arhost::ring

@@ -11,6 +11,7 @@
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
@@ -117,10 +118,13 @@ void reap(int socket, std::set<pid_t> &spawned) {
 } // namespace
 
 int main() {
-    if (::fcntl(launcher_fd, F_SETFD, FD_CLOEXEC) < 0) {
+    int type = 0;
+    socklen_t size = sizeof type;
+    if (::getsockopt(launcher_fd, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_SEQPACKET) {
         std::fprintf(stderr, "arhost-launcher is started by arhost, not by hand: arhost --config FILE\n");
         return 2;
     }
+    ::fcntl(launcher_fd, F_SETFD, FD_CLOEXEC);
     ::syscall(SYS_close_range, launcher_fd + 1u, ~0u, 0u);
     // The socket tells when the host is gone, and then there is something left to do: not SIGKILL, but the signal
     // that lets one go on which somebody has stopped.
@@ -129,6 +133,7 @@ int main() {
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGHUP, SIG_IGN);
+    ::signal(SIGCHLD, SIG_DFL); // ignored, as a parent may have left it, its children's ends would be lost
     sigset_t child;
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);

@@ -15,11 +15,14 @@
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <tuple>
+#include <unistd.h>
 
 namespace arhost::supervise {
 namespace {
 
 using ring::UniqueFd;
+
+constexpr int most_tries = 5;
 
 // The launcher's next word; none: it is gone. One that somebody has stopped is made to go on: the host must not
 // stand still.
@@ -38,8 +41,14 @@ std::optional<Reply> receive_reply(int socket, pid_t launcher, std::vector<Uniqu
 
 } // namespace
 
-Launcher::Launcher(std::filesystem::path program) : program_(std::move(program)) {
+Launcher::Launcher(std::filesystem::path program) : program_(std::move(program)), not_of_workers_(ring::children()) {
+    if (::access(program_.c_str(), X_OK) != 0)
+        throw std::runtime_error(cannot_start(errno));
     ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a killed launcher leaves behind comes here
+}
+
+std::string Launcher::cannot_start(int error) const {
+    return program_.string() + " can't be started: " + std::strerror(error) + "; is it installed beside arhost?";
 }
 
 // A new program and not a fork: this process may have threads, whose locks a fork would keep for ever.
@@ -62,19 +71,21 @@ void Launcher::start() {
     ::posix_spawnattr_destroy(&attributes);
     ::posix_spawn_file_actions_destroy(&actions);
     if (error != 0)
-        throw std::runtime_error(path + " can't be started: " + std::strerror(error));
+        throw std::runtime_error(cannot_start(error));
     socket_ = std::move(host_end);
 }
 
 void Launcher::lose() {
     ::kill(pid_, SIGKILL); // should only its socket be shut
     ::waitpid(pid_, nullptr, 0);
+    std::vector<UniqueFd> fds;
+    for (Reply reply; receive_struct(socket_.get(), reply, fds);) // what it had still told
+        if (reply.kind == Reply::exited)
+            note(reply.exit);
     socket_.reset();
     is_lost_ = true;
     alive_.clear();
-    // What its workers have forked does not die with them.
-    for (int i = 0; i < 500 && ring::kill_orphans({}) > 0; ++i) // not for ever: one may hang in the kernel
-        ::usleep(1000);
+    ring::end_orphans(not_of_workers_); // what its workers have forked does not die with them
 }
 
 Launcher::~Launcher() {
@@ -93,7 +104,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());
 
-    for (int tries = 0; tries < 2; ++tries) {
+    for (int tries = 0; tries < most_tries; ++tries) {
         if (is_lost_)
             log(ARHOST_SEVERITY_WARNING, "arhost", "the launcher is gone, and all workers with it; starting another");
         if (!socket_)
@@ -121,8 +132,10 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
             lose();
             continue;
         }
-        if (reply->kind == Reply::failed || fds.size() != 1 || !fds[0])
-            throw std::runtime_error(std::string("no process can be started: ") + std::strerror(reply->error));
+        const bool has_failed = reply->kind == Reply::failed;
+        if (has_failed || fds.size() != 1 || !fds[0]) // or this process may have no more descriptors
+            throw std::runtime_error(std::string("no process can be started: ") +
+                                     std::strerror(has_failed ? reply->error : EMFILE));
         alive_.insert(reply->exit.pid);
         spawned.pid = reply->exit.pid;
         spawned.pidfd = std::move(fds[0]);
@@ -130,7 +143,8 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         spawned.doorbell = std::move(doorbell.host);
         return spawned;
     }
-    throw std::runtime_error(program_.string() + " ends as soon as it is started");
+    throw std::runtime_error("no process can be started: " + program_.string() + " was started " +
+                             std::to_string(most_tries) + " times, and ended each time");
 }
 
 void Launcher::note(const Exit &exit) {

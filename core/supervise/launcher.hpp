@@ -44,10 +44,12 @@ public:
     virtual Exit wait_exit(pid_t pid) = 0;
 };
 
-// To be used from the thread that lives longest: the launcher is its child.
+// To be used from the thread that lives longest, and one for all of a process: the launcher is that thread's child,
+// and so is what the workers of a killed one leave behind, which is ended.
 class Launcher final : public Starter {
 public:
-    // `program`: arhost-launcher, which is started together with the first worker.
+    // `program`: arhost-launcher, which is started together with the first worker. Throws std::runtime_error where it
+    // can't be executed.
     explicit Launcher(std::filesystem::path program);
     ~Launcher() override;
     Launcher(const Launcher &) = delete;
@@ -57,11 +59,13 @@ public:
     Exit wait_exit(pid_t pid) override;
 
 private:
+    std::string cannot_start(int error) const;
     void start();
     void lose(); // it is gone, and its workers with it
     void note(const Exit &exit);
 
     std::filesystem::path program_;
+    std::set<pid_t> not_of_workers_; // children of who became this program by exec
     ring::UniqueFd socket_; // none: no launcher is at work
     pid_t pid_ = 0;
     bool is_lost_ = false;  // and not yet replaced

@@ -175,7 +175,51 @@ TEST(Conform, KeepsAnEarlierReportUntilThereIsANewOne) {
     EXPECT_THAT(run.output(), HasSubstr("\"exit_status\": 0"));
 }
 
-// ---- What a plugin leaves behind, and what it says --------------------------------------------------
+TEST(Conform, WritesNoReportOverWhatItReads) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("none").string();
+    run.write("print.png", "no picture");
+    std::filesystem::create_hard_link(run.path("print.png"), run.path("other.png"));
+    for (const std::vector<std::string> &report :
+         {std::vector<std::string>{"--json", plugin}, {"--junit", rt_embree},
+          {"--html", "print.png", "--print", "1=print.png"}, {"--html", "other.png", "--reads", "print.png"}}) {
+        std::vector<std::string> arguments = {plugin, "--only", "abi.load", "--reference", rt_embree};
+        arguments.insert(arguments.end(), report.begin(), report.end());
+        EXPECT_EQ(run.run(arguments), 2) << report[1];
+        EXPECT_THAT(run.output(), HasSubstr("can't write " + report[1] + ": it is a file that this run reads"));
+    }
+    EXPECT_EQ(run.read("print.png"), "no picture");
+}
+
+TEST(Conform, IsNotWellWhereItsWordsCanNotBeWritten) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("can't write what the tests told: No space left on device"));
+}
+
+TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::signal(SIGCHLD, SIG_IGN); });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
+// ---- What a plugin gets, leaves behind, and says ---------------------------------------------------
+
+TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
+    ConformRun run;
+    run.write("secret.txt", "secret");
+    run.start({run.link_wrong("tells_descriptors").string(), "--only", "abi.create"}, [] {
+        const int secret = ::open("secret.txt", O_RDWR);
+        ::dup2(secret, STDIN_FILENO);
+        ::dup2(secret, 9);
+    });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("0 is /dev/null"));
+    EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
+}
+
+ --------------------------------------------------
 
 // The process that rt_hangs_beside_a_process has started.
 pid_t process_beside(const ConformRun &run) {

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <set>
 
 namespace arhost::test {
@@ -240,9 +241,13 @@ TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
     parts.more = std::string("mode: ") + GetParam() + "\n";
     LiveRun run(parts);
     run.start();
-    std::size_t shown = 0;
+    const auto augmented = [&] {
+        const auto lines = counted(run);
+        return static_cast<std::size_t>(std::ranges::count_if(lines, [](const auto &l) { return l.overlay != "none"; }));
+    };
+    std::size_t shown = 0; // with an overlay
     const auto wait_for_more = [&](std::size_t frames) {
-        for (shown += frames; run.running() && counted(run).size() < shown;)
+        for (shown += frames; run.running() && augmented() < shown;)
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
     };
     for (const char *plugin : {"source_synthetic", "tracker_aruco", "rt_embree"}) {

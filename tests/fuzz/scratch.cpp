@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "targets.hpp"
 
+#include <chrono>
+#include <fcntl.h>
 #include <fstream>
 #include <stdexcept>
 #include <stdlib.h>
 #include <string>
+#include <sys/file.h>
+#include <unistd.h>
 
 namespace arhost::fuzz {
 namespace {
@@ -17,9 +21,11 @@ public:
         std::string pattern =
             ((fs::exists("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path()) / "arhost-fuzz-XXXXXX")
                 .string();
+        remove_abandoned(fs::path(pattern).parent_path());
         if (!::mkdtemp(pattern.data()))
             throw std::runtime_error("mkdtemp " + pattern);
         path = pattern;
+        lock_ = locked(path);
     }
     ~Folder() {
         std::error_code ignored;
@@ -28,6 +34,29 @@ public:
     Folder(const Folder &) = delete;
     Folder &operator=(const Folder &) = delete;
     fs::path path;
+
+private:
+    // For as long as this process lives, however it ends; -1: somebody else's.
+    static int locked(const fs::path &folder) {
+        const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
+            return fd;
+        ::close(fd);
+        return -1;
+    }
+    // Of processes that a crash or a signal has ended. A folder that is just being made may lack its lock.
+    static void remove_abandoned(const fs::path &of) {
+        std::error_code ignored;
+        for (const auto &entry : fs::directory_iterator(of, ignored))
+            if (entry.path().filename().string().starts_with("arhost-fuzz-") &&
+                fs::last_write_time(entry, ignored) < fs::file_time_type::clock::now() - std::chrono::minutes(1))
+                if (const int fd = locked(entry); fd >= 0) {
+                    fs::remove_all(entry, ignored);
+                    ::close(fd);
+                }
+    }
+
+    int lock_ = -1;
 };
 
 } // namespace

@@ -135,14 +135,25 @@ private:
     pid_t pid_ = 0;
 };
 
-// A configuration of the counting plugins; every frame's journey can be read off counted.txt. The deadlines are for
-// plugins that hang on purpose: no busy machine lets one that does not wait as long.
+// As kill(2), but for a process that must be there: 0, for one that is gone, would be everybody.
+inline void send_signal(pid_t pid, int signal) {
+    if (pid <= 0)
+        throw std::runtime_error("the process that a signal was meant for is gone");
+    ::kill(pid, signal);
+}
+
+// For plugins that hang on purpose: no busy machine lets one that does not wait as long.
+inline constexpr std::chrono::milliseconds counting_deadline{3000};
+
+// A configuration of the counting plugins; every frame's journey can be read off counted.txt.
 inline std::string counting(const std::string &mode, const std::string &source, const std::string &tracker,
-                            const std::string &raytracer, const std::string &more = "") {
+                            const std::string &raytracer, const std::string &more = "",
+                            std::chrono::milliseconds deadline = counting_deadline) {
+    const std::string deadline_ms = "deadline_ms: " + std::to_string(deadline.count());
     return "version: 1\nmode: " + mode + "\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
            "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}], options: {" + tracker +
-           "}, deadline_ms: 3000}\n" + "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + raytracer +
-           "}, deadline_ms: 3000}\n" + "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" +
+           "}, " + deadline_ms + "}\n" + "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + raytracer +
+           "}, " + deadline_ms + "}\n" + "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" +
            more;
 }
 inline const char *const small_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 0.5}}\n"

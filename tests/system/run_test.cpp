@@ -176,10 +176,9 @@ TEST(Run, TakesTwoSignalsInOneMomentForOne) { // timeout(1) sends to the process
     run.start();
     while (run.running() && counted(run).size() < 20)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    for (int i = 0; i < 3 && run.running(); ++i) {
-        ::kill(run.pid(), SIGTERM);
-        std::this_thread::sleep_for(std::chrono::milliseconds(3));
-    }
+    ::kill(run.pid(), SIGSTOP); // so that they come to it in one moment
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGCONT})
+        ::kill(run.pid(), signal);
     ASSERT_EQ(run.wait(), 130) << run.output();
     EXPECT_TRUE(run.exists("counted.txt.done"));
     expect_every_frame_augmented(run, counted(run).size());
@@ -192,7 +191,7 @@ TEST(Run, ASecondCtrlCALittleLaterEndsItAtOnce) {
     while (run.running() && counted(run).size() < 20)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
     ::kill(run.pid(), SIGINT);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    std::this_thread::sleep_for(std::chrono::milliseconds(3000));
     ASSERT_TRUE(run.running()) << "it was to wait for the output";
     ::kill(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(std::chrono::seconds(5)), 130) << run.output();
@@ -229,6 +228,22 @@ TEST(Run, NeedsNoStandardStreams) {
             EXPECT_EQ(lines[i].overlay, i == 10 || i == 20 ? "none" : std::to_string(i)) << c.name;
         EXPECT_EQ(run.stats()["frames"]["composited"], 30) << c.name;
     }
+}
+
+TEST(Run, EndsWhereWhoeverStartedItIgnoresTheEndsOfChildren) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml"}, [] { ::signal(SIGCHLD, SIG_IGN); });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
+TEST(Run, LeavesAFileBesideItsStatisticsAlone) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    run.write("stats.json.tmp", "somebody's");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(run.read("stats.json.tmp"), "somebody's");
+    EXPECT_EQ(run.stats()["frames"]["in"], 5);
 }
 
 TEST(Run, WritesItsStatisticsToSpecialFilesToo) {

@@ -285,7 +285,7 @@ TEST(Sandbox, DescriptorsAreLeftForOthers) {
     run.start_it();
     while (run.running() && counted(run, "out/counted.txt").size() < attacked + 5)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    ::kill(run.worker("sink_counter"), SIGKILL);
+    send_signal(run.worker("sink_counter"), SIGKILL);
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(": stopped"));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));

@@ -40,7 +40,7 @@ bool is_gone(pid_t pid) {
         const std::size_t end_of_name = text.rfind(')');
         return end_of_name != std::string::npos && text.substr(end_of_name).compare(0, 3, ") Z") != 0;
     };
-    for (int i = 0; i < 1000 && lives(); ++i)
+    for (int i = 0; i < 10'000 && lives(); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
     return !lives();
 }
@@ -80,15 +80,14 @@ TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 40);
-    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within 3000 ms"));
+    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within " + std::to_string(counting_deadline.count()) + " ms"));
     EXPECT_EQ(counted(run)[20].overlay, "none");
 }
 
 TEST(Supervision, AHungPluginThatIgnoresSigabrtIsKilled) {
     ArhostRun run(counting("lockstep", "frames: 30", "hang_at: 20, ignore_abort: true", ""));
     run.write("scene.yaml", small_scene);
-    run.start({"--config", "run.yaml", "--set", "tracker.deadline_ms=1000"});
-    ASSERT_EQ(run.wait(std::chrono::seconds(20)), 0) << run.output();
+    ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(counted(run)[20].overlay, "none");
     const std::string how = run.stats()["crashes"][0]["how"];
@@ -112,10 +111,10 @@ TEST(Supervision, ASourceThatIsKilledWhileItStartsAgainGoesOn) {
     wait_for_frames(run, 20);
     for (int hits = 0; hits < 3 && run.running();) {
         if (const pid_t source = run.worker("source_counter"))
-            ::kill(source, SIGKILL);
+            send_signal(source, SIGKILL);
         for (int tries = 0; tries < 10'000 && !run.worker("source_counter"); ++tries)
             if (const pid_t starting = run.worker("arhost-worker")) {
-                ::kill(starting, SIGKILL); // it has not even said whether it can go on in the middle
+                send_signal(starting, SIGKILL); // it has not even said whether it can go on in the middle
                 ++hits;
                 break;
             }
@@ -184,11 +183,11 @@ TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
         const std::vector<pid_t> children = forked_children(run);
         ASSERT_EQ(children.size(), 2u);
         if (end == End::worker_dies)
-            ::kill(run.worker("tracker_counter"), SIGKILL);
+            send_signal(run.worker("tracker_counter"), SIGKILL);
         else if (end == End::launcher_dies)
-            ::kill(run.launcher(), SIGKILL);
+            send_signal(run.launcher(), SIGKILL);
         else
-            ::kill(run.pid(), end == End::run_stops ? SIGTERM : SIGKILL);
+            send_signal(run.pid(), end == End::run_stops ? SIGTERM : SIGKILL);
         for (const pid_t child : children) {
             EXPECT_TRUE(is_gone(child)) << static_cast<int>(end);
             ::kill(child, SIGKILL);
@@ -213,9 +212,9 @@ TEST(Supervision, NothingIsTakenForHungBecauseTheHostWasStopped) {
     run.start();
     for (const std::size_t frame : {20, 60}) {
         wait_for_frames(run, frame);
-        ::kill(run.pid(), SIGSTOP);
-        std::this_thread::sleep_for(std::chrono::milliseconds(800));
-        ::kill(run.pid(), SIGCONT);
+        send_signal(run.pid(), SIGSTOP);
+        std::this_thread::sleep_for(counting_deadline + std::chrono::milliseconds(500));
+        send_signal(run.pid(), SIGCONT);
     }
     ASSERT_EQ(run.wait(), 0) << run.output();
     expect_all_frames_in_order(run, 120);
@@ -231,13 +230,13 @@ TEST(Supervision, NothingIsTakenForHungBecauseAllWereStopped) {
     wait_for_frames(run, 20);
     const std::vector<pid_t> workers = run.workers();
     for (const pid_t worker : workers)
-        ::kill(worker, SIGSTOP);
-    ::kill(run.pid(), SIGSTOP);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1200));
-    ::kill(run.pid(), SIGCONT);
+        send_signal(worker, SIGSTOP);
+    send_signal(run.pid(), SIGSTOP);
+    std::this_thread::sleep_for(counting_deadline + std::chrono::milliseconds(500));
+    send_signal(run.pid(), SIGCONT);
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     for (const pid_t worker : workers)
-        ::kill(worker, SIGCONT);
+        send_signal(worker, SIGCONT);
     ASSERT_EQ(run.wait(), 0) << run.output();
     expect_all_frames_in_order(run, 100);
     EXPECT_THAT(run.output(), testing::Not(HasSubstr("hung")));
@@ -296,7 +295,7 @@ TEST(Supervision, AnyWorkerMayBeKilledAndTheResultIsTheSame) {
         wait_for_frames(run, at += 60);
         const pid_t worker = run.worker(plugin);
         ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
-        ::kill(worker, SIGKILL);
+        send_signal(worker, SIGKILL);
     }
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
@@ -316,11 +315,11 @@ TEST(Supervision, SurvivesKillsAndStopsAtRandom) {
     while (run.running()) {
         if (const pid_t worker = run.worker(plugins[random() % 4])) {
             if (random() % 4 == 0) {
-                ::kill(worker, SIGSTOP);
+                send_signal(worker, SIGSTOP);
                 std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));
-                ::kill(worker, SIGCONT);
+                send_signal(worker, SIGCONT);
             } else {
-                ::kill(worker, SIGKILL);
+                send_signal(worker, SIGKILL);
             }
             ++faults;
         }
@@ -367,11 +366,11 @@ TEST(Supervision, ASourceWhoseEveryFrameIsOfTheFarFutureIsGivenUp) {
 }
 
 TEST(Supervision, ASourceThatDiesAtTheLastFramesThatAreAskedForGivesThemAll) {
-    ArhostRun run(counting("lockstep", "frames: 100, delay_ms: 20", "", ""));
+    ArhostRun run(counting("lockstep", "frames: 100, hold_at: 12", "", ""));
     run.write("scene.yaml", small_scene);
     run.start({"--config", "run.yaml", "--frames", "14"});
     wait_for_frames(run, 12);
-    ::kill(run.worker("source_counter"), SIGKILL);
+    send_signal(run.worker("source_counter"), SIGKILL);
     ASSERT_EQ(run.wait(), 0) << run.output();
     expect_all_frames_in_order(run, 14);
 }
@@ -396,9 +395,9 @@ TEST(Supervision, AWorkerThatDiesAfterItHasFinishedIsLeftAtThat) {
 }
 
 TEST(Supervision, AStartMayTakeLongerThanItsDeadlineAsLongAsItTellsProgress) {
-    ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 20, start_step_ms: 100", ""));
+    ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 50, start_step_ms: 100", ""));
     run.write("scene.yaml", small_scene);
-    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.start_deadline_ms=1000"}), 0) << run.output();
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.start_deadline_ms=4000"}), 0) << run.output();
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
     expect_all_frames_in_order(run, 5);
 }
@@ -425,14 +424,14 @@ TEST(Supervision, AnOutputThatHangsInItsStopIsEndedAndTheOthersAreFinished) {
 }
 
 TEST(Supervision, AStoppedLauncherIsMadeToGoOn) {
-    ArhostRun run(counting("lockstep", "frames: 120, delay_ms: 5", "", ""));
+    ArhostRun run(counting("lockstep", "frames: 600, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
     run.start();
     wait_for_frames(run, 20);
-    ::kill(run.launcher(), SIGSTOP);
-    ::kill(run.worker("tracker_counter"), SIGKILL);
+    send_signal(run.launcher(), SIGSTOP);
+    send_signal(run.worker("tracker_counter"), SIGKILL);
     ASSERT_EQ(run.wait(std::chrono::seconds(20)), 0) << run.output();
-    expect_all_frames_in_order(run, 120);
+    expect_all_frames_in_order(run, 600);
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
 }
 
@@ -442,22 +441,22 @@ TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
     run.start();
     while (run.running() && run.worker("tracker_counter") == 0)
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    ::kill(run.launcher(), SIGSTOP);
-    ::kill(run.pid(), SIGINT);
+    send_signal(run.launcher(), SIGSTOP);
+    send_signal(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
 }
 
 // Its workers die with it, the output in the midst of a file; all start again under another.
 TEST(Supervision, AKilledLauncherIsReplacedAsOftenAsItTakes) {
-    ArhostRun run(counting("lockstep", "frames: 240, delay_ms: 5", "", ""));
+    ArhostRun run(counting("lockstep", "frames: 700, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
     run.start();
     for (const std::size_t frames : {20, 60, 100}) {
         wait_for_frames(run, frames);
-        ::kill(run.launcher(), SIGKILL);
+        send_signal(run.launcher(), SIGKILL);
     }
     ASSERT_EQ(run.wait(std::chrono::seconds(30)), 0) << run.output();
-    expect_all_frames_in_order(run, 240);
+    expect_all_frames_in_order(run, 700);
     EXPECT_TRUE(run.exists("counted.txt.done"));
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 3);
     EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher is gone, and all workers with it; starting"));
@@ -476,8 +475,8 @@ TEST(Supervision, AHostThatIsKilledLeavesNothingThoughAllIsStopped) {
     all.push_back(run.launcher());
     ASSERT_GE(all.size(), 7u);
     for (auto pid = all.rbegin(); pid != all.rend(); ++pid)
-        ::kill(*pid, SIGSTOP);
-    ::kill(run.pid(), SIGKILL);
+        send_signal(*pid, SIGSTOP);
+    send_signal(run.pid(), SIGKILL);
     for (const pid_t pid : all) {
         EXPECT_TRUE(is_gone(pid)) << pid;
         ::kill(pid, SIGKILL);

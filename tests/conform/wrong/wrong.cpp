@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -203,6 +204,12 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         start_a_process();
         hang();
     }
+    if (has("tells_descriptors"))
+        for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+            std::error_code closed; // the folder's own
+            ::dprintf(STDERR_FILENO, "%s is %s\n", entry.path().filename().c_str(),
+                      std::filesystem::read_symlink(entry, closed).c_str());
+        }
     if (has("writes_to_descriptor_3"))
         (void)!::write(3, "{}\n", 3);
     if (has("floods_descriptor_3"))

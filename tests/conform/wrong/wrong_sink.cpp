@@ -142,7 +142,7 @@ public:
         waiting_.emplace_back(record.sequence, pixels, line);
         if (!(has("writes_frames_in_pairs") && waiting_.size() < 2) && !has("keeps_all_to_its_end"))
             write_waiting();
-        is_late_ = has("drops_frames_on_a_slow_disk") &&
+        is_late_ = has("drops_frames_on_a_slow_disk") && path_.find("/slow/") != std::string::npos &&
                    std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(80);
         return ARHOST_OK;
     }

@@ -36,8 +36,7 @@ TEST(InProcess, LeavesTheSameBytesAsProcesses) {
 }
 
 TEST(InProcess, WaitsAsLongAsAFrameTakes) {
-    ArhostRun run(counting("lockstep", "frames: 2", "", "delay_ms: 300"));
-    run.write("run.yaml", run.read("run.yaml").replace(run.read("run.yaml").rfind("700"), 3, "100"));
+    ArhostRun run(counting("lockstep", "frames: 2", "", "delay_ms: 300", "", std::chrono::milliseconds(100)));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run_in_process(run), 0) << run.read("said.txt");
     EXPECT_EQ(run.stats()["frames"]["augmented"], 2);

@@ -88,18 +88,34 @@ TEST(Launcher, IsReplacedWhenItIsKilledAsOftenAsItTakes) {
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(last.pid).wait_status), 0);
 }
 
+TEST(Launcher, LeavesAloneWhatIsNoWorkersWhenItIsReplaced) {
+    const pid_t other = ::fork(); // as of a shell that has become this program by exec
+    if (other == 0)
+        for (;;)
+            ::pause();
+    Launcher launcher(program);
+    const Spawned first = launcher.spawn("/usr/bin/yes", no_log);
+    ::kill(parent_of(first.pid), SIGKILL);
+    wait_dead(first);
+    launcher.spawn("/usr/bin/yes", no_log);
+    EXPECT_EQ(::waitpid(other, nullptr, WNOHANG), 0) << "it was killed";
+    ::kill(other, SIGKILL);
+    ::waitpid(other, nullptr, 0);
+}
+
 TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
     const auto reason = [](const char *wrong) -> std::string {
-        Launcher launcher(wrong);
         try {
+            Launcher launcher(wrong);
             launcher.spawn("/bin/true", no_log);
         } catch (const std::runtime_error &error) {
             return error.what();
         }
         return "";
     };
-    EXPECT_EQ(reason("/no/such/program"), "/no/such/program can't be started: No such file or directory");
-    EXPECT_EQ(reason("/bin/true"), "/bin/true ends as soon as it is started");
+    EXPECT_EQ(reason("/no/such/program"),
+              "/no/such/program can't be started: No such file or directory; is it installed beside arhost?");
+    EXPECT_EQ(reason("/bin/true"), "no process can be started: /bin/true was started 5 times, and ended each time");
 }
 
 // What PR_SET_PDEATHSIG alone would not: it goes on, and has the workers' own processes ended too.

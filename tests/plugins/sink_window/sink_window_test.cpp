@@ -89,9 +89,9 @@ protected:
         keep_libraries();
         return *sink_;
     }
-    // Serves the window until `done` or for two seconds.
+    // Serves the window until `done` or for 20 seconds.
     bool becomes(const std::function<bool()> &done) {
-        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
         while (std::chrono::steady_clock::now() < end) {
             if (done())
                 return true;

@@ -16,7 +16,7 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int64_t crash_at, hang_at, error_at, answer;
+    int64_t crash_at, hang_at, hang_until, error_at, answer;
     double delay_ms;
     int64_t writes_later;
     uint8_t *last; /* image */
@@ -31,6 +31,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     misbehave_install();
     self->crash_at = arhost_find_option(options, option_count, "crash_at")->integer;
     self->hang_at = arhost_find_option(options, option_count, "hang_at")->integer;
+    self->hang_until = arhost_find_option(options, option_count, "hang_until")->integer;
     self->error_at = arhost_find_option(options, option_count, "error_at")->integer;
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
@@ -68,7 +69,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
         signal(SIGSEGV, SIG_DFL);
         raise(SIGSEGV);
     }
-    while (number == self->hang_at)
+    while (number == self->hang_at || (number > self->hang_at && number < self->hang_until))
         pause();
     if (misbehave_if_asked() || number == self->error_at)
         return ARHOST_ERROR_INTERNAL;
@@ -100,6 +101,8 @@ static void stop(arhost_instance *self) {
 
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Dies at this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_until", "-1", 0, 0, NULL,
+     "Nor from those after it that are before this one."},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL,
      "Never returns from this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,

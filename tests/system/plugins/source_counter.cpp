@@ -17,7 +17,7 @@ public:
           width_(static_cast<std::uint32_t>(options.integer("width"))),
           height_(static_cast<std::uint32_t>(options.integer("height"))),
           writes_later_(options.boolean("writes_later")), ahead_ms_(options.real("ahead_ms")),
-          ahead_at_(options.integer("ahead_at")) {}
+          ahead_at_(options.integer("ahead_at")), hold_at_(options.integer("hold_at")) {}
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         fps_ = setup.fps > 0 ? setup.fps : 30;
@@ -45,6 +45,8 @@ public:
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         if (buffer.sequence >= frames_)
             return ARHOST_END;
+        while (first_ == 0 && static_cast<std::int64_t>(buffer.sequence) == hold_at_)
+            ::pause();
         faults_.at(buffer.sequence);
         if (paced_)
             std::this_thread::sleep_until(
@@ -80,7 +82,7 @@ private:
     bool writes_later_;
     std::uint8_t *last_ = nullptr; // the frame before
     double ahead_ms_;
-    std::int64_t ahead_at_;
+    std::int64_t ahead_at_, hold_at_;
     double fps_ = 30;
     bool paced_ = false;
     std::chrono::steady_clock::time_point begin_;
@@ -93,6 +95,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_BOOL, "writes_later", "false", "Writes into the frame before, too"),
     option(ARHOST_OPTION_REAL, "ahead_ms", "0", "Captures so far in the future; 0: tells times of the media"),
     option(ARHOST_OPTION_INTEGER, "ahead_at", "-1", "Only at this frame of its first life; -1: always"),
+    option(ARHOST_OPTION_INTEGER, "hold_at", "-1", "Does not return from this frame of its first life; -1: never"),
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),     ARHOST_KIND_SOURCE, "source_counter",   "Counter", "0.1.0", "arhost", "Apache-2.0",
