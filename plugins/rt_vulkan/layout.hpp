@@ -122,7 +122,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t waiting_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_slopes;
+    std::uint32_t ray_dimensions, has_slopes, has_textures;
 };
 
 } // namespace rt_vulkan

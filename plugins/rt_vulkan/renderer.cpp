@@ -304,7 +304,8 @@ void Renderer::make_pipeline(std::span<const std::uint32_t> shader, std::uint32_
                                    scene_.has_catchers(),
                                    scene_.has_holes(),
                                    ray_dimensions_,
-                                   settings_.samples > 1 || settings_.accumulate};
+                                   settings_.samples > 1 || settings_.accumulate,
+                                   scene_.has_textures()};
     std::array<VkSpecializationMapEntry, sizeof constants / 4> entries;
     for (std::uint32_t i = 0; i < entries.size(); ++i)
         entries[i] = {i, 4 * i, 4};

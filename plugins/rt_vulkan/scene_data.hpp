@@ -39,6 +39,7 @@ public:
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }
+    bool has_textures() const { return !textures_.empty(); } // the environment among them
 
 private:
     // A geometry's place in the arrays.

@@ -32,7 +32,7 @@ vec4 traced(vec3 direction, Random random) {
             light += path.throughput * environment_light(ray.direction);
         }
         if (is_hit) {
-            Surface s = surface_at(ray, hit);
+            Surface s = surface_at(ray, hit, true);
             vec3 ahead = normalize(ray.direction);
             uint material = objects[hit.object].material, model = materials[material].model;
             bool catches = stage == CATCHER_STAGE, is_lit = model != MIRROR && model != GLASS;

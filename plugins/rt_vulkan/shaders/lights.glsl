@@ -69,7 +69,7 @@ Passage passage(Incidence arriving, Surface s) {
             break;
         if (i > 0) {
             way.is_tinted = true;
-            Surface glass = surface_at(ray, hit);
+            Surface glass = surface_at(ray, hit, false);
             way.tint *= glass_shadow(materials[objects[hit.object].material].shadow_attenuation,
                                      abs(dot(glass.normal, arriving.direction)));
             if (!(largest(way.tint) > 1e-3))

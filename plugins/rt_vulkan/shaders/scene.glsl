@@ -24,6 +24,7 @@ layout(constant_id = 2) const bool has_catchers = true;
 layout(constant_id = 3) const bool has_holes = true; // any object
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_slopes = false;
+layout(constant_id = 6) const bool has_textures = true; // any material
 
 struct Object {
     mat4x3 object_from_world;

@@ -52,7 +52,8 @@ vec3 bent(Hit hit, vec3 facet, vec3 normal) {
                        textured(hit, materials[objects[hit.object].material].normal_texture));
 }
 
-Surface surface_at(Ray ray, Hit hit) {
+// `bends`: where normal textures may count.
+Surface surface_at(Ray ray, Hit hit, bool bends) {
     uint object = hit.object, material = objects[object].material;
     precise vec3 ahead = ray.direction * hit.way;
     vec3 geometric = hit.facet, normal = hit.facet;
@@ -62,7 +63,7 @@ Surface surface_at(Ray ray, Hit hit) {
         geometric = objects[object].normal_transform * geometric;
         normal = objects[object].normal_transform * normal;
     }
-    if (materials[material].model == METALLIC_ROUGHNESS && materials[material].normal_texture != NONE &&
+    if (has_textures && bends && materials[material].model == METALLIC_ROUGHNESS && materials[material].normal_texture != NONE &&
         objects[object].first_texcoord != NONE)
         normal = bent(hit, geometric, normal);
 
@@ -84,34 +85,43 @@ Surface surface_at(Ray ray, Hit hit) {
 // Adds the material's colours; the material is not a mirror, nor glass.
 void shaded(inout Surface s, Hit hit) {
     uint material = objects[hit.object].material, model = materials[material].model;
+    bool is_rough = model == METALLIC_ROUGHNESS;
     s.ambient = materials[material].ambient;
     s.diffuse = materials[material].diffuse;
-    if (materials[material].colour_texture != NONE) {
-        vec3 colour = textured(hit, materials[material].colour_texture);
-        s.ambient *= colour;
-        s.diffuse *= colour;
+    s.emission = materials[material].emission;
+    float metallic = materials[material].metallic, roughness = materials[material].roughness;
+    if (has_textures) {
+        // One loop, since sampling is long.
+        uvec3 numbers = uvec3(materials[material].colour_texture, materials[material].metallic_roughness_texture,
+                              materials[material].emission_texture);
+        if (!is_rough)
+            numbers.y = NONE;
+        if (!(s.emission.x + s.emission.y + s.emission.z > 0.0))
+            numbers.z = NONE;
+        for (int i = 0; i < 3; ++i) {
+            if (numbers[i] == NONE)
+                continue;
+            vec3 factors = textured(hit, numbers[i]);
+            if (i == 0) {
+                s.ambient *= factors;
+                s.diffuse *= factors;
+            } else if (i == 1) {
+                metallic *= factors.z;
+                roughness *= factors.y;
+            } else {
+                s.emission *= factors;
+            }
+        }
     }
     if (model == SPECULAR || model == METAL) {
         s.specular = materials[material].specular;
         s.exponent = materials[material].exponent;
     }
-    if (model == METALLIC_ROUGHNESS) {
-        float metallic = materials[material].metallic, roughness = materials[material].roughness;
-        if (materials[material].metallic_roughness_texture != NONE) {
-            vec3 factors = textured(hit, materials[material].metallic_roughness_texture);
-            metallic *= factors.z;
-            roughness *= factors.y;
-        }
+    if (is_rough) {
         s.specular = metallic_reflectance(s.diffuse, metallic);
         s.alpha = ggx_alpha(roughness);
         s.is_rough = true;
         s.ambient = metallic_diffuse(s.ambient, metallic);
         s.diffuse = metallic_diffuse(s.diffuse, metallic);
-    }
-    vec3 emission = materials[material].emission;
-    if (emission.x + emission.y + emission.z > 0.0) {
-        if (materials[material].emission_texture != NONE)
-            emission *= textured(hit, materials[material].emission_texture);
-        s.emission = emission;
     }
 }

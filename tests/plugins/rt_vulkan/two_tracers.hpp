@@ -25,11 +25,13 @@ struct Likeness {
     int pixels = 0, alphas_off = 0;
     int alphas_off_inside = 0; // where the reference has one alpha class for a pixel round
     int inside = 0;            // pixels of alpha 255 amid others, which PSNR is of
+    int colours_off = 0;       // of those inside, by more than 2 codes
     double psnr = 0;           // dB; infinite where they are the same
 };
 inline std::ostream &operator<<(std::ostream &stream, const Likeness &like) {
     return stream << like.pixels << " px, " << like.alphas_off << " alphas off (" << like.alphas_off_inside
-                  << " of them inside), " << like.psnr << " dB over " << like.inside << " px inside";
+                  << " of them inside), " << like.psnr << " dB over " << like.inside << " px inside, "
+                  << like.colours_off << " colours off";
 }
 
 // Nothing is inside at the picture's border.
@@ -51,8 +53,12 @@ inline Likeness likeness(const Picture &got, const Picture &reference) {
             if (!is_inside || b[3] != 255 || a[3] != 255)
                 continue;
             ++like.inside;
-            for (std::size_t i = 0; i < 3; ++i)
+            int most = 0;
+            for (std::size_t i = 0; i < 3; ++i) {
                 squares += (a[i] - b[i]) * (a[i] - b[i]);
+                most = std::max(most, std::abs(a[i] - b[i]));
+            }
+            like.colours_off += most > 2;
         }
     like.psnr = squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * like.inside / squares)
                             : std::numeric_limits<double>::infinity();
