@@ -111,7 +111,8 @@ struct Pipe {
                                           {pipe, result_fd},
                                           {page, call_page_fd}};
     std::array<int, std::size(places)> high;
-    std::ranges::transform(places, high.begin(), [](auto place) { return ::fcntl(place.first, F_DUPFD_CLOEXEC, 10); });
+    std::ranges::transform(places, high.begin(),
+                           [](auto place) { return ::fcntl(place.first, F_DUPFD_CLOEXEC, 10); });
     for (std::size_t i = 0; i < high.size(); ++i)
         if (high[i] < 0 || ::dup2(high[i], places[i].second) < 0)
             ::_exit(127);
@@ -303,7 +304,7 @@ int wait(const std::list<Child> &running, int signals) {
     for (const Child &child : running)
         for (const int fd : child.fds())
             fds.push_back({fd, POLLIN, 0});
-    ::poll(fds.data(), fds.size(), 2);          // an end of a process closes no pipe that its children hold
+    ::poll(fds.data(), fds.size(), 2); // an end of a process closes no pipe that its children hold
     signalfd_siginfo taken{};
     if (fds.front().revents != 0 && ::read(signals, &taken, sizeof taken) == sizeof taken)
         return static_cast<int>(taken.ssi_signo);

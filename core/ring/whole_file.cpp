@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 
 // Which of this process's streams the file is; -1: neither.
 int standard_stream(const fs::path &file) {
-    struct stat there {}, stream {};
+    struct stat there {
+    }, stream{};
     for (const int fd : {STDOUT_FILENO, STDERR_FILENO})
         if (::stat(file.c_str(), &there) == 0 && ::fstat(fd, &stream) == 0 && there.st_dev == stream.st_dev &&
             there.st_ino == stream.st_ino)

@@ -66,7 +66,7 @@ private:
 
     std::filesystem::path program_;
     std::set<pid_t> not_of_workers_; // children of who became this program by exec
-    ring::UniqueFd socket_; // none: no launcher is at work
+    ring::UniqueFd socket_;          // none: no launcher is at work
     pid_t pid_ = 0;
     bool is_lost_ = false;  // and not yet replaced
     std::set<pid_t> alive_; // its children

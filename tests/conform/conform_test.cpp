@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <thread>
 
@@ -180,9 +181,10 @@ TEST(Conform, WritesNoReportOverWhatItReads) {
     const std::string plugin = run.link_wrong("none").string();
     run.write("print.png", "no picture");
     std::filesystem::create_hard_link(run.path("print.png"), run.path("other.png"));
-    for (const std::vector<std::string> &report :
-         {std::vector<std::string>{"--json", plugin}, {"--junit", rt_embree},
-          {"--html", "print.png", "--print", "1=print.png"}, {"--html", "other.png", "--reads", "print.png"}}) {
+    for (const std::vector<std::string> &report : {std::vector<std::string>{"--json", plugin},
+                                                   {"--junit", rt_embree},
+                                                   {"--html", "print.png", "--print", "1=print.png"},
+                                                   {"--html", "other.png", "--reads", "print.png"}}) {
         std::vector<std::string> arguments = {plugin, "--only", "abi.load", "--reference", rt_embree};
         arguments.insert(arguments.end(), report.begin(), report.end());
         EXPECT_EQ(run.run(arguments), 2) << report[1];
@@ -219,10 +221,12 @@ TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
 }
 
- --------------------------------------------------
+-- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- --
 
-// The process that rt_hangs_beside_a_process has started.
-pid_t process_beside(const ConformRun &run) {
+                                                                        // The process that rt_hangs_beside_a_process
+                                                                        // has started.
+                                                                        pid_t
+                                                                        process_beside(const ConformRun &run) {
     const std::string before = "process ";
     for (int i = 0; i < 5000; ++i) {
         const std::string output = run.output();

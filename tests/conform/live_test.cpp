@@ -243,7 +243,8 @@ TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
     run.start();
     const auto augmented = [&] {
         const auto lines = counted(run);
-        return static_cast<std::size_t>(std::ranges::count_if(lines, [](const auto &l) { return l.overlay != "none"; }));
+        return static_cast<std::size_t>(
+            std::ranges::count_if(lines, [](const auto &l) { return l.overlay != "none"; }));
     };
     std::size_t shown = 0; // with an overlay
     const auto wait_for_more = [&](std::size_t frames) {

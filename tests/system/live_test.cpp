@@ -25,7 +25,9 @@ void expect_own_overlays_in_order(const std::vector<CountedLine> &lines) {
     }
 }
 
-bool is_plain(const CountedLine &line) { return line.overlay == "none"; }
+bool is_plain(const CountedLine &line) {
+    return line.overlay == "none";
+}
 
 std::uint64_t dropped(const nlohmann::json &stats) { // at all stages together
     std::uint64_t sum = 0;
@@ -47,7 +49,7 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
     // 300 ms a frame at 30 fps: eight of nine frames are dropped, however fast the machine is.
     EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
     EXPECT_EQ(dropped(stats) + lines.size(), 120u) << "each frame is shown or counted where it was dropped\n"
-                                                  << stats.dump(1);
+                                                   << stats.dump(1);
     for (const auto &line : lines)
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
@@ -84,7 +86,8 @@ TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
 
 TEST(Live, TheVideoGoesOnWhileABackendHangs) {
     // In the first of ten frames that reaches it; by the end of its deadline they are past.
-    ArhostRun run(counting("live", "frames: 120", "", "hang_at: 20, hang_until: 30", "live: {max_latency_ms: 150}\n"));
+    ArhostRun run(
+        counting("live", "frames: 120", "", "hang_at: 20, hang_until: 30", "live: {max_latency_ms: 150}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.deadline_ms=700"}), 0) << run.output();
     const auto lines = counted(run);

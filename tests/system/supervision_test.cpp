@@ -80,7 +80,8 @@ TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 40);
-    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within " + std::to_string(counting_deadline.count()) + " ms"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("hung: no answer within " + std::to_string(counting_deadline.count()) + " ms"));
     EXPECT_EQ(counted(run)[20].overlay, "none");
 }
 
