@@ -53,6 +53,8 @@ std::string place(Call call, const Test &test) {
         return " in stop";
     case Call::destroy:
         return " in destroy";
+    case Call::devices:
+        return " while it listed its devices";
     }
     return " in an unknown call";
 }

@@ -262,6 +262,28 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
     return stopped_by_signal ? interrupted : success;
 }
 
+// What `arhost plugins --devices` prints below a plugin; nothing where it tells of no devices.
+std::vector<std::string> lines_of(const DevicesResult &result) {
+    if (const auto *reason = std::get_if<std::string>(&result))
+        return {"its devices can't be listed: " + *reason};
+    const auto &list = std::get<std::optional<ring::DeviceList>>(result);
+    if (!list)
+        return {};
+    if (list->devices.empty())
+        return {"no device that it could run on"};
+    std::vector<std::string> lines;
+    for (const ring::DeviceDescription &device : list->devices) {
+        lines.push_back(fmt::format("device {}: {} ({}{}{}){}", device.index, device.name,
+                                    ring::device_kind_text(device.kind), device.uuid.empty() ? "" : ", ", device.uuid,
+                                    device.is_default ? ", the default" : ""));
+        if (!device.abilities.empty())
+            lines.push_back("    " + device.abilities);
+    }
+    if (list->left_out > 0)
+        lines.push_back(fmt::format("and {} more", list->left_out));
+    return lines;
+}
+
 } // namespace
 
 fs::path own_prefix() {
@@ -319,13 +341,13 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
     return success;
 }
 
-int list_plugins(bool with_options, const std::vector<fs::path> &reads, bool verbose, supervise::Starter &launcher) {
-    Console console(verbose);
+int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher) {
+    Console console(arguments.verbose);
     ring::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
     const std::vector<fs::path> files = config::PluginPath({}, built_in_plugins()).all();
     sandbox::Policy policy;
-    for (const fs::path &path : reads)
+    for (const fs::path &path : plugins.reads)
         policy.readable.push_back(fs::absolute(path));
     int status = success;
     std::string level;
@@ -343,7 +365,14 @@ int list_plugins(bool with_options, const std::vector<fs::path> &reads, bool ver
         print(fmt::format("{:<18} {}", "", plugin.description));
         for (const std::string &need : plugin.needs)
             print(fmt::format("{:<18} needs 'allow: [{}]'", "", need));
-        if (!with_options)
+        if (plugins.with_devices) {
+            const DevicesResult devices = list_devices(context, file, policy, plugin.needs);
+            for (const std::string &line : lines_of(devices))
+                print(fmt::format("{:<18} {}", "", line));
+            if (std::holds_alternative<std::string>(devices))
+                status = run_failed;
+        }
+        if (!plugins.with_options)
             continue;
         for (const ring::OptionDeclaration &option : plugin.options) {
             const std::string standard =

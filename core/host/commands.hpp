@@ -34,11 +34,17 @@ struct ReplayArguments {
     bool with_pipeline = false;
 };
 
+// `arhost plugins`.
+struct PluginsArguments {
+    bool with_options = false;
+    bool with_devices = false; // which takes as long as drivers take to load
+    std::vector<std::filesystem::path> reads;
+};
+
 int run(const Arguments &arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
 int check(const Arguments &arguments, supervise::Starter &launcher);
-int list_plugins(bool with_options, const std::vector<std::filesystem::path> &reads, bool verbose,
-                 supervise::Starter &launcher);
+int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
 int print_schema(bool markdown);
 // Becomes arhost-conform, which lies beside this program: the host itself opens no plugin.
 int conform(std::vector<std::string> arguments);

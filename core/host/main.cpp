@@ -105,11 +105,13 @@ int main(int argc, char **argv) {
     check_command->add_option("FILE", arguments.file, "The configuration")->required();
     add_configuration_options(*check_command);
 
-    bool with_options = false;
+    PluginsArguments plugins_arguments;
     CLI::App *plugins_command = app.add_subcommand("plugins", "List the plugins, or why one can't be used");
-    plugins_command->add_flag("--options", with_options, "With their options");
-    std::vector<std::filesystem::path> reads;
-    plugins_command->add_option("--reads", reads, "A folder where libraries of theirs lie (again for more)")
+    plugins_command->add_flag("--options", plugins_arguments.with_options, "With their options");
+    plugins_command->add_flag("--devices", plugins_arguments.with_devices,
+                              "With the devices that they could run on; drivers may take some time to load");
+    plugins_command
+        ->add_option("--reads", plugins_arguments.reads, "A folder where libraries of theirs lie (again for more)")
         ->check(CLI::ExistingPath)
         ->type_name("FOLDER")
         ->allow_extra_args(false);
@@ -152,7 +154,7 @@ int main(int argc, char **argv) {
         if (*check_command)
             return check(arguments, launcher);
         if (*plugins_command)
-            return list_plugins(with_options, reads, arguments.verbose, launcher);
+            return list_plugins(arguments, plugins_arguments, launcher);
         if (arguments.file.empty()) {
             std::fputs(app.help().c_str(), stderr);
             return bad_configuration;

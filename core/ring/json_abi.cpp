@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ring/json_abi.hpp"
 
+#include "ring/text.hpp"
+
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 namespace arhost::ring {
@@ -18,6 +21,13 @@ std::string text_of(const Json &json, const char *key) {
         throw std::runtime_error(std::string("the descriptor's '") + key + "' has " + std::to_string(text.size()) +
                                  " bytes, and " + std::to_string(max_text_size) + " are the most");
     return text;
+}
+
+// The worker's side of max_device_text_size. Of an endless text no more is read than decides where it is cut.
+std::string device_text(const char *text) {
+    constexpr std::size_t longest_character = 4;
+    return text ? printable({text, ::strnlen(text, max_device_text_size + longest_character)}, max_device_text_size)
+                : std::string();
 }
 
 double finite(const Json &json, const char *key) {
@@ -98,6 +108,42 @@ PluginDescription description_from_json(const Json &json) {
         d.options.push_back(std::move(option));
     }
     return d;
+}
+
+Json to_json(const arhost_device &device) {
+    return {{"index", device.index},
+            {"kind", device.kind},
+            {"is_default", device.is_default != 0},
+            {"name", device_text(device.name)},
+            {"uuid", device_text(device.uuid)},
+            {"abilities", device_text(device.abilities)}};
+}
+constexpr std::size_t longest_device_text = max_device_text_size + std::string_view("…").size();
+// A message holds them all, should each byte of a text be a quotation mark, which JSON escapes.
+static_assert(max_devices * (3 * 2 * longest_device_text + 128) < Channel::max_message_size);
+
+DeviceList devices_from_json(const Json &message) {
+    const auto text_of = [](const Json &json, const char *key) {
+        std::string text = json.at(key).get<std::string>();
+        if (text.size() > longest_device_text)
+            throw std::runtime_error(std::string("a device's '") + key + "' is too long");
+        return text;
+    };
+    DeviceList list;
+    if (message.at("devices").size() > max_devices)
+        throw std::runtime_error("there are too many devices");
+    for (const Json &d : message.at("devices")) {
+        DeviceDescription device;
+        device.index = d.at("index").get<std::uint32_t>();
+        device.kind = d.at("kind").get<arhost_device_kind>();
+        device.is_default = d.at("is_default").get<bool>();
+        device.name = text_of(d, "name");
+        device.uuid = text_of(d, "uuid");
+        device.abilities = text_of(d, "abilities");
+        list.devices.push_back(std::move(device));
+    }
+    list.left_out = message.at("left_out").get<std::uint64_t>();
+    return list;
 }
 
 Json to_json(const std::vector<OptionValue> &options) {
@@ -192,6 +238,21 @@ const char *to_text(arhost_kind kind) {
         return "sink";
     default:
         return "unknown kind";
+    }
+}
+
+const char *device_kind_text(arhost_device_kind kind) {
+    switch (kind) {
+    case ARHOST_DEVICE_DISCRETE_GPU:
+        return "discrete GPU";
+    case ARHOST_DEVICE_INTEGRATED_GPU:
+        return "integrated GPU";
+    case ARHOST_DEVICE_VIRTUAL_GPU:
+        return "virtual GPU";
+    case ARHOST_DEVICE_CPU:
+        return "CPU";
+    default:
+        return "other device";
     }
 }
 

@@ -47,6 +47,22 @@ constexpr std::size_t max_text_size = 4096, max_descriptor_size = Channel::max_m
 Json to_json(const arhost_descriptor &descriptor);
 PluginDescription description_from_json(const Json &json);
 
+// What a plugin's extension arhost.devices/1 tells, as a worker passes it on: so many of them, their texts printable.
+struct DeviceDescription {
+    std::uint32_t index = 0;
+    arhost_device_kind kind = 0;
+    bool is_default = false;
+    std::string name, uuid, abilities; // "": none
+};
+struct DeviceList {
+    std::vector<DeviceDescription> devices;
+    std::uint64_t left_out = 0; // behind them
+};
+constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, before the "…" of what is longer
+
+Json to_json(const arhost_device &device);
+DeviceList devices_from_json(const Json &message);
+
 Json to_json(const std::vector<OptionValue> &options);
 std::vector<OptionValue> options_from_json(const Json &json);
 
@@ -61,6 +77,7 @@ Json to_json(const SlotLayout &layout);
 SlotLayout layout_from_json(const Json &json);
 
 const char *to_text(arhost_kind kind);
+const char *device_kind_text(arhost_device_kind kind);
 const char *status_text(arhost_status status);
 
 } // namespace arhost::ring

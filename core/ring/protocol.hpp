@@ -6,6 +6,7 @@
 //
 //   host → worker                                        worker → host
 //   {type: open, plugin, sandbox} + host and worker page  {type: hello, descriptor, sandbox: how far it was reached}
+//   {type: devices}, or straight on                       {type: devices [, devices, left_out]} or failed; it goes on
 //   {type: create, options, setup…} [+ arena, inputs]     {type: ready, properties…}
 //   {type: attach, role, generation, layout} + memory     {type: attached, role, generation}
 //   {type: detach, generation}                            {type: detached, generation}
@@ -60,7 +61,7 @@ struct Result {
 };
 
 // The plugin's function that a worker is in, for crash reports.
-enum class Call : std::uint32_t { none, load, negotiate, create, start, per_frame, idle, stop, destroy };
+enum class Call : std::uint32_t { none, load, negotiate, create, start, per_frame, idle, stop, destroy, devices };
 
 constexpr std::uint32_t ring_capacity = 16;
 

@@ -20,14 +20,17 @@ std::string valid_utf8(std::string_view text) {
     return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
 
-std::string printable(std::string_view text) {
+std::string printable(std::string_view text, std::size_t max_size) {
     const std::string valid = valid_utf8(text);
     std::string line;
     for (std::size_t at = 0, length = 0; at < valid.size(); at += length) {
         const auto first = static_cast<unsigned char>(valid[at]);
         length = first < 0x80 ? 1 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
         const std::string_view c = std::string_view(valid).substr(at, length);
-        line += is_harmful(c) ? " " : c;
+        const std::string_view shown = is_harmful(c) ? " " : c;
+        if (line.size() + shown.size() > max_size)
+            return line + "…";
+        line += shown;
     }
     return line;
 }

@@ -33,6 +33,8 @@ const char *to_text(Call call) {
         return "in stop";
     case Call::destroy:
         return "in destroy";
+    case Call::devices:
+        return "while it listed its devices";
     }
     return "in an unknown call";
 }

@@ -2,6 +2,7 @@
 #include "worker/session.hpp"
 
 #include "sandbox/sandbox.hpp"
+#include "worker/devices.hpp"
 #include "worker/library.hpp"
 #include "worker/loader.hpp"
 #include "worker/services.hpp"
@@ -26,6 +27,12 @@ public:
     std::string last_error() const {
         std::lock_guard lock(mutex_);
         return last_error_;
+    }
+    // The message for a call that the plugin has failed in.
+    Json failed(arhost_status status) const {
+        const std::string reason = last_error();
+        return {
+            {"type", "failed"}, {"status", status}, {"text", reason.empty() ? "the plugin gave no reason" : reason}};
     }
 
 private:
@@ -53,7 +60,8 @@ private:
 // One plugin, from `create` to `destroy`.
 class Session {
 public:
-    Session(Link &link, const arhost_plugin &plugin) : link_(link), plugin_(plugin), host_(link) {}
+    Session(Link &link, const HostSide &host, const arhost_plugin &plugin)
+        : link_(link), host_(host), plugin_(plugin) {}
     ~Session() {
         if (!instance_)
             return;
@@ -101,10 +109,7 @@ private:
             status = service_->start(create, ready);
         }
         if (status != ARHOST_OK) {
-            const std::string reason = host_.last_error();
-            link_.send({{"type", "failed"},
-                        {"status", status},
-                        {"text", reason.empty() ? "the plugin gave no reason" : reason}});
+            link_.send(host_.failed(status));
             return false;
         }
         link_.send(ready);
@@ -162,8 +167,8 @@ private:
     }
 
     Link &link_;
+    const HostSide &host_;
     const arhost_plugin &plugin_;
-    HostSide host_;
     Memory memory_;
     arhost_instance *instance_ = nullptr;
     std::unique_ptr<Service> service_;
@@ -175,6 +180,13 @@ sandbox::Level tell(const Link &link, sandbox::Level level) {
     link.log(sandbox::whole(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO,
              "sandbox: " + sandbox::to_text(level));
     return level;
+}
+
+Json answer_devices(const Link &link, const HostSide &host, const arhost_plugin &plugin) {
+    Json answer = {{"type", "devices"}};
+    const Link::InCall call(link, Call::devices);
+    const arhost_status status = list_devices(plugin, *host.get(), answer);
+    return status == ARHOST_OK ? answer : host.failed(status);
 }
 
 int serve(Link &link) {
@@ -204,7 +216,11 @@ int serve(Link &link) {
     ::prctl(PR_SET_NAME, plugin->descriptor->id);
     link.send(
         {{"type", "hello"}, {"descriptor", to_json(*plugin->descriptor)}, {"sandbox", sandbox::to_text(level)}});
-    return Session(link, *plugin).run(link.receive());
+    HostSide host(link);
+    Message next = link.receive();
+    for (; next.body.at("type") == "devices"; next = link.receive())
+        link.send(answer_devices(link, host, *plugin));
+    return Session(link, host, *plugin).run(next);
 }
 
 } // namespace

@@ -54,7 +54,7 @@ constexpr const char *glass[] = {"tree", "path", nullptr};
 constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 64),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 256),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
     arhost::option(

@@ -7,6 +7,7 @@
 
 using namespace arhost::test;
 using testing::HasSubstr;
+using testing::Not;
 
 namespace {
 
@@ -359,6 +360,47 @@ TEST(CommandLine, TellsVersionHelpAndPlugins) {
     EXPECT_THAT(run.output(), HasSubstr("third                The third of three (default 'c')"));
     EXPECT_EQ(run.run({}), 2);
     EXPECT_EQ(run.run({"--nonsense"}), 2);
+}
+
+TEST(CommandLine, ListsTheDevicesOfEveryPluginThatTells) {
+    ArhostRun run;
+    // Shaders' places, which GPUs are given, in the scratch folder.
+    run.start({"plugins", "--devices"}, [&] { ::setenv("XDG_CACHE_HOME", run.path("cache").c_str(), 1); });
+    EXPECT_EQ(run.wait(), 1) << "broken ones are among the test plugins";
+    const std::string blank(19, ' '), output = run.output();
+    EXPECT_THAT(output,
+                HasSubstr("\n" + blank + "device 0: Abacus  [2J3000 (discrete GPU, 0d15c0de-0000)\n" + blank +
+                          "    counts: up, down\n" + blank + "device 1: Ten fingers (CPU), the default\nsource_"));
+    const auto below = [&](const std::string &plugin) {
+        const std::size_t at = output.find("\n" + plugin + " ");
+        const std::size_t end = output.find("\n\n", at);
+        std::istringstream lines(output.substr(at + 1, end - at));
+        std::string line, found;
+        std::getline(lines, line); // its own
+        while (std::getline(lines, line) && line.starts_with(blank))
+            found += line.substr(blank.size()) + "\n";
+        return found;
+    };
+    EXPECT_EQ(below("tracker_counter"), "Tracks numbered frames, for tests.\n");
+    const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
+    EXPECT_EQ(below("lister_none"), what + "no device that it could run on\n");
+    EXPECT_EQ(below("lister_fail"), what + "its devices can't be listed: the driver is of another age\n");
+    EXPECT_EQ(below("lister_broken"),
+              what + "its devices can't be listed: it told of a device that has no name, or is too short\n");
+    EXPECT_THAT(below("lister_crash"),
+                testing::StartsWith(what + "its devices can't be listed: killed by signal 11 "));
+    EXPECT_THAT(below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
+    EXPECT_THAT(below("lister_hang"),
+                testing::StartsWith(what + "its devices can't be listed: no answer within 20 s; "));
+    const std::string many = below("lister_many"), text(256, '"');
+    EXPECT_THAT(many, testing::StartsWith(what + "device 0: " + text + "… (integrated GPU)\n    " + text + "…\n"));
+    EXPECT_THAT(many, HasSubstr("\ndevice 63: "));
+    EXPECT_THAT(many, testing::EndsWith("…\nand 9936 more\n"));
+
+    EXPECT_EQ(run.run({"plugins"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("lister_hang"));
+    EXPECT_THAT(run.output(), testing::AllOf(Not(HasSubstr("device 0")), Not(HasSubstr("its devices"))))
+        << "only on request, as drivers take long to load";
 }
 
 TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugin_under_test.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -10,16 +10,20 @@
 namespace {
 
 namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const std::string counter = ARHOST_TEST_PLUGIN_DIRECTORY "/rt_counter.so";
 
 class RenderScene : public testing::Test {
 protected:
     // The picture file's bytes; none where the program fails.
-    std::string picture(const std::string &scene, const std::string &options) const {
+    std::string picture(const std::string &scene, const std::string &options,
+                        const std::string &samples = "--samples 1") const {
         const fs::path file = scratch_.path() / "picture.ppm";
         fs::remove(file);
         const std::string command = ARHOST_BINARY_DIRECTORY "/bin/render-scene " ARHOST_SOURCE_DIRECTORY
                                                             "/config/scenes/" +
-                                    scene + ".yaml --size 80x60 --samples 1 --output " + file.string() + " " +
+                                    scene + ".yaml --size 80x60 --output " + file.string() + " " + samples + " " +
                                     options + " > " + (scratch_.path() / "said.txt").string() + " 2>&1";
         status_ = std::system(command.c_str());
         return read(file);
@@ -67,4 +71,57 @@ TEST_F(RenderScene, RefusesWhatIsNoTimeAndNoNumberOfSamples) {
         EXPECT_NE(said().find(std::string(option).substr(0, std::string(option).find(' '))), std::string::npos)
             << said();
     }
+}
+
+TEST_F(RenderScene, AsksAnyRayTracerByItsNameOrItsFile) {
+    const std::string embree = picture("demo", "");
+    ASSERT_FALSE(embree.empty()) << said();
+    EXPECT_EQ(picture("demo", "--raytracer rt_embree"), embree) << said();
+    EXPECT_EQ(picture("demo", "--raytracer " ARHOST_PLUGIN_DIRECTORY "/rt_embree.so"), embree) << said();
+
+    // Its square in a corner, of the colour that the distance gives, beside the checkerboard.
+    const std::string counted = picture("demo", "--eye 0,0,513 --raytracer " + counter, "");
+    ASSERT_FALSE(counted.empty()) << said();
+    const std::string header = "P6\n80 60\n255\n";
+    ASSERT_EQ(counted.size(), header.size() + 80 * 60 * 3);
+    EXPECT_EQ(counted.substr(0, header.size() + 3), header + std::string("\x0d\x00\xaa", 3));
+    EXPECT_EQ(counted.substr(counted.size() - 3), "\xb0\xb0\xb0");
+    ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
+    EXPECT_EQ(picture("demo", "--eye 0,0,513 --raytracer rt_counter", ""), counted) << said();
+    ::unsetenv("ARHOST_PLUGIN_PATH");
+}
+
+TEST_F(RenderScene, GivesThePluginItsOptions) {
+    const std::string one = picture("demo", ""), four = picture("demo", "", "--samples 4");
+    ASSERT_FALSE(one.empty()) << said();
+    EXPECT_NE(four, one);
+    EXPECT_EQ(picture("demo", "--set samples=4", ""), four);
+    EXPECT_EQ(picture("demo", "--set samples=4"), four) << "which stands above --samples";
+    EXPECT_EQ(picture("demo", "", ""), picture("demo", "", "--samples 16")) << "where nothing is said";
+    EXPECT_EQ(picture("moving", "--set light_samples=2"), picture("moving", "--light-samples 2"));
+    EXPECT_EQ(picture("demo", "--set threads=1 --set instruction_set=base"), one);
+}
+
+TEST_F(RenderScene, SaysWhatIsWrongWithThePluginAndItsOptions) {
+    const auto refused = [&](const std::string &options, const std::string &samples = "") {
+        EXPECT_EQ(picture("demo", options, samples), "") << options;
+        EXPECT_TRUE(failed()) << options;
+        return said();
+    };
+    EXPECT_THAT(refused("--raytracer rt_embre"),
+                HasSubstr("--raytracer: there is no plugin 'rt_embre'; did you mean 'rt_embree'?"));
+    EXPECT_THAT(refused("--raytracer ./nowhere.so"), HasSubstr("--raytracer: there is no plugin '"));
+    EXPECT_THAT(refused("--raytracer sink_null"), HasSubstr("--raytracer: 'sink_null' is a sink, not a ray tracer"));
+    EXPECT_THAT(refused("--raytracer " ARHOST_TEST_PLUGIN_DIRECTORY "/no_plugin.so"),
+                HasSubstr("is no arhost plugin"));
+    EXPECT_THAT(refused("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
+    EXPECT_THAT(refused("--set samples=1000"), HasSubstr("--set: samples: "));
+    EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: must be key=value"));
+    EXPECT_THAT(refused("--raytracer " + counter, "--samples 2"), HasSubstr("--samples: samples: unknown key"));
+    // The plugin's own words, then which call has failed.
+    EXPECT_THAT(
+        refused("--set refuse=true --raytracer " + counter),
+        HasSubstr("refused, as the option 'refuse' asks\nrender-scene: rt_counter: create: configuration error"));
+    EXPECT_THAT(refused("--set error_at=13 --eye 0,0,513 --raytracer " + counter),
+                HasSubstr("rt_counter: render: internal error"));
 }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A picture of a scene file from a given place, by the Embree ray tracer: without a video, a tracker or a marker.
-#include "renderer.hpp"
+// A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+#include "ray_tracer.hpp"
 #include "scene/loader.hpp"
-#include "scene/motion.hpp"
 
 #include <CLI/CLI.hpp>
 #include <glm/trigonometric.hpp>
@@ -14,25 +13,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace {
 
 using Vector = std::array<double, 3>;
-
-arhost_host host() {
-    return {sizeof(arhost_host),
-            ARHOST_ABI_VERSION,
-            "render-scene",
-            "0",
-            nullptr,
-            [](const arhost_host *, arhost_severity severity, const char *text) {
-                if (severity >= ARHOST_SEVERITY_WARNING)
-                    std::fprintf(stderr, "%s\n", text);
-            },
-            [](const arhost_host *, double, const char *) {},
-            [](const arhost_host *) { return 0; },
-            [](const arhost_host *, const char *) -> const void * { return nullptr; }};
-}
 
 struct View {
     Vector eye{0, -300, 200}, look_at{0, 0, 40}, up{};
@@ -73,7 +60,7 @@ cv::Mat over_checkerboard(const cv::Mat &rgba) {
     return picture;
 }
 
-cv::Mat render(const std::string &file, View view, double time_s, const rt_embree::Settings &settings) {
+cv::Mat render(const std::string &file, View view, double time_s, const RayTracer &ray_tracer) {
     arhost::scene::LoadCallbacks callbacks;
     callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
@@ -81,32 +68,34 @@ cv::Mat render(const std::string &file, View view, double time_s, const rt_embre
         throw std::runtime_error(file + ": " + wrong);
     if (view.up == Vector{})
         view.up[arena.scene().axes == ARHOST_Z_UP ? 2 : 1] = 1;
-    const arhost_camera camera = camera_of(view);
-    const arhost_host for_messages = host();
-    rt_embree::Renderer renderer(
-        {sizeof(arhost_raytracer_setup), view.size[0], view.size[1], 0, &arena.scene(), &camera.intrinsics}, settings,
-        arhost::Host(&for_messages));
-    cv::Mat rgba(static_cast<int>(view.size[1]), static_cast<int>(view.size[0]), CV_8UC4);
-    const arhost_image image{sizeof(arhost_image), static_cast<std::uint32_t>(rgba.step), view.size[0], view.size[1],
-                             rgba.data};
-    if (arena.scene().duration_s > 0) {
-        arhost::scene::MotionEvaluator evaluator(arena.scene());
-        const arhost_motion motion = evaluator.at(time_s);
-        renderer.render(camera, image, &motion);
-    } else {
-        renderer.render(camera, image);
+    return ray_tracer.render(arena.scene(), camera_of(view), time_s);
+}
+
+// The plugin's options: those that have a name of their own here, and above them what `--set` says.
+arhost::yaml::Node options_of(const std::optional<int> &samples, const std::optional<int> &light_samples,
+                              const std::vector<std::string> &settings) {
+    arhost::yaml::Node options = arhost::yaml::Node::parse("{}", "render-scene");
+    if (samples)
+        options.override_value("samples", std::to_string(*samples), "--samples");
+    if (light_samples)
+        options.override_value("light_samples", std::to_string(*light_samples), "--light-samples");
+    for (const std::string &setting : settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals == 0 || equals == std::string::npos)
+            throw std::runtime_error("--set " + setting + ": must be key=value, as in --set samples=4");
+        options.override_value(setting.substr(0, equals), setting.substr(equals + 1));
     }
-    return rgba;
+    return options;
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
     CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
-    std::string scene, output, label;
+    std::string scene, output, label, ray_tracer = "rt_embree";
     View view;
-    rt_embree::Settings settings;
-    settings.samples = 16;
+    std::optional<int> samples, light_samples;
+    std::vector<std::string> settings;
     double time_s = 0;
     bool transparent = false;
     app.add_option("scene", scene, "The scene file")->required();
@@ -128,11 +117,16 @@ int main(int argc, char **argv) {
             return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
         })
         ->capture_default_str();
-    app.add_option("--samples", settings.samples, "A pixel")->check(CLI::Range(1, 256))->capture_default_str();
-    app.add_option("--light-samples", settings.light_samples,
-                   "Shadow rays from each of them to a light that has an extent, or to the environment")
-        ->check(CLI::Range(1, 256))
+    app.add_option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
+        ->type_name("NAME|PATH")
         ->capture_default_str();
+    app.add_option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    app.add_option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
+        ->check(CLI::Range(1, 256));
+    app.add_option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
+        ->check(CLI::Range(1, 256));
     app.add_option("--label", label, "A line of text to write into the picture");
     app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
     app.add_option("--output,-o", output, "The file to write")->required();
@@ -140,7 +134,8 @@ int main(int argc, char **argv) {
     try {
         if (!cv::haveImageWriter(output))
             throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
-        const cv::Mat rgba = render(scene, view, time_s, settings);
+        const cv::Mat rgba =
+            render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)));
         cv::Mat picture;
         if (transparent)
             cv::cvtColor(rgba, picture, cv::COLOR_RGBA2BGRA);

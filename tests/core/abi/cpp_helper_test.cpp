@@ -15,6 +15,13 @@ public:
     }
     void start(const arhost_tracker_setup &) { throw std::runtime_error("no luck"); }
     void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
+    static std::vector<arhost::Device> devices() {
+        if (no_devices)
+            throw arhost::Failure(ARHOST_ERROR_IO, "no driver");
+        return {{3, ARHOST_DEVICE_VIRTUAL_GPU, true, "Thrower's", "a-b", "throws"},
+                {.index = 4, .kind = ARHOST_DEVICE_CPU, .name = "Else", .uuid = "", .abilities = ""}};
+    }
+    static inline bool no_devices = false;
 };
 constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "refuse", "false", "Fails")};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
@@ -71,6 +78,73 @@ TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
 
     EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_ERROR_INVALID_ARGUMENT)
         << "an option is missing";
+}
+
+TEST(CppHelper, GivesAClassThatHasDevicesTheExtension) {
+    EXPECT_EQ(arhost_plugin_object.get_extension("arhost.devices/2"), nullptr);
+    const void *extension = arhost_plugin_object.get_extension("arhost.devices/1");
+    ASSERT_NE(extension, nullptr);
+    const auto &devices = *static_cast<const arhost_devices *>(extension);
+    EXPECT_EQ(devices.struct_size, sizeof(arhost_devices));
+
+    std::vector<std::string> told;
+    const arhost_take_device take = [](void *context, const arhost_device *device) {
+        EXPECT_EQ(device->struct_size, sizeof(arhost_device));
+        const auto text = [](const char *t) { return t ? std::string(t) : "none"; };
+        static_cast<std::vector<std::string> *>(context)->push_back(
+            std::to_string(device->index) + " " + std::to_string(device->kind) +
+            (device->is_default ? " default " : " ") + device->name + " " + text(device->uuid) + " " +
+            text(device->abilities));
+    };
+    ASSERT_EQ(devices.list(&host, take, &told), ARHOST_OK);
+    EXPECT_EQ(told, (std::vector<std::string>{"3 3 default Thrower's a-b throws", "4 4 Else none none"}));
+
+    Thrower::no_devices = true;
+    EXPECT_EQ(devices.list(&host, take, &told), ARHOST_ERROR_IO);
+    EXPECT_EQ(logged, "no driver");
+    EXPECT_EQ(told.size(), 2u);
+    Thrower::no_devices = false;
+}
+
+namespace {
+
+struct Deviceless {};
+struct WithAnExtension {
+    static const void *get_extension(const char *id) { return id; }
+};
+struct WithBoth : WithAnExtension {
+    static std::vector<arhost::Device> devices() { return {}; }
+};
+struct WithAHost {
+    static std::vector<arhost::Device> devices(const arhost::Host &h) {
+        h.warn("looking");
+        return {};
+    }
+};
+struct WithOtherDevices {
+    static int devices() { return 2; } // a name that is the plugin's own affair
+};
+
+} // namespace
+
+TEST(CppHelper, GivesDevicesTheHostIfTheyTakeIt) {
+    const auto *devices =
+        static_cast<const arhost_devices *>(arhost::detail::get_extension<WithAHost>(ARHOST_DEVICES_EXTENSION));
+    ASSERT_NE(devices, nullptr);
+    EXPECT_EQ(devices->list(
+                  &host, [](void *, const arhost_device *) {}, nullptr),
+              ARHOST_OK);
+    EXPECT_EQ(logged, "looking");
+}
+
+TEST(CppHelper, LeavesOtherExtensionsToTheClass) {
+    EXPECT_EQ(arhost::detail::get_extension<Deviceless>(ARHOST_DEVICES_EXTENSION), nullptr);
+    EXPECT_EQ(arhost::detail::get_extension<WithOtherDevices>(ARHOST_DEVICES_EXTENSION), nullptr);
+    const char *other = "somebody.something/1";
+    EXPECT_EQ(arhost::detail::get_extension<WithAnExtension>(other), other);
+    EXPECT_EQ(arhost::detail::get_extension<WithBoth>(other), other);
+    EXPECT_EQ(arhost::detail::get_extension<WithBoth>(ARHOST_DEVICES_EXTENSION),
+              &arhost::detail::devices_functions<WithBoth>);
 }
 
 TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {

@@ -108,6 +108,26 @@ STRUCT(arhost_entry_point, 16);
 FIELD(arhost_entry_point, struct_size, 0, 4);
 FIELD(arhost_entry_point, negotiate, 8, 8);
 
+/* arhost/devices.h */
+VALUE(ARHOST_DEVICE_DISCRETE_GPU, 1);
+VALUE(ARHOST_DEVICE_INTEGRATED_GPU, 2);
+VALUE(ARHOST_DEVICE_VIRTUAL_GPU, 3);
+VALUE(ARHOST_DEVICE_CPU, 4);
+VALUE(ARHOST_DEVICE_OTHER, 5);
+
+STRUCT(arhost_device, 40);
+FIELD(arhost_device, struct_size, 0, 4);
+FIELD(arhost_device, index, 4, 4);
+FIELD(arhost_device, kind, 8, 4);
+FIELD(arhost_device, is_default, 12, 4);
+FIELD(arhost_device, name, 16, 8);
+FIELD(arhost_device, uuid, 24, 8);
+FIELD(arhost_device, abilities, 32, 8);
+
+STRUCT(arhost_devices, 16);
+FIELD(arhost_devices, struct_size, 0, 4);
+FIELD(arhost_devices, list, 8, 8);
+
 /* arhost/frame.h */
 VALUE(ARHOST_GREY8, 1);
 VALUE(ARHOST_RGB8, 2);

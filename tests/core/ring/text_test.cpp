@@ -22,6 +22,13 @@ TEST(Printable, HasNothingThatXmlCantHold) {
     EXPECT_EQ(printable("a\ufffe\uffff"), "a  ");
 }
 
+TEST(Printable, IsCutBetweenCharactersWhereItIsTooLong) {
+    EXPECT_EQ(printable("12345", 5), "12345");
+    EXPECT_EQ(printable("123456", 5), "12345…");
+    EXPECT_EQ(printable("123½6", 4), "123…");
+    EXPECT_EQ(printable("\xe9\xe9", 4), "\ufffd…") << "what stands in for others counts";
+}
+
 TEST(Printable, ReplacesWhatIsNoUtf8) {
     EXPECT_EQ(printable("Bas\xe9"), "Bas\ufffd");
     EXPECT_EQ(printable("\xed\xa0\x80").find('\xed'), std::string::npos); // half of a pair

@@ -19,6 +19,11 @@ public:
           writes_later_(options.boolean("writes_later")), ahead_ms_(options.real("ahead_ms")),
           ahead_at_(options.integer("ahead_at")), hold_at_(options.integer("hold_at")) {}
 
+    static std::vector<Device> devices() {
+        return {{0, ARHOST_DEVICE_DISCRETE_GPU, false, "Abacus \x1b[2J3000", "0d15c0de-0000", "counts: up, down"},
+                {1, ARHOST_DEVICE_CPU, true, "Ten fingers", "", ""}};
+    }
+
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         fps_ = setup.fps > 0 ? setup.fps : 30;
         paced_ = setup.paced;

@@ -19,10 +19,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <concepts>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 namespace arhost {
 
@@ -95,6 +98,16 @@ constexpr arhost_option_descriptor option(arhost_option_type type, const char *k
     return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
 }
 
+// What a plugin could run on. A class with a static member `std::vector<arhost::Device> devices()`, or one that takes
+// `const arhost::Host &`, has the extension of arhost/devices.h, where the fields are explained; "" is for what a
+// device does not have.
+struct Device {
+    std::uint32_t index = 0;
+    arhost_device_kind kind = ARHOST_DEVICE_OTHER;
+    bool is_default = false;
+    std::string name, uuid, abilities;
+};
+
 namespace detail {
 
 // What arhost_instance is for a plugin written as the class T.
@@ -149,6 +162,35 @@ inline const void *no_extension(const char *) {
     return nullptr;
 }
 
+template <class T>
+concept ListsDevicesByHost = requires(const Host &host) {
+    { T::devices(host) } -> std::convertible_to<std::vector<Device>>;
+};
+template <class T>
+concept ListsDevices = ListsDevicesByHost<T> || requires {
+    { T::devices() } -> std::convertible_to<std::vector<Device>>;
+};
+template <ListsDevices T> std::vector<Device> devices_of(const Host &host) {
+    if constexpr (ListsDevicesByHost<T>)
+        return T::devices(host);
+    else
+        return T::devices();
+}
+template <ListsDevices T>
+arhost_status list_devices(const arhost_host *host, arhost_take_device take, void *context) {
+    return guarded(Host(host), [&] {
+        const auto or_null = [](const std::string &text) { return text.empty() ? nullptr : text.c_str(); };
+        for (const Device &d : devices_of<T>(Host(host))) {
+            const arhost_device device{
+                sizeof device, d.index, d.kind, d.is_default, d.name.c_str(), or_null(d.uuid), or_null(d.abilities)};
+            take(context, &device);
+        }
+        return ARHOST_OK;
+    });
+}
+template <ListsDevices T>
+inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), list_devices<T>};
+
 // Members that a class may leave out.
 template <class T> void stop(T &plugin) {
     if constexpr (requires { plugin.stop(); })
@@ -158,6 +200,9 @@ template <class T> void stop_instance(arhost_instance *instance) {
     with<T>(instance, [](T &plugin) { return stop(plugin), ARHOST_OK; });
 }
 template <class T> const void *get_extension(const char *id) {
+    if constexpr (ListsDevices<T>)
+        if (std::string_view(id) == ARHOST_DEVICES_EXTENSION)
+            return &devices_functions<T>;
     if constexpr (requires { T::get_extension(id); })
         return T::get_extension(id);
     else

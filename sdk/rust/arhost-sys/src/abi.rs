@@ -28,6 +28,13 @@ pub type arhost_interpolation = i32;
 pub type arhost_light_type = i32;
 pub type arhost_falloff = i32;
 pub type arhost_overlay = i32;
+pub type arhost_device_kind = i32;
+
+/// Takes one device, in `arhost_devices.list`.
+pub type arhost_take_device = Option<unsafe extern "C" fn(*mut c_void, *const arhost_device)>;
+
+/// The id of `arhost_devices`, for C: it ends with NUL.
+pub const ARHOST_DEVICES_EXTENSION: &[u8] = b"arhost.devices/1\0";
 
 // Declares constants, and lists them for the test.
 macro_rules! abi_constants {
@@ -103,6 +110,12 @@ abi_constants! {
     pub const ARHOST_IS_LIVE: u32 = 1 << 1;
     pub const ARHOST_TRACES_LENS: u32 = 1 << 2;
     pub const ARHOST_IS_REALTIME_SINK: u32 = 1 << 4;
+    // arhost/devices.h
+    pub const ARHOST_DEVICE_DISCRETE_GPU: arhost_device_kind = 1;
+    pub const ARHOST_DEVICE_INTEGRATED_GPU: arhost_device_kind = 2;
+    pub const ARHOST_DEVICE_VIRTUAL_GPU: arhost_device_kind = 3;
+    pub const ARHOST_DEVICE_CPU: arhost_device_kind = 4;
+    pub const ARHOST_DEVICE_OTHER: arhost_device_kind = 5;
     // arhost/frame.h
     pub const ARHOST_GREY8: arhost_pixel_format = 1;
     pub const ARHOST_RGB8: arhost_pixel_format = 2;
@@ -238,6 +251,20 @@ abi_structs! {
     struct arhost_entry_point {
         struct_size: u32,
         negotiate: Option<unsafe extern "C" fn(*const arhost_offer, *mut arhost_answer) -> arhost_status>,
+    }
+    // arhost/devices.h
+    struct arhost_device {
+        struct_size: u32,
+        index: u32,
+        kind: arhost_device_kind,
+        is_default: i32,
+        name: *const c_char,
+        uuid: *const c_char,
+        abilities: *const c_char,
+    }
+    struct arhost_devices {
+        struct_size: u32,
+        list: Option<unsafe extern "C" fn(*const arhost_host, arhost_take_device, *mut c_void) -> arhost_status>,
     }
     // arhost/frame.h
     struct arhost_frame_format {

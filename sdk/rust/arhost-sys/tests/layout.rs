@@ -54,6 +54,12 @@ fn constants_are_those_of_the_headers() {
 }
 
 #[test]
+fn texts_are_those_of_the_headers() {
+    let printed = run_c("texts", "puts(ARHOST_DEVICES_EXTENSION);\n");
+    assert_eq!(printed.concat().as_bytes(), arhost_sys::ARHOST_DEVICES_EXTENSION.strip_suffix(b"\0").unwrap());
+}
+
+#[test]
 fn frames_are_laid_out_as_by_the_headers() {
     let (mut program, mut expected) = (String::new(), vec![]);
     for pixel_format in 0..=7 {

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Real plugins in real workers, asked what they are and what they could run on.
+#include "host/probe.hpp"
+#include "plugin_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost;
+using namespace arhost::ring;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+namespace {
+
+struct Probe : testing::Test {
+    // Where a GPU's driver would keep its shaders.
+    void SetUp() override { ::setenv("XDG_CACHE_HOME", scratch.path().c_str(), 1); }
+
+    host::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
+                                std::chrono::seconds patience = std::chrono::seconds(60)) {
+        return host::list_devices(context(), file(plugin), {}, needs, patience);
+    }
+    DeviceList list(const std::string &plugin, const std::vector<std::string> &needs = {}) {
+        const host::DevicesResult result = devices(plugin, needs);
+        if (const auto *reason = std::get_if<std::string>(&result))
+            throw std::runtime_error(*reason);
+        return std::get<std::optional<DeviceList>>(result).value();
+    }
+    std::string reason(const std::string &plugin, std::chrono::seconds patience = std::chrono::seconds(60)) {
+        return std::get<std::string>(devices(plugin, {}, patience));
+    }
+    static std::filesystem::path file(const std::string &plugin) {
+        return ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so";
+    }
+    supervise::Context &context() {
+        if (!context_)
+            context_.emplace(supervise::Context{reactor_,
+                                                launcher_.emplace(ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher"),
+                                                ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
+                                                [](arhost_severity, const std::string &, const std::string &) {}});
+        return *context_;
+    }
+
+    test::ScratchFolder scratch;
+
+private:
+    Reactor reactor_;
+    std::optional<supervise::Launcher> launcher_; // which takes the environment along
+    std::optional<supervise::Context> context_;
+};
+
+} // namespace
+
+TEST_F(Probe, TellsWhoAPluginIsOrWhyItCantBeUsed) {
+    std::string level;
+    const host::ProbeResult good = host::probe(context(), file("source_counter"), {}, &level);
+    EXPECT_EQ(std::get<PluginDescription>(good).id, "source_counter");
+    EXPECT_NE(level, "");
+    EXPECT_THAT(std::get<std::string>(host::probe(context(), file("no_plugin"), {})),
+                HasSubstr("is no arhost plugin"));
+    EXPECT_THAT(std::get<std::string>(host::probe(context(), file("broken_constructor"), {})),
+                HasSubstr("while its library was loaded"));
+}
+
+TEST_F(Probe, ListsDevicesAsThePluginTellsOfThem) {
+    const DeviceList told = list("source_counter");
+    ASSERT_EQ(told.devices.size(), 2u);
+    EXPECT_EQ(told.left_out, 0u);
+    const DeviceDescription &first = told.devices[0], &second = told.devices[1];
+    EXPECT_EQ(first.index, 0u);
+    EXPECT_EQ(first.kind, ARHOST_DEVICE_DISCRETE_GPU);
+    EXPECT_FALSE(first.is_default);
+    EXPECT_EQ(first.name, "Abacus  [2J3000") << "printable";
+    EXPECT_EQ(first.uuid, "0d15c0de-0000");
+    EXPECT_EQ(first.abilities, "counts: up, down");
+    EXPECT_EQ(second.index, 1u);
+    EXPECT_TRUE(second.is_default);
+    EXPECT_EQ(second.uuid, "");
+    EXPECT_EQ(list("lister_none").devices.size(), 0u);
+}
+
+TEST_F(Probe, KnowsWhichPluginTellsOfNoDevices) {
+    EXPECT_EQ(std::get<std::optional<DeviceList>>(devices("tracker_counter")), std::nullopt);
+}
+
+TEST_F(Probe, TakesNoMoreThanAMessageHolds) {
+    const DeviceList told = list("lister_many");
+    EXPECT_EQ(told.devices.size(), max_devices);
+    EXPECT_EQ(told.left_out, 10'000 - max_devices);
+    EXPECT_EQ(told.devices.back().name, std::string(max_device_text_size, '"') + "…");
+}
+
+TEST_F(Probe, TellsWhyDevicesCantBeListed) {
+    EXPECT_EQ(reason("lister_fail"), "the driver is of another age");
+    EXPECT_EQ(reason("lister_broken"), "it told of a device that has no name, or is too short");
+    EXPECT_THAT(reason("lister_crash"), testing::ContainsRegex("killed by signal 11 .* while it listed its devices"));
+    EXPECT_THAT(reason("lister_hang", std::chrono::seconds(1)),
+                StartsWith("no answer within 1 s; killed by signal 6 "));
+    EXPECT_THAT(reason("no_plugin"), HasSubstr("is no arhost plugin"));
+}
+
+TEST_F(Probe, GivesTheDevicesThatAPluginNeedsAndNoNetwork) {
+    std::string level;
+    host::probe(context(), file("lister_gpu"), {}, &level);
+    if (level.substr(0, level.find("LACKING")).find("seccomp") == std::string::npos)
+        GTEST_SKIP() << "this machine's sandbox is: " << level;
+    const DeviceList with = list("lister_gpu", {"gpu", "network"}), without = list("lister_gpu");
+    EXPECT_EQ(with.devices.at(0).name, "with its shaders");
+    EXPECT_EQ(with.devices.at(0).abilities, "no network");
+    EXPECT_EQ(without.devices.at(0).name, "without its shaders");
+}
+
+TEST(DevicesFromJson, RefusesWhatNoWorkerOfOursSends) {
+    const Json device = {{"index", 0}, {"kind", 1},  {"is_default", false},
+                         {"name", ""}, {"uuid", ""}, {"abilities", ""}};
+    const auto message = [](const Json &devices) { return Json{{"devices", devices}, {"left_out", 0}}; };
+    EXPECT_EQ(devices_from_json(message(Json::array({device}))).devices.size(), 1u);
+    EXPECT_THROW(devices_from_json(message(Json(max_devices + 1, device))), std::runtime_error);
+    EXPECT_THROW(devices_from_json(message(5)), std::exception);
+    for (const auto &[key, value] : {std::pair<const char *, Json>{"name", std::string(1000, 'x')},
+                                     {"uuid", nullptr},
+                                     {"index", "first"},
+                                     {"is_default", 2}}) {
+        Json wrong = device;
+        wrong[key] = value;
+        EXPECT_THROW(devices_from_json(message(Json::array({wrong}))), std::exception) << key;
+    }
+}

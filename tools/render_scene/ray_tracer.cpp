@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ray_tracer.hpp"
+
+#include "config/options.hpp"
+#include "config/plugin_path.hpp"
+#include "ring/json_abi.hpp"
+#include "ring/protocol.hpp"
+#include "ring/text.hpp"
+#include "scene/motion.hpp"
+#include "worker/library.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <new>
+#include <optional>
+#include <vector>
+
+using namespace arhost;
+
+namespace {
+
+// Beside this program, in a build folder as in an installed arhost.
+std::filesystem::path built_in_plugins() {
+    return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/arhost/plugins";
+}
+
+constexpr arhost_host host = {sizeof(arhost_host),
+                              ARHOST_ABI_VERSION,
+                              "render-scene",
+                              ARHOST_VERSION,
+                              nullptr,
+                              [](const arhost_host *, arhost_severity severity, const char *text) {
+                                  if (severity >= ARHOST_SEVERITY_WARNING)
+                                      std::fprintf(stderr, "%s\n", ring::printable(text ? text : "").c_str());
+                              },
+                              [](const arhost_host *, double, const char *) {},
+                              [](const arhost_host *) { return 0; },
+                              [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+
+// More than the plugin's 1, for pictures that stand still, where it can take as many.
+void prefer_samples(yaml::Node &options, const ring::PluginDescription &plugin) {
+    for (const ring::OptionDeclaration &o : plugin.options)
+        if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
+            ((o.minimum == 0 && o.maximum == 0) || (o.minimum <= 16 && o.maximum >= 16)))
+            options.override_value("samples", "16");
+}
+
+// Pages of their own, as arhost/raytracer.h promises.
+class ImageMemory {
+public:
+    explicit ImageMemory(std::size_t size)
+        : bytes_(static_cast<std::uint8_t *>(std::aligned_alloc(page, whole(size)))) {
+        if (!bytes_)
+            throw std::bad_alloc();
+    }
+    std::uint8_t *get() const { return bytes_.get(); }
+
+private:
+    static constexpr std::size_t page = 4096;
+    static std::size_t whole(std::size_t size) { return (size + page - 1) / page * page; }
+    struct Free {
+        void operator()(std::uint8_t *bytes) const { std::free(bytes); }
+    };
+    std::unique_ptr<std::uint8_t, Free> bytes_;
+};
+
+} // namespace
+
+RayTracer::RayTracer(const std::string &name, yaml::Node options) {
+    const yaml::Node asked = yaml::Node::scalar(name, "--raytracer");
+    const std::filesystem::path file = config::PluginPath({}, built_in_plugins()).resolve(asked);
+    plugin_ = &worker::negotiate(file, worker::open_library(file));
+    const ring::PluginDescription plugin = ring::description_from_json(ring::to_json(*plugin_->descriptor));
+    if (plugin.kind != ARHOST_KIND_RAYTRACER)
+        asked.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a ray tracer");
+    prefer_samples(options, plugin);
+    const std::vector<ring::OptionValue> values = config::resolve_options(plugin, options, std::nullopt, asked);
+    std::vector<arhost_option> passed;
+    passed.reserve(values.size());
+    for (const ring::OptionValue &v : values)
+        passed.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
+    expect_ok("create", plugin_->create(&host, passed.data(), static_cast<std::uint32_t>(passed.size()), &instance_));
+    if (!instance_)
+        throw std::runtime_error(plugin.id + ": create succeeded without an instance");
+}
+
+void RayTracer::expect_ok(const char *call, arhost_status status) const {
+    if (status != ARHOST_OK) // its reason has been logged
+        throw std::runtime_error(std::string(plugin_->descriptor->id) + ": " + call + ": " +
+                                 ring::status_text(status));
+}
+
+cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera, double time_s) const {
+    const auto &functions = *static_cast<const arhost_raytracer *>(plugin_->functions);
+    const std::uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
+    const std::uint32_t stride = ring::overlay_stride(width);
+    const ImageMemory memory(std::size_t{stride} * height);
+    const arhost_image image{sizeof image, stride, width, height, memory.get()};
+    arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr};
+    arhost_motion motion;
+    std::optional<arhost::scene::MotionEvaluator> evaluator; // whose memory it is in
+    if (scene.duration_s > 0) {
+        motion = evaluator.emplace(scene).at(time_s);
+        request.motion = &motion;
+    }
+    arhost_render_info info{};
+    info.struct_size = sizeof info;
+
+    const arhost_raytracer_setup setup{sizeof setup, width, height, 0, &scene, &camera.intrinsics};
+    expect_ok("start", functions.start(instance_, &setup));
+    const arhost_status status = functions.render(instance_, &request, &image, &info);
+    functions.stop(instance_);
+    expect_ok("render", status);
+    return cv::Mat(static_cast<int>(height), static_cast<int>(width), CV_8UC4, memory.get(), stride).clone();
+}
