@@ -22,8 +22,34 @@ std::filesystem::path own_folder() {
     return std::filesystem::weakly_canonical(info.dli_fname).parent_path();
 }
 
+arhost_device_kind kind_of(VkPhysicalDeviceType type) {
+    switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+        return ARHOST_DEVICE_DISCRETE_GPU;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+        return ARHOST_DEVICE_INTEGRATED_GPU;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+        return ARHOST_DEVICE_VIRTUAL_GPU;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+        return ARHOST_DEVICE_CPU;
+    default:
+        return ARHOST_DEVICE_OTHER;
+    }
+}
+
 class Plugin {
 public:
+    // What option `device` chooses from.
+    static std::vector<arhost::Device> devices(const arhost::Host &host) {
+        const Instance instance(host, false);
+        const std::vector<PhysicalDevice> found = instance.devices();
+        std::vector<arhost::Device> devices;
+        for (const PhysicalDevice &device : found)
+            devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
+                               &device == &choose_device(found, "auto"), device.name, device.uuid, "paths: plain"});
+        return devices;
+    }
+
     Plugin(const arhost::Host &host, const arhost::Options &options)
         : host_(host), shader_(read_shader(own_folder() / "rt_vulkan_plain.spv")),
           instance_(host, options.boolean("validate")),

@@ -221,12 +221,8 @@ TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
 }
 
--- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- -- --
-
-                                                                        // The process that rt_hangs_beside_a_process
-                                                                        // has started.
-                                                                        pid_t
-                                                                        process_beside(const ConformRun &run) {
+// The process that rt_hangs_beside_a_process has started.
+pid_t process_beside(const ConformRun &run) {
     const std::string before = "process ";
     for (int i = 0; i < 5000; ++i) {
         const std::string output = run.output();

@@ -11,8 +11,10 @@
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <optional>
 
 namespace arhost::test {
@@ -253,6 +255,21 @@ TEST(Device, OptionThatNamesNoneIsRefused) {
     EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_ERROR_CONFIGURATION);
     EXPECT_THAT(plugin.log(), HasSubstr("there are: 0 '"));
     EXPECT_EQ(plugin.create({{"device", "0"}}), ARHOST_OK);
+}
+
+TEST(Device, IsListedByTheHost) {
+    ARHOST_REQUIRE_VULKAN();
+    const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
+        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost plugins --devices 2>&1", "r"), ::pclose);
+    std::string text;
+    for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
+        text.append(part, size);
+    LoggingHost logging;
+    for (const auto &device : rt_vulkan::Instance(Host(&logging.host), false).devices()) {
+        EXPECT_THAT(text, HasSubstr(device.name));
+        EXPECT_THAT(text, HasSubstr(device.uuid));
+    }
+    EXPECT_THAT(text, HasSubstr("paths: plain"));
 }
 
 TEST(Device, WithoutWhatIsNeededIsRefused) {
