@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost's own sources and sinks, and rt_vulkan, keep the ABI's promises; rt_embree is matrix.hpp's first.
+// arhost's own sources and sinks keep the ABI's promises; rt_embree is matrix.hpp's first.
 #include "conform_run.hpp"
 
 #include <gmock/gmock.h>
@@ -59,8 +59,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Own{"Poses", "sink_poses", {"path=poses.jsonl"}},
                     Own{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}},
                     Own{"Dissertation", "sink_trajectory", {"path=run.txt", "format=dissertation"}},
-                    Own{"Null", "sink_null", {}}, Own{"Window", "sink_window", {}, "display"},
-                    Own{"Vulkan", "rt_vulkan", {}, "gpu"}),
+                    Own{"Null", "sink_null", {}}, Own{"Window", "sink_window", {}, "display"}),
     [](const auto &info) { return info.param.name; });
 
 } // namespace
