@@ -511,11 +511,13 @@ void slow_disk(Context &context) {
         SinkRun run(context, "slow");
         run.start();
         Files before = run.files();
+        bool has_held_up = false;
         for (std::uint64_t n = 0; n < frames; ++n) {
             disk.hold_up_next_write();
             run.write(n, n + 1);
             Files after = run.files();
-            if (!disk.has_held_up())
+            has_held_up = has_held_up || disk.has_held_up(); // at a frame that it drops there is nothing to hold up
+            if (!has_held_up)
                 throw Skip("it writes in a way that can't be held up: by memory maps, rings or another process");
             if (after == before)
                 throw Failure(

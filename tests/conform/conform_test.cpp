@@ -211,11 +211,13 @@ TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
 TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
     ConformRun run;
     run.write("secret.txt", "secret");
-    run.start({run.link_wrong("tells_descriptors").string(), "--only", "abi.create"}, [] {
-        const int secret = ::open("secret.txt", O_RDWR);
-        ::dup2(secret, STDIN_FILENO);
-        ::dup2(secret, 9);
-    });
+    run.start({run.link_wrong("none").string(), "--only", "abi.create", "--environment", "ARHOST_TELLS_DESCRIPTORS"},
+              [] {
+                  ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                  const int secret = ::open("secret.txt", O_RDWR);
+                  ::dup2(secret, STDIN_FILENO);
+                  ::dup2(secret, 9);
+              });
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("0 is /dev/null"));
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));

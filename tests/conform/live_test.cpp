@@ -3,6 +3,7 @@
 // `conform: true` in a run of the real arhost.
 #include "arhost_run.hpp"
 
+#include <arhost/sink.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -244,7 +245,7 @@ TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
     const auto augmented = [&] {
         const auto lines = counted(run);
         return static_cast<std::size_t>(
-            std::ranges::count_if(lines, [](const auto &l) { return l.overlay != "none"; }));
+            std::ranges::count_if(lines, [](const auto &l) { return l.kind != ARHOST_OVERLAY_NONE; }));
     };
     std::size_t shown = 0; // with an overlay
     const auto wait_for_more = [&](std::size_t frames) {

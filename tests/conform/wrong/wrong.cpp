@@ -204,7 +204,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         start_a_process();
         hang();
     }
-    if (has("tells_descriptors"))
+    if (std::getenv("ARHOST_TELLS_DESCRIPTORS"))
         for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
             std::error_code closed; // the folder's own
             ::dprintf(STDERR_FILENO, "%s is %s\n", entry.path().filename().c_str(),
@@ -479,7 +479,7 @@ const arhost_plugin &spoilt_plugin() {
     static arhost_descriptor descriptor = *embree().descriptor;
     descriptor.id = has("id_unlike_file") ? "rt_other" : own_name().c_str();
     if (has("default_out_of_range"))
-        options[0].default_value = "65";
+        options[0].default_value = "257";
     if (has("no_licence"))
         descriptor.licence = "";
     if (has("description_is_no_utf8"))

@@ -88,7 +88,7 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
         if (glass) {
             Picture again(small);
             ASSERT_EQ(robust.try_render(view, again, &then), ARHOST_OK);
-            least_psnr = std::min(least_psnr, likeness(again, expected).psnr - 3);
+            least_psnr = std::min(40.0, likeness(again, expected).psnr - 3);
         }
         std::cout << name << ": " << like << "; at least " << least_psnr << " dB wanted" << std::endl;
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
