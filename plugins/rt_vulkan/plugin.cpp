@@ -44,6 +44,7 @@ public:
         const Instance instance(host, false);
         const std::vector<PhysicalDevice> found = instance.devices();
         std::vector<arhost::Device> devices;
+        devices.reserve(found.size());
         for (const PhysicalDevice &device : found)
             devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
                                &device == &choose_device(found, "auto"), device.name, device.uuid, "paths: plain"});
