@@ -1,128 +1,63 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "common_view/view.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <mutex>
-#include <span>
+#include <string>
 #include <utility>
 
 namespace rt_embree {
 namespace {
 
 using arhost::Failure;
+using arhost::view::Pose, arhost::view::same, arhost::view::same_view;
 using Vec3d = arhost::shading::Vec3T<double>;
 
 [[noreturn]] void refuse(const std::string &message) {
     throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, message);
 }
 
-bool all_finite(std::span<const double> values) {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-}
-
-const arhost_intrinsics &checked(const arhost_raytracer_setup &setup) {
-    const arhost_intrinsics &in = *setup.intrinsics;
-    if (setup.width < 1 || setup.height < 1 || setup.width > ARHOST_MAX_IMAGE_SIDE ||
-        setup.height > ARHOST_MAX_IMAGE_SIDE)
-        refuse("the image's size is not 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
-    if (in.width != setup.width || in.height != setup.height)
-        refuse("the intrinsics belong to an image of another size than the one to make");
-    if (!all_finite({&in.fx, 4}) || !(in.fx > 0) || !(in.fy > 0))
-        refuse("the intrinsics' focal lengths are not above 0, or not finite");
-    const std::uint32_t count = in.coefficient_count;
-    const bool fits = in.distortion == ARHOST_DISTORTION_NONE ? count == 0
-                      : in.distortion == ARHOST_DISTORTION_BROWN
-                          ? count == 4 || count == 5 || count == 8 || count == 12
-                      : in.distortion == ARHOST_DISTORTION_FISHEYE ? count == 4
-                                                                   : false;
-    if (!fits || !all_finite({in.coefficients, count}))
-        refuse("the distortion's model, or the count or values of its coefficients, are not valid");
-    if (setup.scene->magic != ARHOST_SCENE_MAGIC || setup.scene->version != ARHOST_SCENE_VERSION)
-        refuse("the scene is not an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
-    return in;
-}
-
-bool same_view(const arhost_camera &a, const arhost_camera &b) {
-    return std::equal(a.eye, a.eye + 3, b.eye) && std::equal(a.look_at, a.look_at + 3, b.look_at) &&
-           std::equal(a.up, a.up + 3, b.up);
-}
-
-bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
-    return a.width == b.width && a.height == b.height && a.distortion == b.distortion && a.fx == b.fx &&
-           a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.coefficient_count == b.coefficient_count &&
-           std::equal(a.coefficients,
-                      a.coefficients + std::min<std::uint32_t>(a.coefficient_count, ARHOST_MAX_DISTORTION),
-                      b.coefficients);
-}
-
-// The camera's axes in the world.
-struct Pose {
-    Vec3d eye, right, down, forward;
-
-    explicit Pose(const arhost_camera &camera) {
-        if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
-            refuse("the camera's eye, look_at or up is not finite");
-        constexpr double limit_mm = 1e12; // Embree takes no ray from far beyond
-        if (std::any_of(camera.eye, camera.eye + 3, [](double number) { return std::abs(number) > limit_mm; }))
-            refuse("the camera's eye lies beyond 1e12 mm");
-        eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
-        const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
-        const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};
-        const Vec3d u = cross(up, w);
-        if (!(length(w) > 0))
-            refuse("the camera's look_at is its eye");
-        if (!(length(u) > 1e-9 * length(up) * length(w)))
-            refuse("the camera's up is parallel to its view direction");
-        forward = w * (-1 / length(w));
-        right = u * (1 / length(u));
-        down = cross(forward, right);
-    }
-
-    // What of the plane z = 1 a box covers: nothing where it lies behind the camera.
-    Window window_of(const Box &box) const {
-        const double infinity = std::numeric_limits<double>::infinity();
-        Window window{infinity, infinity, -infinity, -infinity, false};
-        int behind = 0;
-        for (int corner = 0; corner < 8; ++corner) {
-            const Vec3d p = Vec3d{corner & 1 ? box.max[0] : box.min[0], corner & 2 ? box.max[1] : box.min[1],
-                                  corner & 4 ? box.max[2] : box.min[2]} -
-                            eye;
-            const double z = dot(p, forward);
-            if (!(z > 1e-6 * (std::abs(dot(p, right)) + std::abs(dot(p, down))))) {
-                ++behind;
-                continue;
-            }
-            const double x = dot(p, right) / z, y = dot(p, down) / z;
-            // More than single precision loses in a ray's direction and origin.
-            const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(eye) / z;
-            window.x0 = std::min(window.x0, x - margin);
-            window.y0 = std::min(window.y0, y - margin);
-            window.x1 = std::max(window.x1, x + margin);
-            window.y1 = std::max(window.y1, y + margin);
+// What of the plane z = 1 a box covers: nothing where it lies behind the camera.
+Window window_of(const Box &box, const Pose &pose) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    Window window{infinity, infinity, -infinity, -infinity, false};
+    int behind = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3d p = Vec3d{corner & 1 ? box.max[0] : box.min[0], corner & 2 ? box.max[1] : box.min[1],
+                              corner & 4 ? box.max[2] : box.min[2]} -
+                        pose.eye;
+        const double z = dot(p, pose.forward);
+        if (!(z > 1e-6 * (std::abs(dot(p, pose.right)) + std::abs(dot(p, pose.down))))) {
+            ++behind;
+            continue;
         }
-        window.everything = behind > 0 && behind < 8;
-        return window;
+        const double x = dot(p, pose.right) / z, y = dot(p, pose.down) / z;
+        // More than single precision loses in a ray's direction and origin.
+        const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(pose.eye) / z;
+        window.x0 = std::min(window.x0, x - margin);
+        window.y0 = std::min(window.y0, y - margin);
+        window.x1 = std::max(window.x1, x + margin);
+        window.y1 = std::max(window.y1, y + margin);
     }
-};
+    window.everything = behind > 0 && behind < 8;
+    return window;
+}
 
 // Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
-    const auto put = [](Vec3d from, float *to) {
-        to[0] = static_cast<float>(from.x);
-        to[1] = static_cast<float>(from.y);
-        to[2] = static_cast<float>(from.z);
-    };
-    put(pose.eye, camera.eye);
-    put(pose.right, camera.world_from_camera);
-    put(pose.down, camera.world_from_camera + 3);
-    put(pose.forward, camera.world_from_camera + 6);
+    arhost::view::put(pose.eye, camera.eye);
+    arhost::view::put(pose.right, camera.world_from_camera);
+    arhost::view::put(pose.down, camera.world_from_camera + 3);
+    arhost::view::put(pose.forward, camera.world_from_camera + 6);
     return camera;
 }
 
@@ -175,8 +110,9 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) 
 }
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
-    : host_(host), intrinsics_(checked(setup)), kernel_(choose_kernel(settings.instruction_set)),
-      threads_(settings.threads), ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
+    : host_(host), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
+      kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
+      ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
       samples_a_frame_(settings.samples), samples_(sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       one_path_(settings.one_path) {
@@ -198,7 +134,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
     std::vector<Window> windows;
     for (const Box &box : scene_.visible_boxes())
-        windows.push_back(pose.window_of(box));
+        windows.push_back(window_of(box, pose));
 
     std::array<float *, 4> history{};
     if (!history_.empty()) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "common_view/view.hpp"
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -171,7 +173,7 @@ std::vector<std::uint32_t> read_shader(const std::filesystem::path &file) {
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
                    const Instance &instance, const PhysicalDevice &physical, std::span<const std::uint32_t> shader)
-    : host_(host), settings_(settings), intrinsics_((check_setup(setup), *setup.intrinsics)),
+    : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       scene_(*setup.scene, host), device_(instance, checked(physical)), submission_(device_) {
     make_buffers(intrinsics_);
     make_pipeline(shader, setup.scene->max_depth);
@@ -414,7 +416,7 @@ void Renderer::write_moving_parts() {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
-    if (!same(camera.intrinsics, intrinsics_))
+    if (!arhost::view::same(camera.intrinsics, intrinsics_))
         throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width || image.stride % 4)
@@ -428,7 +430,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
     std::vector<Sample> samples = sample_positions(settings_.samples);
     if (settings_.accumulate) {
-        if (motion || !still_camera_ || !same_view(*still_camera_, camera))
+        if (motion || !still_camera_ || !arhost::view::same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_ = camera;
         samples = sample_positions(history_samples_, history_samples_ < enough_samples ? settings_.samples : 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The camera: what is asked of it, its axes in the world, and where each pixel looks.
+// The camera as the shaders read it: its axes in the world, and where each pixel looks.
 #pragma once
 
 #include "layout.hpp"
@@ -10,12 +10,6 @@
 #include <vector>
 
 namespace rt_vulkan {
-
-// Throws where images of this setup can't be made.
-void check_setup(const arhost_raytracer_setup &setup);
-
-bool same(const arhost_intrinsics &a, const arhost_intrinsics &b);
-bool same_view(const arhost_camera &a, const arhost_camera &b);
 
 // Writes the frame's eye and axes.
 void look(const arhost_camera &camera, Frame &frame);
