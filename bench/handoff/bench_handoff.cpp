@@ -141,7 +141,7 @@ Latencies eventfds(int rounds) {
     const SharedMemory memory = SharedMemory::create("times", 4096);
     const Mapping page = memory.map(Access::read_write);
     auto *stamps = reinterpret_cast<volatile std::int64_t *>(page.bytes().data());
-    const UniqueFd there(::eventfd(0, EFD_CLOEXEC)), back(::eventfd(0, EFD_CLOEXEC));
+    const arhost::base::UniqueFd there(::eventfd(0, EFD_CLOEXEC)), back(::eventfd(0, EFD_CLOEXEC));
     const std::uint64_t one = 1;
     std::uint64_t count = 0;
     const pid_t worker = ::fork();

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/access.hpp"
 
-#include "ring/file_identity.hpp"
+#include "base/file_identity.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 
 namespace arhost::config {
 namespace {
 
 namespace fs = std::filesystem;
-using ring::real_path;
+using base::real_path;
 
 // Outputs are written beside their place and then renamed, so their folder it is; a link's target's too.
 void let_write(sandbox::Policy &policy, const fs::path &file) {
@@ -42,7 +41,7 @@ void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
 void add_environment(sandbox::Policy &policy, const yaml::Node &variables) {
     for (const yaml::Node &variable : variables.items()) {
         const std::string name = variable.text();
-        if (std::any_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '=' || c == 0x7f; }))
+        if (!sandbox::is_variable(name))
             variable.fail("must be a variable's name alone; its value is the one that arhost is started with");
         policy.environment.insert(name);
     }

@@ -231,7 +231,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = ring::real_path(node->text()); // of a link, which is not to be replaced, where it leads to
+            *file = base::real_path(node->text()); // of a link, which is not to be replaced, where it leads to
             std::error_code error;
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;

@@ -9,7 +9,11 @@ namespace arhost::config {
 namespace {
 
 namespace fs = std::filesystem;
-using ring::FileIdentity;
+using base::FileIdentity;
+
+bool are_digits(std::string_view text) {
+    return text.find_first_not_of("0123456789") == std::string_view::npos;
+}
 
 // A name with one number in it: frame-%04d.png.
 struct Pattern {
@@ -21,8 +25,7 @@ struct Pattern {
             !file.ends_with(after))
             return false;
         const std::string_view number = file.substr(before.size(), file.size() - before.size() - after.size());
-        return number.find_first_not_of("0123456789") == std::string_view::npos &&
-               (number.size() == digits || number[0] != '0');
+        return are_digits(number) && (number.size() == digits || number[0] != '0');
     }
 };
 
@@ -51,20 +54,34 @@ std::optional<Pattern> pattern_of(const std::string &name) {
     return pattern.digits ? std::optional(pattern) : std::nullopt;
 }
 
+// Whether two names can stand for one file. Patterns that differ by zeros alone (f0%d, f%d) can, as taken here.
+bool can_meet(const std::string &a, const std::string &b) {
+    const auto p = pattern_of(a), q = pattern_of(b);
+    if (!p || !q)
+        return p ? p->names(b) : q ? q->names(a) : a == b;
+    const auto [begin, longer_begin] =
+        std::minmax(p->before, q->before, [](auto &x, auto &y) { return x.size() < y.size(); });
+    const auto [end, longer_end] =
+        std::minmax(p->after, q->after, [](auto &x, auto &y) { return x.size() < y.size(); });
+    return longer_begin.starts_with(begin) && are_digits(std::string_view(longer_begin).substr(begin.size())) &&
+           longer_end.ends_with(end) &&
+           are_digits(std::string_view(longer_end).substr(0, longer_end.size() - end.size()));
+}
+
 std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
-    std::vector<FileIdentity> files{ring::identity_of(file_or_pattern)};
+    std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
     if (const auto pattern = pattern_of(file_or_pattern.filename())) {
         std::error_code ignored; // a folder that can't be listed: who is to use it says so
         for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
              entry.increment(ignored))
             if (pattern->names(entry->path().filename().string()))
-                files.push_back(ring::identity_of(entry->path()));
+                files.push_back(base::identity_of(entry->path()));
     }
     return files;
 }
 
 [[noreturn]] void refuse(const yaml::Node &output, const std::string &file_read) {
-    const bool same_name = ring::real_path(output.output_path()) == file_read;
+    const bool same_name = base::real_path(output.output_path()) == file_read;
     output.fail("'" + output.text() + "' is a file that this run reads" + (same_name ? "" : " (" + file_read + ")") +
                 "; choose another path");
 }
@@ -72,7 +89,7 @@ std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
 } // namespace
 
 void FilesInUse::read(const fs::path &file) {
-    const FileIdentity identity = ring::identity_of(file);
+    const FileIdentity identity = base::identity_of(file);
     check_read(identity);
     add(identity, {});
 }
@@ -91,8 +108,16 @@ void FilesInUse::write(const yaml::Node &output) {
             output.fail("another output writes '" + output.text() + "' already; choose another path");
         else if (use)
             refuse(output, use->path);
+    const fs::path path = output.output_path();
+    for (const yaml::Node &other : outputs_)
+        if (const fs::path theirs = other.output_path();
+            can_meet(path.filename(), theirs.filename()) &&
+            base::real_path(path.parent_path()) == base::real_path(theirs.parent_path()))
+            output.fail("another output, '" + other.text() + "', can write a file of the same name as '" +
+                        output.text() + "'; choose another path");
     for (const FileIdentity &file : files)
         add(file, output);
+    outputs_.push_back(output);
 }
 
 void FilesInUse::check_read(const FileIdentity &file) const {

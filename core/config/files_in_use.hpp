@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "ring/file_identity.hpp"
+#include "base/file_identity.hpp"
 #include "yaml/yaml.hpp"
 
 #include <filesystem>
@@ -23,16 +23,17 @@ public:
     void write(const yaml::Node &output);
 
     // Of a file that a worker tells of, once all that is written is known. Compares alone: the worker may lie.
-    void check_read(const ring::FileIdentity &file) const;
+    void check_read(const base::FileIdentity &file) const;
 
 private:
     struct Use {
         std::string path;
         std::optional<yaml::Node> output; // that writes it; none: it is read
     };
-    const Use *find(const ring::FileIdentity &file) const;
-    void add(const ring::FileIdentity &file, const std::optional<yaml::Node> &output);
+    const Use *find(const base::FileIdentity &file) const;
+    void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output);
 
+    std::vector<yaml::Node> outputs_;
     std::map<std::string, Use> uses_; // by real path, and by device and inode
 };
 

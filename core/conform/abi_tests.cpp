@@ -196,9 +196,13 @@ void create(Context &context) {
 void longer_options(Context &context) {
     if (context.library.descriptor().option_count < 2)
         throw Skip("it has fewer than two options");
-    constexpr std::size_t unknown_bytes = 16; // who steps too short takes garbage for a key
     Instance instance(context.library);
-    instance.create_or_fail(unknown_bytes);
+    instance.create_or_fail({.bytes = 16, .option = false}); // who steps too short takes garbage for a key
+}
+
+void unknown_option(Context &context) {
+    Instance instance(context.library);
+    instance.create_or_fail({.bytes = 0, .option = true});
 }
 
 void two_instances(Context &context) {
@@ -269,6 +273,8 @@ constexpr Test tests[] = {
      same_answer},
     {"abi.longer-options", "It steps through the options by their struct_size.", 0, "abi.create", 10s,
      longer_options},
+    {"abi.unknown-option", "It passes over an option whose key it does not know.", 0, "abi.create", 10s,
+     unknown_option},
     {"abi.two-instances", "Two instances live at a time, and end in any order.", 0, "abi.create", 20s, two_instances},
     {"abi.create-1000-times",
      "Created and destroyed 1,000 times, or 20 s long, it keeps no descriptor, no thread and no memory.", 0,

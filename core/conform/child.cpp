@@ -20,7 +20,7 @@ namespace {
 CallPage map_call_page() {
     void *address = ::mmap(nullptr, sizeof(ring::Call), PROT_READ | PROT_WRITE, MAP_SHARED, call_page_fd, 0);
     if (address == MAP_FAILED)
-        ring::throw_errno("mmap of the call page");
+        base::throw_errno("mmap of the call page");
     ::close(call_page_fd);
     return CallPage(ring::Mapping(static_cast<std::byte *>(address), sizeof(ring::Call)));
 }
@@ -41,7 +41,7 @@ constexpr off_t room_mib = 16;
 // 0: the folder has room for so much; otherwise the error.
 int look_for_room(const std::filesystem::path &folder) {
     const std::filesystem::path file = folder / "room";
-    const ring::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
+    const base::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
     const int error = fd ? ::posix_fallocate(fd.get(), 0, room_mib << 20) : errno;
     std::error_code ignored;
     std::filesystem::remove(file, ignored);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
+#include "base/file_identity.hpp"
+#include "base/text.hpp"
+#include "base/whole_file.hpp"
 #include "conform/report.hpp"
-#include "ring/file_identity.hpp"
-#include "ring/text.hpp"
-#include "ring/whole_file.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -16,13 +16,16 @@
 #include <cstdio>
 #include <cstring>
 #include <fnmatch.h>
+#include <poll.h>
 #include <set>
+#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <thread>
 
 namespace {
 
 using namespace arhost::conform;
+namespace base = arhost::base;
 namespace sandbox = arhost::sandbox;
 namespace fs = std::filesystem;
 
@@ -38,9 +41,9 @@ std::string wrong_with_name(const std::string &text) {
     return text.empty() ? "the name is empty" : "";
 }
 std::string wrong_with_variable(const std::string &text) {
-    return text.empty() || text.find('=') != std::string::npos
-               ? "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with"
-               : "";
+    return sandbox::is_variable(text)
+               ? ""
+               : "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with";
 }
 std::string wrong_with_seed(const std::string &text) {
     std::uint64_t seed = 0;
@@ -129,10 +132,12 @@ struct PolicyOptions {
     }
 };
 
-void list(const std::string &pattern) {
+std::string list(const std::string &pattern) {
+    std::string text;
     for (const Test &test : all_tests())
         if (::fnmatch(pattern.c_str(), test.name, 0) == 0)
-            fmt::print("{:<34} {}\n", test.name, test.promise);
+            text += fmt::format("{:<34} {}\n", test.name, test.promise);
+    return text;
 }
 
 // What the plugin needs and is not given: without it the host would make no instance.
@@ -174,9 +179,12 @@ std::string wrong_with_reference(std::span<const Test> tests, const RunSettings 
 }
 
 // At once, for whoever reads along. A full disk, and a reader who has gone, end the run.
-void print(const std::string &text) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-        throw std::runtime_error(std::string("can't write what the tests told: ") + std::strerror(errno));
+void print(const std::string &text, int signals = -1) {
+    try {
+        base::write_all(STDOUT_FILENO, text, signals);
+    } catch (const std::system_error &error) {
+        throw std::runtime_error("can't write what the tests told: " + error.code().message());
+    }
 }
 
 Report run(const RunSettings &settings, const std::string &pattern, bool quiet) {
@@ -187,7 +195,7 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
     };
     const auto tell = [&](const Result &result) {
         if (!is_fine(result) || (wanted(result.test.c_str()) && !quiet))
-            print(as_line(report, result));
+            print(as_line(report, result), settings.signals);
     };
     const auto give = [&](const Test &test, Verdict verdict, const std::string &why) {
         report.results.push_back({test.name, verdict, why});
@@ -221,9 +229,19 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
     return report;
 }
 
+// Where there are fewer, a plugin would be blamed for it.
+void expect_descriptors(unsigned jobs) {
+    rlimit limit{};
+    ::getrlimit(RLIMIT_NOFILE, &limit);
+    if (const rlim_t needed = 64 + 4 * jobs; limit.rlim_cur < needed)
+        throw std::runtime_error(
+            fmt::format("{} files may be open at once, and {} are needed; raise it: ulimit -n {}", limit.rlim_cur,
+                        needed, needed));
+}
+
 // A report replaces what is there, unless that is a pipe or a device.
 void expect_files_of_their_own(const std::vector<std::string> &reports, const Subject &subject) {
-    using arhost::ring::identity_of;
+    using base::identity_of;
     std::set<std::string> read, written; // paths, and nodes: a file may have several names
     const auto add = [](std::set<std::string> &files, const fs::path &file) {
         const auto [path, node] = identity_of(file);
@@ -251,7 +269,7 @@ void expect_files_of_their_own(const std::vector<std::string> &reports, const Su
 
 // Those that end a program, but for what whoever started this one wants ignored (nohup): taken from here on by who
 // reads the descriptor.
-arhost::ring::UniqueFd take_signals() {
+base::UniqueFd take_signals() {
     sigset_t taken;
     ::sigemptyset(&taken);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
@@ -260,7 +278,14 @@ arhost::ring::UniqueFd take_signals() {
             ::sigaddset(&taken, signal);
     }
     ::sigprocmask(SIG_BLOCK, &taken, nullptr);
-    return arhost::ring::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
+    return base::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
+}
+
+// The last line, where somebody reads it.
+void say(const std::string &line) {
+    pollfd ready{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&ready, 1, 0) > 0)
+        fmt::print(stderr, "{}\n", line);
 }
 
 } // namespace
@@ -270,9 +295,13 @@ int main(int argc, char **argv) {
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGCHLD, SIG_DFL); // whoever started this may ignore it, and then no child can be waited for
     CLI::App app("Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
-                 "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell.",
+                 "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell;\n"
+                 "128 and a signal's number: interrupted.",
                  "arhost conform");
     app.get_formatter()->column_width(34);
+    app.failure_message([](const CLI::App *, const CLI::Error &error) {
+        return base::printable(error.what()) + "\nRun with --help for more information.\n";
+    });
     RunSettings settings;
     std::vector<std::string> option_texts, print_texts;
     std::string plugin, pattern = "*", json, junit, html, child_test;
@@ -317,7 +346,7 @@ int main(int argc, char **argv) {
     }
     try {
         if (only_list) {
-            list(pattern);
+            print(list(pattern));
             return 0;
         }
         if (!fs::is_regular_file(plugin))
@@ -331,23 +360,24 @@ int main(int argc, char **argv) {
         settings.subject.policy_options = policy_options.texts();
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
-        const arhost::ring::UniqueFd signals = take_signals();
+        expect_descriptors(settings.jobs);
         expect_files_of_their_own({json, junit, html}, settings.subject);
-        arhost::ring::WholeFile json_file(json), junit_file(junit), html_file(html);
+        base::WholeFile json_file(json), junit_file(junit), html_file(html); // a pipe's may wait for its reader
+        const base::UniqueFd signals = take_signals();
         settings.signals = signals.get();
         const Report report = run(settings, pattern, quiet);
-        print(as_summary(report));
+        print(as_summary(report), settings.signals);
         if (report.results.empty())
             throw std::runtime_error("--only " + pattern + ": no test of this kind of plugin has such a name");
-        json_file.write(as_json(report));
-        junit_file.write(as_junit(report));
-        html_file.write(as_html(report));
+        json_file.write(as_json(report), settings.signals);
+        junit_file.write(as_junit(report), settings.signals);
+        html_file.write(as_html(report), settings.signals);
         return report.exit_status();
-    } catch (const Interrupted &interrupted) {
-        fmt::print(stderr, "{}\n", interrupted.what());
+    } catch (const base::Interrupted &interrupted) {
+        say(interrupted.what());
         return 128 + interrupted.signal;
     } catch (const std::exception &error) {
-        fmt::print(stderr, "error: {}\n", arhost::ring::printable(error.what()));
+        say("error: " + base::printable(error.what()));
         return usage_or_suite_failed;
     }
 }

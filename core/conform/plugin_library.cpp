@@ -114,7 +114,7 @@ Instance::Instance(PluginLibrary &library, Settings overrides, std::filesystem::
     settings_.insert(library.settings().begin(), library.settings().end());
 }
 
-arhost_status Instance::create(std::size_t unknown_bytes) {
+arhost_status Instance::create(Newer newer) {
     const arhost_plugin &plugin = library_.plugin();
     std::vector<std::string> texts; // which the values point to
     std::vector<arhost_option> values;
@@ -142,7 +142,9 @@ arhost_status Instance::create(std::size_t unknown_bytes) {
     for (const auto &[key, value] : settings_)
         if (!library_.option(key))
             throw std::runtime_error(fmt::format("--set {}={}: the plugin has no such option", key, value));
-    const std::size_t step = sizeof(arhost_option) + unknown_bytes;
+    if (newer.option)
+        values.push_back({sizeof(arhost_option), ARHOST_OPTION_TEXT, "arhost_conform_unknown", 0, 0, "?"});
+    const std::size_t step = sizeof(arhost_option) + newer.bytes;
     std::vector<std::byte> passed(values.size() * step, std::byte{0xa5});
     for (std::size_t i = 0; i < values.size(); ++i) {
         values[i].struct_size = static_cast<std::uint32_t>(step);
@@ -154,8 +156,8 @@ arhost_status Instance::create(std::size_t unknown_bytes) {
     });
 }
 
-void Instance::create_or_fail(std::size_t unknown_bytes) {
-    expect_ok("create", create(unknown_bytes));
+void Instance::create_or_fail(Newer newer) {
+    expect_ok("create", create(newer));
     if (!instance_)
         throw Failure("create returned OK and left the instance NULL");
 }

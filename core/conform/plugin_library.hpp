@@ -108,9 +108,15 @@ public:
     Instance(const Instance &) = delete;
     Instance &operator=(const Instance &) = delete;
 
-    // With `unknown_bytes` of a newer ABI, garbage here, behind each option.
-    void create_or_fail(std::size_t unknown_bytes = 0);  // throws Failure
-    arhost_status create(std::size_t unknown_bytes = 0); // as it comes
+    // What the host of a newer ABI passes besides.
+    struct Newer {
+        std::size_t bytes = 0; // behind each option; garbage here
+        bool option = false;   // behind the declared ones
+    };
+    void create_or_fail(Newer newer);  // throws Failure
+    arhost_status create(Newer newer); // as it comes
+    void create_or_fail() { create_or_fail({}); }
+    arhost_status create() { return create({}); }
     void destroy();
 
     arhost_instance *get() const { return instance_; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/report.hpp"
 
-#include "ring/text.hpp"
+#include "base/text.hpp"
 
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@ std::string quoted(const std::string &word) {
             std::string::npos &&
         !word.empty())
         return word;
-    if (ring::printable(word) != word) { // bytes that are better not shown, as bash writes them
+    if (base::printable(word) != word) { // bytes that are better not shown, as bash writes them
         std::string text = "$'";
         for (const char c : word)
             text += c == '\'' || c == '\\' ? fmt::format("\\{}", c)
@@ -72,7 +72,7 @@ std::string Report::command(const Result &result) const {
 std::string as_line(const Report &report, const Result &result) {
     std::string text = fmt::format("{:<8} {}", to_text(result.verdict), result.test);
     if (!result.message.empty())
-        text += fmt::format("\n         {}", ring::printable(result.message));
+        text += fmt::format("\n         {}", base::printable(result.message));
     if (is_bad(result.verdict))
         text += fmt::format("\n         promised: {}\n         again: {}", report.test_of(result).promise,
                             report.command(result));
@@ -84,7 +84,7 @@ std::string as_summary(const Report &report) {
     for (std::size_t i = 1; i < verdict_texts.size(); ++i)
         if (const std::size_t count = report.count(static_cast<Verdict>(i)))
             text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, verdict_texts[i]);
-    return fmt::format("{}: {}\n", ring::printable(report.settings.subject.plugin.string()),
+    return fmt::format("{}: {}\n", base::printable(report.settings.subject.plugin.string()),
                        text.empty() ? "no test ran" : text);
 }
 
@@ -140,7 +140,7 @@ std::string as_junit(const Report &report) {
 
 std::string escaped(const std::string &text) {
     std::string result;
-    for (const char c : ring::printable(text)) {
+    for (const char c : base::printable(text)) {
         switch (c) {
         case '&':
             result += "&amp;";

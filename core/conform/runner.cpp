@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/runner.hpp"
 
+#include "base/orphans.hpp"
+#include "base/text.hpp"
 #include "ring/memory.hpp"
-#include "ring/orphans.hpp"
-#include "ring/text.hpp"
 
 #include <fmt/format.h>
 
@@ -19,7 +19,6 @@
 #include <set>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/signalfd.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -29,8 +28,8 @@ namespace arhost::conform {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using base::UniqueFd;
 using ring::Call;
-using ring::UniqueFd;
 
 std::string place(Call call, const Test &test) {
     constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
@@ -63,9 +62,12 @@ std::string place(Call call, const Test &test) {
 class ScratchFolder {
 public:
     ScratchFolder() {
-        std::string pattern = std::filesystem::temp_directory_path() / "arhost-conform-XXXXXX";
+        std::error_code error;
+        std::string pattern = std::filesystem::temp_directory_path(error) / "arhost-conform-XXXXXX";
+        if (error)
+            throw std::runtime_error("there is no folder for temporary files; set TMPDIR to one that is there");
         if (!::mkdtemp(pattern.data()))
-            ring::throw_errno("mkdtemp " + pattern);
+            base::throw_errno("mkdtemp " + pattern);
         path_ = pattern;
     }
     ~ScratchFolder() {
@@ -80,13 +82,12 @@ private:
     std::filesystem::path path_;
 };
 
-// In the child, after fork.
 // A pipe: its end to read from, which does not wait, and its end to write to.
 struct Pipe {
     Pipe() {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC) != 0)
-            ring::throw_errno("pipe2");
+            base::throw_errno("pipe2");
         to_read.reset(ends[0]);
         to_write.reset(ends[1]);
         ::fcntl(to_read.get(), F_SETFL, O_NONBLOCK);
@@ -94,6 +95,7 @@ struct Pipe {
     UniqueFd to_read, to_write;
 };
 
+// In the child, after fork.
 [[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
     ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -131,16 +133,14 @@ struct Pipe {
 // What a plugin prints: no part of the report, and shown as lines that can't steer a terminal, as many as one reads.
 class Printed {
 public:
-    explicit Printed(std::string test) : test_(std::move(test)) {}
-    ~Printed() {
+    explicit Printed(int signals) : signals_(signals) {}
+
+    void finish(const std::string &test) {
         if (!line_.empty())
             show();
         if (left_out_ > 0)
-            fmt::print(stderr, "{}: and {} bytes more\n", test_, left_out_);
+            base::write_all(STDERR_FILENO, fmt::format("{}: and {} bytes more\n", test, left_out_), signals_);
     }
-    Printed(const Printed &) = delete;
-    Printed &operator=(const Printed &) = delete;
-
     void take(std::string_view bytes) {
         for (const char c : bytes.substr(0, room_))
             if (c == '\n')
@@ -152,9 +152,10 @@ public:
     }
 
 private:
-    void show() { fmt::print(stderr, "{}\n", ring::printable(std::exchange(line_, {}))); }
+    void show() { base::write_all(STDERR_FILENO, base::printable(std::exchange(line_, {})) + '\n', signals_); }
 
-    std::string test_, line_;
+    int signals_;
+    std::string line_;
     std::size_t room_ = 64 << 10, left_out_ = 0;
 };
 
@@ -165,7 +166,7 @@ public:
         : test_(test), alive_(alive), begin_(Clock::now()),
           deadline_(begin_ + std::chrono::duration_cast<Clock::duration>(test.deadline * settings.subject.patience)),
           memory_(ring::SharedMemory::create("arhost-conform-call", sizeof(Call))),
-          calls_(memory_.map(ring::Access::read_only)) {
+          calls_(memory_.map(ring::Access::read_only)), printed_(settings.signals) {
         const Subject &subject = settings.subject;
         std::vector<std::string> arguments = {"arhost-conform", subject.plugin,
                                               "--run",          test.name,
@@ -183,7 +184,7 @@ public:
         if (pid_ == 0)
             become(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
         if (pid_ < 0)
-            ring::throw_errno("fork");
+            base::throw_errno("fork");
         result_.to_write.reset();
         output_.to_write.reset();
         ::setpgid(pid_, pid_); // here too: who comes first is open
@@ -210,6 +211,7 @@ public:
 
     Result finish() {
         const bool in_time = ended_, told = text_.ends_with('\n');
+        printed_.finish(test_.name);
         const std::string where = told ? " when the process ended" : place(calls_.read(), test_);
         end();
         Result result;
@@ -251,7 +253,7 @@ private:
             Result result;
             result.verdict = Verdict::fail;
             result.message = fmt::format("what came on its result pipe, descriptor {}, is no result: '{}'", result_fd,
-                                         ring::printable(text_.substr(0, 60)));
+                                         base::printable(text_.substr(0, 60)));
             return result;
         }
     }
@@ -278,7 +280,7 @@ private:
             ::waitpid(pid_, &status_, 0);
         alive_.erase(pid_);
         pid_ = 0;
-        ring::end_orphans(alive_);
+        base::end_orphans(alive_);
     }
 
     const Test &test_;
@@ -288,7 +290,7 @@ private:
     ring::SharedMemory memory_;
     CallPage calls_;
     Pipe result_, output_;
-    Printed printed_{test_.name};
+    Printed printed_;
     pid_t pid_ = 0;
     std::string text_;
     bool ended_ = false;
@@ -307,10 +309,7 @@ int wait(const std::list<Child> &running, int signals) {
         for (const int fd : child.fds())
             fds.push_back({fd, POLLIN, 0});
     ::poll(fds.data(), fds.size(), 2); // an end of a process closes no pipe that its children hold
-    signalfd_siginfo taken{};
-    if (fds.front().revents != 0 && ::read(signals, &taken, sizeof taken) == sizeof taken)
-        return static_cast<int>(taken.ssi_signo);
-    return 0;
+    return base::take_signal(signals);
 }
 
 } // namespace
@@ -336,7 +335,7 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
         if (!find(results, test.name))
             waiting.push_back(&test);
     ::prctl(PR_SET_CHILD_SUBREAPER, 1);       // what a test leaves behind comes here
-    std::set<pid_t> alive = ring::children(); // of who became this program by exec
+    std::set<pid_t> alive = base::children(); // of who became this program by exec
     std::list<Child> running;
     while (!waiting.empty() || !running.empty()) {
         for (auto it = waiting.begin(); it != waiting.end() && running.size() < settings.jobs;) {
@@ -353,8 +352,8 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
                 running.emplace_back(test, settings, alive);
         }
         if (const int signal = wait(running, settings.signals))
-            throw Interrupted(signal, fmt::format("interrupted after {} of {} tests", results.size(),
-                                                  results.size() + running.size() + waiting.size()));
+            throw base::Interrupted(signal, fmt::format("interrupted after {} of {} tests", results.size(),
+                                                        results.size() + running.size() + waiting.size()));
         for (auto it = running.begin(); it != running.end();) {
             if (it->poll()) {
                 take(it->finish());

@@ -3,12 +3,12 @@
 // Runs tests, each in a process of its own with a deadline. Nothing of the plugin is opened in this one.
 #pragma once
 
+#include "base/write_all.hpp"
 #include "conform/child.hpp"
 #include "conform/test.hpp"
 
 #include <functional>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
 namespace arhost::conform {
@@ -19,16 +19,11 @@ struct RunSettings {
     int signals = -1; // a signalfd: what comes there ends a run
 };
 
-// A run was ended by a signal. Nothing of it is left, neither processes nor folders.
-struct Interrupted : std::runtime_error {
-    Interrupted(int signal, const std::string &what) : std::runtime_error(what), signal(signal) {}
-    int signal;
-};
-
 Result run_alone(const Test &test, const RunSettings &settings);
 
 // `results` may begin with those of tests that were run before. A test whose need has not passed is skipped;
-// a need that is not among the tests counts as passed. What the tests leave behind is killed. Throws Interrupted.
+// a need that is not among the tests counts as passed. What the tests leave behind is killed. Throws
+// base::Interrupted, and then nothing of the run is left, neither processes nor folders.
 void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
              const std::function<void(const Result &)> &on_result);
 

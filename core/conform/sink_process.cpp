@@ -20,11 +20,11 @@ struct Pipe {
     Pipe() {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC) != 0)
-            ring::throw_errno("pipe2");
+            base::throw_errno("pipe2");
         read_end.reset(ends[0]);
         write_end.reset(ends[1]);
     }
-    ring::UniqueFd read_end, write_end;
+    base::UniqueFd read_end, write_end;
 };
 
 constexpr const char *helper = "sink.process";
@@ -70,7 +70,7 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
     const pid_t parent = ::getpid();
     pid_ = ::fork();
     if (pid_ < 0)
-        ring::throw_errno("fork");
+        base::throw_errno("fork");
     if (pid_ == 0) { // only what a thread of many may do, until execv
         ::prctl(PR_SET_PDEATHSIG, SIGKILL);
         if (::getppid() != parent)
@@ -88,7 +88,7 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
     const std::string order =
         fmt::format("{} {} {} {}\n", work.frames, work.size.width, work.size.height, work.folder);
     if (::write(orders_.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
-        ring::throw_errno("write to the sink's process");
+        base::throw_errno("write to the sink's process");
 }
 
 void SinkProcess::wait_until_written(std::uint64_t frames) {

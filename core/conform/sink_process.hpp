@@ -4,8 +4,8 @@
 // been used does not live through a fork.
 #pragma once
 
+#include "base/unique_fd.hpp"
 #include "conform/sink_run.hpp"
-#include "ring/unique_fd.hpp"
 
 #include <sys/types.h>
 
@@ -29,7 +29,7 @@ public:
 
 private:
     pid_t pid_ = 0;                   // 0: reaped
-    ring::UniqueFd orders_, written_; // while the former is open, it stays
+    base::UniqueFd orders_, written_; // while the former is open, it stays
     std::uint64_t count_ = 0;
 };
 

@@ -63,7 +63,7 @@ SealedOutput::SealedOutput(const Look &look) {
     size_ = whole_pages(sizeof(arhost_record)) + whole_pages(pixels);
     memory_ = ::mmap(nullptr, size_ + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory_ == MAP_FAILED)
-        ring::throw_errno("mmap of a frame");
+        base::throw_errno("mmap of a frame");
     auto *bytes = static_cast<std::uint8_t *>(memory_);
     ::mprotect(bytes + size_, page, PROT_NONE);
 

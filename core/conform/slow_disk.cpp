@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/slow_disk.hpp"
 
+#include "base/unique_fd.hpp"
 #include "conform/test.hpp"
-#include "ring/unique_fd.hpp"
 
 #include <cerrno>
 #include <future>
@@ -46,7 +46,7 @@ void SlowDisk::under(const std::function<void(SlowDisk &)> &work) {
         if (listener >= 0 && (::write(-1, "", 0) == 0 || errno != ENOSYS))
             work(disk);
     });
-    const ring::UniqueFd listener(listening.get_future().get());
+    const base::UniqueFd listener(listening.get_future().get());
     const auto is_done = [&] { return done.wait_for(0s) == std::future_status::ready; };
     if (listener.get() < 0 || !disk.serve(listener.get(), is_done))
         throw Skip("this kernel does not let a process hold up its own writes");

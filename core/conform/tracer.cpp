@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/tracer.hpp"
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <algorithm>
 #include <sys/mman.h>
@@ -24,7 +24,7 @@ bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
 SealedScene::SealedScene(scene::ArenaBuilder builder) : memory_(nullptr), size_(builder.byte_size()) {
     memory_ = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory_ == MAP_FAILED)
-        ring::throw_errno("mmap of a scene");
+        base::throw_errno("mmap of a scene");
     const std::span<std::byte> bytes(static_cast<std::byte *>(memory_), size_);
     std::move(builder).write(bytes);
     if (const std::string problem = scene::validate(bytes); !problem.empty())

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conform/tracker.hpp"
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -22,7 +22,7 @@ GuardedMemory::GuardedMemory(std::size_t size) {
     byte_size_ = (size + page - 1) / page * page + 2 * page;
     void *address = ::mmap(nullptr, byte_size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (address == MAP_FAILED)
-        ring::throw_errno("mmap");
+        base::throw_errno("mmap");
     pages_ = static_cast<std::byte *>(address);
     data_ = pages_ + byte_size_ - page - size;
     ::mprotect(pages_, page, PROT_NONE);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/commands.hpp"
 
+#include "base/text.hpp"
+#include "base/whole_file.hpp"
 #include "config/schema.hpp"
 #include "host/probe.hpp"
-#include "ring/text.hpp"
-#include "ring/whole_file.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -180,7 +180,7 @@ bool write_whole(const fs::path &file, const char *key, Console &console, const 
     try {
         std::error_code ignored; // the file tells
         fs::create_directories(file.parent_path(), ignored);
-        ring::WholeFile(file).write(text);
+        base::WholeFile(file).write(text);
         return true;
     } catch (const std::runtime_error &error) {
         console.log(ARHOST_SEVERITY_ERROR, key, error.what());
@@ -209,7 +209,7 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
     ::sigaddset(&signals, SIGTERM);
     ::sigaddset(&signals, SIGHUP);
     ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread, which must not take them
-    const ring::UniqueFd signal_fd = ring::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
+    const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
     Console console(verbose);
     show_warnings(configuration, console);
@@ -291,7 +291,10 @@ fs::path own_prefix() {
 }
 
 fs::path own_folder() {
-    return fs::read_symlink("/proc/self/exe").parent_path();
+    fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+    if (!base::is_utf8(folder.native())) // workers get paths as UTF-8
+        throw std::runtime_error("arhost lies in a folder whose path is no UTF-8: " + folder.string());
+    return folder;
 }
 
 int run(const Arguments &arguments, supervise::Starter &launcher) {
@@ -337,7 +340,7 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
         if (!outcome->empty())
             throw yaml::Error(*outcome);
     }
-    std::printf("%s: fine\n", arguments.file.c_str());
+    std::printf("%s: fine\n", base::printable(arguments.file).c_str());
     return success;
 }
 
@@ -351,7 +354,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
         policy.readable.push_back(fs::absolute(path));
     int status = success;
     std::string level;
-    const auto print = [](const std::string &line) { std::printf("%s\n", ring::printable(line).c_str()); };
+    const auto print = [](const std::string &line) { std::printf("%s\n", base::printable(line).c_str()); };
     for (const fs::path &file : files) {
         const ProbeResult result = probe(context, file, policy, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
@@ -385,7 +388,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
     if (!level.empty())
         std::printf("\nsandbox on this machine: %s\n", level.c_str());
     if (files.empty())
-        std::printf("no plugins in %s\n", built_in_plugins().c_str());
+        print("no plugins in " + built_in_plugins().string());
     return status;
 }
 

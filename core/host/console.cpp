@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/console.hpp"
 
-#include "ring/text.hpp"
+#include "base/text.hpp"
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -58,7 +58,7 @@ void Console::log(arhost_severity severity, const std::string &component, const 
     const char *blame = severity == ARHOST_SEVERITY_PLUGIN_MISBEHAVING ? "the plugin misbehaves: "
                         : severity == ARHOST_SEVERITY_HOST_MISBEHAVING ? "the host misbehaves: "
                                                                        : "";
-    log_->log(level, "{}: {}{}", component, blame, ring::printable(text));
+    log_->log(level, "{}: {}{}", component, blame, base::printable(text));
 }
 
 void Console::show(const Progress &progress, const Statistics &statistics) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost: the command line.
+#include "base/text.hpp"
 #include "host/commands.hpp"
 #include "host/new_plugin.hpp"
-#include "ring/text.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -29,8 +29,14 @@ void prepare_process() {
 
 // One line, which no name of a file makes two.
 int refuse(const std::string &why, int exit_status) {
-    std::fprintf(stderr, "error: %s\n", arhost::ring::printable(why).c_str());
+    std::fprintf(stderr, "error: %s\n", arhost::base::printable(why).c_str());
     return exit_status;
+}
+
+// A full disk is told at the end, if not before.
+void expect_stdout_written() {
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+        throw std::runtime_error("standard output can't be written");
 }
 
 } // namespace
@@ -45,6 +51,9 @@ int main(int argc, char **argv) {
     app.set_version_flag("--version", "arhost " ARHOST_VERSION);
     app.require_subcommand(0, 1);
     app.get_formatter()->column_width(34);
+    app.failure_message([](const CLI::App *, const CLI::Error &error) {
+        return arhost::base::printable(error.what()) + "\nRun with --help for more information.\n";
+    });
 
     Arguments arguments;
     const auto add_configuration_options = [&](CLI::App &command) {
@@ -139,9 +148,10 @@ int main(int argc, char **argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 ? success : bad_configuration;
+        const int status = app.exit(error) == 0 ? success : bad_configuration;
+        return std::fflush(stdout) == 0 ? status : run_failed;
     }
-    try {
+    const auto command = [&]() -> int {
         if (*schema_command)
             return print_schema(markdown);
         if (*new_plugin_command)
@@ -160,6 +170,11 @@ int main(int argc, char **argv) {
             return bad_configuration;
         }
         return run(arguments, launcher);
+    };
+    try {
+        const int status = command();
+        expect_stdout_written();
+        return status;
     } catch (const arhost::yaml::Error &error) {
         return refuse(error.what(), bad_configuration);
     } catch (

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/new_plugin.hpp"
 
+#include "base/text.hpp"
 #include "host/commands.hpp"
 
 #include <algorithm>
@@ -159,7 +160,7 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
         throw;
     }
     std::printf("%s: a %s in %s that works. README.md in there tells how to build it, run it and go on.\n",
-                folder.c_str(), plugin.kind.c_str(), plugin.language.c_str());
+                base::printable(folder.string()).c_str(), plugin.kind.c_str(), plugin.language.c_str());
     return success;
 }
 

@@ -56,7 +56,7 @@ void SceneLoading::watch() {
     });
 }
 
-void SceneLoading::look_at(const FileIdentity &file_read) {
+void SceneLoading::look_at(const base::FileIdentity &file_read) {
     try {
         files_.check_read(file_read);
     } catch (const yaml::Error &error) {

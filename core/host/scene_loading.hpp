@@ -29,7 +29,7 @@ public:
 
 private:
     void watch();
-    void look_at(const ring::FileIdentity &file_read);
+    void look_at(const base::FileIdentity &file_read);
     void fail(const std::string &reason);
     void on_died(const supervise::Death &death);
 
@@ -37,7 +37,7 @@ private:
     Hooks hooks_;
     config::FilesInUse files_;
     std::string scene_, failure_;
-    ring::UniqueFd arena_;
+    base::UniqueFd arena_;
     std::chrono::milliseconds patience_;
     ring::Reactor::Registration deadline_;
     std::unique_ptr<supervise::Process> process_;

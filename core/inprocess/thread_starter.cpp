@@ -37,12 +37,12 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
     // What it prints goes where this process prints; the pipe is one that has ended already.
     int pipe_ends[2];
     if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
-        ring::throw_errno("pipe for a worker's output");
+        base::throw_errno("pipe for a worker's output");
     spawned.output.reset(pipe_ends[0]);
     ::close(pipe_ends[1]);
     // Readable from its end on, as a pidfd is. Signals can't be sent to it.
-    spawned.pidfd = ring::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
-    ring::UniqueFd death(ring::checked(::dup(spawned.pidfd.get()), "dup"));
+    spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
+    base::UniqueFd death(base::checked(::dup(spawned.pidfd.get()), "dup"));
 
     const std::lock_guard lock(mutex_);
     const pid_t pid = spawned.pid = first_pid + static_cast<pid_t>(threads_.size());

@@ -11,12 +11,12 @@ namespace arhost::ring {
 std::pair<Channel, Channel> Channel::make_pair() {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
-        throw_errno("socketpair for a control channel");
+        base::throw_errno("socketpair for a control channel");
     for (const int end : ends) {
         const int size = 2 * max_message_size;
         ::setsockopt(end, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     }
-    return {Channel(UniqueFd(ends[0])), Channel(UniqueFd(ends[1]))};
+    return {Channel(base::UniqueFd(ends[0])), Channel(base::UniqueFd(ends[1]))};
 }
 
 bool Channel::send(const Json &body, std::initializer_list<int> fds, bool wait) const {

@@ -5,7 +5,7 @@
 // attach, log); frames go through the rings.
 #pragma once
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -19,7 +19,7 @@ using Json = nlohmann::json;
 
 struct Message {
     Json body; // an object; "type" says which
-    std::vector<UniqueFd> fds;
+    std::vector<base::UniqueFd> fds;
 };
 
 enum class ReceiveState { message, none, closed, breach };
@@ -31,7 +31,7 @@ public:
     static constexpr std::size_t max_message_size = 128 * 1024;
 
     Channel() = default;
-    explicit Channel(UniqueFd fd) : fd_(std::move(fd)) {}
+    explicit Channel(base::UniqueFd fd) : fd_(std::move(fd)) {}
     static std::pair<Channel, Channel> make_pair();
 
     // False where the peer is gone or, without `wait`, its queue is full.
@@ -44,7 +44,7 @@ public:
     void close() { fd_.reset(); }
 
 private:
-    UniqueFd fd_;
+    base::UniqueFd fd_;
 };
 
 } // namespace arhost::ring

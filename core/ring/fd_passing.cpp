@@ -28,7 +28,7 @@ ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, std::initial
     return sent;
 }
 
-Received receive_with_fds(int socket, std::span<std::byte> bytes, std::vector<UniqueFd> &fds, int flags) {
+Received receive_with_fds(int socket, std::span<std::byte> bytes, std::vector<base::UniqueFd> &fds, int flags) {
     iovec part{bytes.data(), bytes.size()};
     msghdr header{};
     header.msg_iov = &part;

@@ -3,7 +3,7 @@
 // One message with file descriptors over a Unix socket.
 #pragma once
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <cstddef>
 #include <initializer_list>
@@ -22,6 +22,6 @@ struct Received {
     bool truncated; // bytes or descriptors did not fit
 };
 // `fds` gets what came along, close-on-exec.
-Received receive_with_fds(int socket, std::span<std::byte> bytes, std::vector<UniqueFd> &fds, int flags = 0);
+Received receive_with_fds(int socket, std::span<std::byte> bytes, std::vector<base::UniqueFd> &fds, int flags = 0);
 
 } // namespace arhost::ring

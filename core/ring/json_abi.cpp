@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ring/json_abi.hpp"
 
-#include "ring/text.hpp"
+#include "base/text.hpp"
 
 #include <cmath>
 #include <cstring>
@@ -26,7 +26,8 @@ std::string text_of(const Json &json, const char *key) {
 // The worker's side of max_device_text_size. Of an endless text no more is read than decides where it is cut.
 std::string device_text(const char *text) {
     constexpr std::size_t longest_character = 4;
-    return text ? printable({text, ::strnlen(text, max_device_text_size + longest_character)}, max_device_text_size)
+    return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
+                                  max_device_text_size)
                 : std::string();
 }
 

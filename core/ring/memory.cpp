@@ -14,16 +14,16 @@
 namespace arhost::ring {
 namespace {
 
-std::size_t size_of(const UniqueFd &fd) {
+std::size_t size_of(const base::UniqueFd &fd) {
     struct stat status {};
     if (::fstat(fd.get(), &status) != 0)
-        throw_errno("fstat of shared memory");
+        base::throw_errno("fstat of shared memory");
     return static_cast<std::size_t>(status.st_size);
 }
 
-void add_seals(const UniqueFd &fd, int seals) {
+void add_seals(const base::UniqueFd &fd, int seals) {
     if (::fcntl(fd.get(), F_ADD_SEALS, seals) != 0)
-        throw_errno("sealing shared memory");
+        base::throw_errno("sealing shared memory");
 }
 
 } // namespace
@@ -34,24 +34,24 @@ Mapping::~Mapping() {
 }
 
 SharedMemory SharedMemory::create(const char *name, std::size_t size) {
-    UniqueFd fd = checked(::memfd_create(name, MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
+    base::UniqueFd fd = base::checked(::memfd_create(name, MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
     if (::ftruncate(fd.get(), static_cast<off_t>(size)) != 0)
-        throw_errno("ftruncate of shared memory");
+        base::throw_errno("ftruncate of shared memory");
     add_seals(fd, F_SEAL_GROW | F_SEAL_SHRINK);
     return SharedMemory(std::move(fd), size);
 }
 
-SharedMemory SharedMemory::adopt(UniqueFd fd) {
+SharedMemory SharedMemory::adopt(base::UniqueFd fd) {
     const int seals = ::fcntl(fd.get(), F_GET_SEALS);
     if (seals < 0)
-        throw_errno("shared memory that is no memfd");
+        base::throw_errno("shared memory that is no memfd");
     if ((seals & (F_SEAL_GROW | F_SEAL_SHRINK)) != (F_SEAL_GROW | F_SEAL_SHRINK))
         throw std::runtime_error("shared memory whose size is not sealed");
     const std::size_t size = size_of(fd);
     return SharedMemory(std::move(fd), size);
 }
 
-SharedMemory SharedMemory::adopt_and_freeze(UniqueFd fd) {
+SharedMemory SharedMemory::adopt_and_freeze(base::UniqueFd fd) {
     add_seals(fd, F_SEAL_GROW | F_SEAL_SHRINK | F_SEAL_WRITE | F_SEAL_SEAL);
     const std::size_t size = size_of(fd);
     return SharedMemory(std::move(fd), size);
@@ -65,7 +65,7 @@ Mapping SharedMemory::map(Access access) const {
     const int sharing = frozen && access == Access::read_only ? MAP_PRIVATE : MAP_SHARED;
     void *address = ::mmap(nullptr, size_, protection, sharing, fd_.get(), 0);
     if (address == MAP_FAILED)
-        throw_errno("mmap of shared memory");
+        base::throw_errno("mmap of shared memory");
     return Mapping(static_cast<std::byte *>(address), size_);
 }
 

@@ -8,7 +8,7 @@
 // to readers. What the host writes it maps and seals at once.
 #pragma once
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -48,10 +48,10 @@ public:
     // Zeros, sealed against growing and shrinking. `name` shows up in /proc for debugging.
     static SharedMemory create(const char *name, std::size_t size);
     // One that came from a peer. Throws where it is no memfd or could still be resized by the peer.
-    static SharedMemory adopt(UniqueFd fd);
+    static SharedMemory adopt(base::UniqueFd fd);
     // One that a peer has finished, has sealed or not: sealed here against everything. Throws where a
     // writable mapping still exists.
-    static SharedMemory adopt_and_freeze(UniqueFd fd);
+    static SharedMemory adopt_and_freeze(base::UniqueFd fd);
 
     Mapping map(Access access) const;
     // No new writable mapping and no write(2) from now on; those that exist stay.
@@ -62,8 +62,8 @@ public:
     explicit operator bool() const { return static_cast<bool>(fd_); }
 
 private:
-    SharedMemory(UniqueFd fd, std::size_t size) : fd_(std::move(fd)), size_(size) {}
-    UniqueFd fd_;
+    SharedMemory(base::UniqueFd fd, std::size_t size) : fd_(std::move(fd)), size_(size) {}
+    base::UniqueFd fd_;
     std::size_t size_ = 0;
 };
 

@@ -14,7 +14,7 @@ void Reactor::Registration::cancel() {
     reactor_ = nullptr;
 }
 
-Reactor::Reactor() : epoll_(checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")) {}
+Reactor::Reactor() : epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")) {}
 
 Reactor::Registration Reactor::watch(int fd, Callback callback) {
     const std::uint64_t id = next_id_++;
@@ -22,7 +22,7 @@ Reactor::Registration Reactor::watch(int fd, Callback callback) {
     event.events = EPOLLIN;
     event.data.u64 = id;
     if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0)
-        throw_errno("epoll_ctl");
+        base::throw_errno("epoll_ctl");
     watches_[id] = {fd, std::make_shared<Callback>(std::move(callback))};
     return Registration(this, id);
 }
@@ -66,7 +66,7 @@ void Reactor::take_events(std::optional<std::chrono::milliseconds> patience) {
     const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
                                    patience ? static_cast<int>(patience->count()) : -1);
     if (count < 0 && errno != EINTR)
-        throw_errno("epoll_wait");
+        base::throw_errno("epoll_wait");
     postpone_by_halt(patience);
     for (int i = 0; i < count; ++i) {
         const std::uint64_t id = events[static_cast<std::size_t>(i)].data.u64; // a copy: epoll_event is packed

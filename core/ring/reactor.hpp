@@ -4,7 +4,7 @@
 // and deadlines. Single-threaded.
 #pragma once
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -65,7 +65,7 @@ private:
     void take_events(std::optional<std::chrono::milliseconds> patience);
     void postpone_by_halt(std::optional<std::chrono::milliseconds> patience);
 
-    UniqueFd epoll_;
+    base::UniqueFd epoll_;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;

@@ -58,8 +58,8 @@ bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanose
 DoorbellPair make_doorbell() {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-        throw_errno("socketpair for a doorbell");
-    return {UniqueFd(ends[0]), UniqueFd(ends[1])};
+        base::throw_errno("socketpair for a doorbell");
+    return {base::UniqueFd(ends[0]), base::UniqueFd(ends[1])};
 }
 
 void ring_doorbell(int worker_end) {

@@ -8,7 +8,7 @@
 // flag that the worker may set on its end (O_NONBLOCK is shared by an eventfd's holders) makes it block.
 #pragma once
 
-#include "ring/unique_fd.hpp"
+#include "base/unique_fd.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -33,8 +33,8 @@ bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanose
                    std::chrono::nanoseconds spin = std::chrono::nanoseconds(0));
 
 struct DoorbellPair {
-    UniqueFd host;   // readable when rung
-    UniqueFd worker; // ring() it
+    base::UniqueFd host;   // readable when rung
+    base::UniqueFd worker; // ring() it
 };
 DoorbellPair make_doorbell();
 void ring_doorbell(int worker_end);

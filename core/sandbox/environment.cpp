@@ -40,6 +40,11 @@ bool is_kept(const Policy &policy, std::string_view entry) {
 
 } // namespace
 
+bool is_variable(std::string_view name) {
+    return !name.empty() &&
+           std::none_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '=' || c == 0x7f; });
+}
+
 void drop_environment(const Policy &policy) {
     char **next = environ;
     for (char **entry = environ; entry && *entry; ++entry)

@@ -54,6 +54,9 @@ Mode mode_of(std::string_view text);
 nlohmann::json to_json(const Policy &policy);
 Policy policy_from_json(const nlohmann::json &json); // throws nlohmann::json::exception
 
+// Whether it is one for Policy::environment: no "name=value", nothing blank.
+bool is_variable(std::string_view name);
+
 // How far a layer was reached.
 struct Layer {
     std::string name;

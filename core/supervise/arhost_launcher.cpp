@@ -2,7 +2,7 @@
 //
 // arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3; of no use by hand.
 // It starts workers, tells how they ended, and kills what they leave behind.
-#include "ring/orphans.hpp"
+#include "base/orphans.hpp"
 #include "supervise/launcher_protocol.hpp"
 
 #include <csignal>
@@ -18,8 +18,8 @@
 namespace {
 
 using namespace arhost::supervise;
-using arhost::ring::kill_orphans;
-using arhost::ring::UniqueFd;
+using arhost::base::kill_orphans;
+using arhost::base::UniqueFd;
 
 // In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
 [[noreturn]] void become(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/launcher.hpp"
 
-#include "ring/orphans.hpp"
+#include "base/orphans.hpp"
 #include "ring/wake.hpp"
 #include "supervise/launcher_protocol.hpp"
 
@@ -20,28 +20,16 @@
 namespace arhost::supervise {
 namespace {
 
-using ring::UniqueFd;
+using base::UniqueFd;
+
+using Clock = std::chrono::steady_clock;
 
 constexpr int most_tries = 5;
 
-// The launcher's next word; none: it is gone. One that somebody has stopped is made to go on: the host must not
-// stand still.
-std::optional<Reply> receive_reply(int socket, pid_t launcher, std::vector<UniqueFd> &fds) {
-    pollfd ready{socket, POLLIN, 0};
-    for (int count; (count = ::poll(&ready, 1, 50)) <= 0;) {
-        if (count < 0 && errno != EINTR)
-            ring::throw_errno("poll of the launcher");
-        ::kill(launcher, SIGCONT);
-    }
-    Reply reply;
-    if (!receive_struct(socket, reply, fds))
-        return std::nullopt;
-    return reply;
-}
-
 } // namespace
 
-Launcher::Launcher(std::filesystem::path program) : program_(std::move(program)), not_of_workers_(ring::children()) {
+Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds patience)
+    : program_(std::move(program)), patience_(patience), not_of_workers_(base::children()) {
     if (::access(program_.c_str(), X_OK) != 0)
         throw std::runtime_error(cannot_start(errno));
     ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a killed launcher leaves behind comes here
@@ -55,7 +43,7 @@ std::string Launcher::cannot_start(int error) const {
 void Launcher::start() {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
-        ring::throw_errno("socketpair for the launcher");
+        base::throw_errno("socketpair for the launcher");
     UniqueFd host_end(ends[0]);
     const UniqueFd launcher_end(ends[1]);
     posix_spawn_file_actions_t actions;
@@ -75,24 +63,47 @@ void Launcher::start() {
     socket_ = std::move(host_end);
 }
 
+// One that somebody has stopped is made to go on: the host must not stand still.
+std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
+    const auto deadline = Clock::now() + patience_;
+    pollfd ready{socket_.get(), POLLIN, 0};
+    for (int count; (count = ::poll(&ready, 1, 50)) <= 0;) {
+        if (count < 0 && errno != EINTR)
+            base::throw_errno("poll of the launcher");
+        if (Clock::now() > deadline)
+            return std::nullopt;
+        ::kill(pid_, SIGCONT);
+    }
+    Reply reply;
+    if (!receive_struct(socket_.get(), reply, fds))
+        return std::nullopt;
+    return reply;
+}
+
 void Launcher::lose() {
     ::kill(pid_, SIGKILL); // should only its socket be shut
     ::waitpid(pid_, nullptr, 0);
     std::vector<UniqueFd> fds;
-    for (Reply reply; receive_struct(socket_.get(), reply, fds);) // what it had still told
+    // What it had still told. Its end of the socket may be open in who is to die below.
+    for (Reply reply; socket_ && receive_struct(socket_.get(), reply, fds, MSG_DONTWAIT);)
         if (reply.kind == Reply::exited)
             note(reply.exit);
     socket_.reset();
     is_lost_ = true;
     alive_.clear();
-    ring::end_orphans(not_of_workers_); // what its workers have forked does not die with them
+    base::end_orphans(not_of_workers_); // what its workers have forked does not die with them
 }
 
 Launcher::~Launcher() {
     if (!socket_)
         return;
     socket_.reset();
+    const auto deadline = Clock::now() + patience_;
     while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
+        if (Clock::now() > deadline) {
+            lose();
+            return;
+        }
         ::kill(pid_, SIGCONT); // should somebody have stopped it
         ::usleep(1000);
     }
@@ -116,7 +127,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         ring::DoorbellPair doorbell = ring::make_doorbell();
         int pipe_ends[2];
         if (::pipe2(pipe_ends, O_CLOEXEC) != 0)
-            ring::throw_errno("pipe for a worker's output");
+            base::throw_errno("pipe for a worker's output");
         spawned.output.reset(pipe_ends[0]);
         const UniqueFd output_end(pipe_ends[1]);
         ::fcntl(spawned.output.get(), F_SETFL, O_NONBLOCK);
@@ -124,9 +135,9 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         std::vector<UniqueFd> fds;
         const bool sent = send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()});
         if (!sent && errno != EPIPE && errno != ECONNRESET) // the machine is short of something, not of a launcher
-            ring::throw_errno("no process can be started");
+            base::throw_errno("no process can be started");
         std::optional<Reply> reply;
-        while (sent && (reply = receive_reply(socket_.get(), pid_, fds)) && reply->kind == Reply::exited)
+        while (sent && (reply = receive_reply(fds)) && reply->kind == Reply::exited)
             note(reply->exit);
         if (!reply) {
             lose();
@@ -144,7 +155,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         return spawned;
     }
     throw std::runtime_error("no process can be started: " + program_.string() + " was started " +
-                             std::to_string(most_tries) + " times, and ended each time");
+                             std::to_string(most_tries) + " times, and ended or did not answer each time");
 }
 
 void Launcher::note(const Exit &exit) {
@@ -163,7 +174,7 @@ Exit Launcher::wait_exit(pid_t pid) {
         if (!alive_.contains(pid)) // it died with its launcher
             return {pid, SIGKILL, 0};
         std::vector<UniqueFd> fds;
-        if (const auto reply = receive_reply(socket_.get(), pid_, fds))
+        if (const auto reply = receive_reply(fds))
             note(reply->exit);
         else
             lose();

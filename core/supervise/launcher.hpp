@@ -2,21 +2,24 @@
 //
 // The launcher: a small single-threaded process, arhost-launcher, that is the parent of all workers. It starts them
 // on request and reports how they ended. Workers die with it (PR_SET_PDEATHSIG follows the thread that forked), and
-// it ends with the host, so a host that is killed leaves nothing behind. One that somebody kills is replaced, as
-// often as it takes.
+// it ends with the host, so a host that is killed leaves nothing behind. One that somebody kills, or that does not
+// answer, is replaced, as often as it takes.
 #pragma once
 
+#include "base/unique_fd.hpp"
 #include "ring/channel.hpp"
-#include "ring/unique_fd.hpp"
 #include "supervise/exit.hpp"
 
 #include <arhost/plugin.h>
 
+#include <chrono>
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace arhost::supervise {
 
@@ -26,11 +29,13 @@ using LogFunction =
 // A process that has just been started.
 struct Spawned {
     pid_t pid = 0;
-    ring::UniqueFd pidfd;    // readable once it is dead
+    base::UniqueFd pidfd;    // readable once it is dead
     ring::Channel channel;   // its descriptor 3
-    ring::UniqueFd doorbell; // its descriptor 4
-    ring::UniqueFd output;   // what it writes to stdout and stderr
+    base::UniqueFd doorbell; // its descriptor 4
+    base::UniqueFd output;   // what it writes to stdout and stderr
 };
+
+struct Reply;
 
 // What starts workers: the launcher, or whatever stands in for it (core/inprocess).
 class Starter {
@@ -49,8 +54,8 @@ public:
 class Launcher final : public Starter {
 public:
     // `program`: arhost-launcher, which is started together with the first worker. Throws std::runtime_error where it
-    // can't be executed.
-    explicit Launcher(std::filesystem::path program);
+    // can't be executed. `patience`: what it has to answer, and at the end to finish.
+    explicit Launcher(std::filesystem::path program, std::chrono::milliseconds patience = std::chrono::seconds(4));
     ~Launcher() override;
     Launcher(const Launcher &) = delete;
     Launcher &operator=(const Launcher &) = delete;
@@ -61,12 +66,14 @@ public:
 private:
     std::string cannot_start(int error) const;
     void start();
-    void lose(); // it is gone, and its workers with it
+    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds); // none: it is gone, or as good as
+    void lose();                                                          // it is gone, and its workers with it
     void note(const Exit &exit);
 
     std::filesystem::path program_;
+    std::chrono::milliseconds patience_;
     std::set<pid_t> not_of_workers_; // children of who became this program by exec
-    ring::UniqueFd socket_;          // none: no launcher is at work
+    base::UniqueFd socket_;          // none: no launcher is at work
     pid_t pid_ = 0;
     bool is_lost_ = false;  // and not yet replaced
     std::set<pid_t> alive_; // its children

@@ -26,8 +26,10 @@ constexpr int launcher_fd = 3;
 template <class Struct> bool send_struct(int socket, const Struct &data, std::initializer_list<int> fds = {}) {
     return ring::send_with_fds(socket, std::as_bytes(std::span(&data, 1)), fds) == sizeof data;
 }
-template <class Struct> bool receive_struct(int socket, Struct &data, std::vector<ring::UniqueFd> &fds) {
-    return ring::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds).size == sizeof data;
+template <class Struct>
+bool receive_struct(int socket, Struct &data, std::vector<base::UniqueFd> &fds, int flags = 0) {
+    return ring::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds, flags).size ==
+           sizeof data;
 }
 
 } // namespace arhost::supervise

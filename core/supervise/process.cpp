@@ -39,7 +39,7 @@ const char *to_text(Call call) {
     return "in an unknown call";
 }
 
-void signal_process(const UniqueFd &pidfd, int signal) {
+void signal_process(const base::UniqueFd &pidfd, int signal) {
     ::syscall(SYS_pidfd_send_signal, pidfd.get(), signal, nullptr, 0);
 }
 

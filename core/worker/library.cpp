@@ -77,11 +77,14 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
     void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) {
         const std::string reason = ::dlerror();
-        const bool of_another = reason.find("cannot open shared object file") != std::string::npos;
-        refuse(file, "can't be loaded: " + reason +
-                         (of_another ? " (if it lies where the sandbox may not look: 'reads: [FOLDER]' in the "
-                                       "configuration, '--reads FOLDER' of plugins and conform)"
-                                     : ""));
+        const auto tells = [&](const char *words) { return reason.find(words) != std::string::npos; };
+        const char *mend = "";
+        if (tells("cannot open shared object file"))
+            mend = " (if it lies where the sandbox may not look: 'reads: [FOLDER]' in the configuration, '--reads "
+                   "FOLDER' of plugins and conform)";
+        else if (tells("failed to map segment") || tells("cannot allocate memory"))
+            mend = " (it gets no more memory: 'memory_mb' may be too small)";
+        refuse(file, "can't be loaded: " + reason + mend);
     }
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)

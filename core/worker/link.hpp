@@ -20,7 +20,7 @@ class HostGone : public std::runtime_error {
 
 class Link {
 public:
-    Link(ring::Channel channel, ring::UniqueFd doorbell)
+    Link(ring::Channel channel, base::UniqueFd doorbell)
         : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
 
     // Waits for the next control message; throws HostGone.
@@ -62,7 +62,7 @@ private:
     }
 
     ring::Channel channel_;
-    ring::UniqueFd doorbell_;
+    base::UniqueFd doorbell_;
     ring::Mapping host_page_, worker_page_;
     std::optional<ring::CommandConsumer> commands_;
     std::optional<ring::ResultProducer> results_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/loader.hpp"
 
-#include "ring/file_identity.hpp"
+#include "base/file_identity.hpp"
 #include "scene/loader.hpp"
 
 #include <arhost/plugin.h>
@@ -16,7 +16,7 @@ int load_scene_for(Link &link, const ring::Message &load) {
     callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
     callbacks.warning = [&](const std::string &text) { link.log(ARHOST_SEVERITY_WARNING, text); };
     callbacks.reads = [&](const std::filesystem::path &file) {
-        const ring::FileIdentity identity = ring::identity_of(file);
+        const base::FileIdentity identity = base::identity_of(file);
         link.send({{"type", "reads"}, {"path", identity.path}, {"node", identity.node}});
     };
     scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);

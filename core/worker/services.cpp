@@ -144,7 +144,7 @@ public:
     arhost_status start(const Message &create, Json &) override {
         const Json &json = create.body.at("setup");
         require(create.fds.size() == 1, "the scene's arena did not come with 'create'");
-        arena_ = SharedMemory::adopt(UniqueFd(::dup(create.fds[0].get()))).map(Access::read_only);
+        arena_ = SharedMemory::adopt(base::UniqueFd(::dup(create.fds[0].get()))).map(Access::read_only);
         require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
         const arhost_intrinsics intrinsics = intrinsics_from_json(json.at("intrinsics"));
         arhost_raytracer_setup setup{};

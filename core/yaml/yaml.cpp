@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml/yaml.hpp"
 
+#include "base/text.hpp"
+
 #include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
@@ -55,6 +57,11 @@ std::vector<std::string> split_path(const std::string &path) {
     return parts;
 }
 
+// A value as messages show it.
+std::string shown(const std::string &text) {
+    return "'" + base::printable(text, 200) + "'";
+}
+
 std::string place_in(const std::string &name, const YAML::Mark &mark) {
     return name + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
 }
@@ -74,31 +81,86 @@ std::filesystem::path without_dots(const std::filesystem::path &path) {
     return result;
 }
 
-// Where documents begin, and nothing else of them.
-class DocumentStarts : public YAML::EventHandler {
-public:
-    std::vector<YAML::Mark> marks;
+YAML::Mark mark_of(const std::string &text, std::size_t position) {
+    YAML::Mark mark;
+    mark.pos = static_cast<int>(position);
+    mark.line = static_cast<int>(std::count(text.begin(), text.begin() + mark.pos, '\n'));
+    const std::size_t line = position == 0 ? std::string::npos : text.rfind('\n', position - 1);
+    mark.column = static_cast<int>(position - (line + 1)); // line + 1 is 0 in the first
+    return mark;
+}
 
-    void OnDocumentStart(const YAML::Mark &mark) override { marks.push_back(mark); }
+// Where documents begin, and whether the last value in quotation marks ends.
+class Marks : public YAML::EventHandler {
+public:
+    std::vector<YAML::Mark> documents;
+
+    explicit Marks(const std::string &text) : text_(text) {}
+    void OnDocumentStart(const YAML::Mark &mark) override { documents.push_back(mark); }
     void OnDocumentEnd() override {}
     void OnNull(const YAML::Mark &, YAML::anchor_t) override {}
     void OnAlias(const YAML::Mark &, YAML::anchor_t) override {}
-    void OnScalar(const YAML::Mark &, const std::string &, YAML::anchor_t, const std::string &) override {}
+    void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t, const std::string &) override {
+        std::size_t i = static_cast<std::size_t>(std::max(mark.pos, 0));
+        while (i < text_.size() && (text_[i] == '&' || text_[i] == '!')) // its properties come first
+            i = text_.find_first_not_of(" \t\r\n", text_.find_first_of(" \t\r\n", i));
+        if (i < text_.size() && (text_[i] == '"' || text_[i] == '\''))
+            last_quotation_ = i;
+    }
     void OnSequenceStart(const YAML::Mark &, const std::string &, YAML::anchor_t,
                          YAML::EmitterStyle::value) override {}
     void OnSequenceEnd() override {}
     void OnMapStart(const YAML::Mark &, const std::string &, YAML::anchor_t, YAML::EmitterStyle::value) override {}
     void OnMapEnd() override {}
+
+    // The library takes the text's end for that of a quotation.
+    std::optional<YAML::Mark> open_quotation() const {
+        if (!last_quotation_)
+            return std::nullopt;
+        const char quote = text_[*last_quotation_];
+        for (std::size_t i = *last_quotation_ + 1; i < text_.size(); ++i)
+            if ((quote == '"' && text_[i] == '\\') || (quote == '\'' && text_.compare(i, 2, "''") == 0))
+                ++i; // of the next one too
+            else if (text_[i] == quote)
+                return std::nullopt;
+        return mark_of(text_, *last_quotation_);
+    }
+
+private:
+    const std::string &text_;
+    std::optional<std::size_t> last_quotation_;
 };
 
-// Not by YAML::LoadAll: of "[1], 2" it makes documents without end, as the comma begins one, and stays.
-std::optional<YAML::Mark> second_document(const std::string &text) {
+// Throws YAML::ParserException, also for what the library lets pass.
+YAML::Node read(std::string text) {
+    if (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which marks do not count
+        text.erase(0, 3);
+    if (!base::is_utf8(text)) {
+        std::size_t line = 0, end = 0;
+        while (end = std::min(text.find('\n', line), text.size()), base::is_utf8({&text[line], end - line}))
+            line = end + 1;
+        throw YAML::ParserException(mark_of(text, line), "this line is no UTF-8, which YAML must be");
+    }
     std::istringstream stream(text);
     YAML::Parser parser(stream);
-    DocumentStarts starts;
-    while (starts.marks.size() < 2 && parser.HandleNextDocument(starts)) {
+    Marks marks(text);
+    const auto expect_quotation_closed = [&] {
+        if (const auto quotation = marks.open_quotation())
+            throw YAML::ParserException(*quotation, "the quotation that begins here does not end");
+    };
+    try {
+        // Not by YAML::LoadAll: of "[1], 2" it makes documents without end, as the comma begins one, and stays.
+        while (marks.documents.size() < 2 && parser.HandleNextDocument(marks)) {
+        }
+    } catch (const YAML::Exception &) {
+        expect_quotation_closed(); // which tells more than what is missing at the end
+        throw;
     }
-    return starts.marks.size() < 2 ? std::nullopt : std::optional(starts.marks[1]);
+    expect_quotation_closed();
+    if (marks.documents.size() > 1)
+        throw YAML::ParserException(marks.documents[1],
+                                    "another document begins here; keep one (remove the '---', or what stands here)");
+    return YAML::Load(text);
 }
 
 } // namespace
@@ -120,21 +182,25 @@ Node Node::load(const std::filesystem::path &file) {
         throw Error(file.string() + ": is a folder, not a YAML file");
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
         throw Error(file.string() + ": is no regular file");
+    if (!base::is_utf8(std::filesystem::absolute(file).native())) // nor would the paths in it be
+        throw Error(file.string() + ": the file's path is no UTF-8; rename what is not, it or a folder above");
+    std::string content;
     errno = 0;
-    std::ifstream stream(file, std::ios::binary);
-    const std::string content{std::istreambuf_iterator<char>(stream), {}};
-    if (!stream)
+    try {
+        std::ifstream stream;
+        stream.exceptions(std::ios::badbit | std::ios::failbit);
+        stream.open(file, std::ios::binary);
+        content.assign(std::istreambuf_iterator<char>(stream), {});
+    } catch (const std::ios_base::failure &) {
         throw Error(file.string() + ": can't be read: " + std::strerror(errno ? errno : EIO));
+    }
     return parse(content, file.string());
 }
 
 Node Node::parse(const std::string &text, const std::string &name) {
     auto document = std::make_shared<Document>(Document{name, {}});
     try {
-        if (const std::optional<YAML::Mark> second = second_document(text))
-            throw Error(place_in(name, *second) +
-                        "another YAML document begins here; keep one (remove the '---', or what stands here)");
-        return Node(YAML::Load(text), "", document);
+        return Node(read(text), "", document);
     } catch (const YAML::Exception &error) {
         throw Error(place_in(name, error.mark) + "YAML syntax: " + error.msg);
     }
@@ -147,9 +213,9 @@ Node Node::scalar(const std::string &text, const std::string &name) {
 void Node::override_value(const std::string &path, const std::string &value, const std::string &option) {
     YAML::Node parsed;
     try {
-        parsed = YAML::Load(value);
+        parsed = read(value);
     } catch (const YAML::Exception &error) {
-        throw Error(option + " " + path + "=" + value + ": YAML syntax: " + error.msg);
+        throw Error(option + " " + path + "=" + base::printable(value, 200) + ": YAML syntax: " + error.msg);
     }
     replace(path, parsed, option);
 }
@@ -279,7 +345,7 @@ bool Node::boolean() const {
         return true;
     if (text == "false")
         return false;
-    fail("must be true or false, is '" + text + "'");
+    fail("must be true or false, is " + shown(text));
 }
 
 std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
@@ -287,9 +353,10 @@ std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
     std::int64_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-        fail("must be a whole number, is '" + text + "'");
+        fail("must be a whole number, is " + shown(text));
     if (value < minimum || value > maximum)
-        fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", is " + text);
+        fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", is " +
+             base::printable(text, 200));
     return value;
 }
 
@@ -303,7 +370,7 @@ double Node::real(double minimum, double maximum) const {
     const char *end_of_text = digits.data() + digits.size();
     const auto [end, error] = std::from_chars(digits.data(), end_of_text, value);
     if (error == std::errc::invalid_argument || end != end_of_text)
-        fail("must be a number, is '" + text + "'");
+        fail("must be a number, is " + shown(text));
     std::ostringstream range;
     if (std::isfinite(minimum) && std::isfinite(maximum))
         range << minimum << " to " << maximum;
@@ -314,9 +381,9 @@ double Node::real(double minimum, double maximum) const {
     const bool too_small = error != std::errc() && std::abs(std::strtod(digits.c_str(), nullptr)) < 1;
     if (error != std::errc() || !std::isfinite(value))
         fail((too_small ? "must be a number farther from 0" : "must be a finite number") +
-             (range.str().empty() ? "" : ", " + range.str()) + ", is " + text);
+             (range.str().empty() ? "" : ", " + range.str()) + ", is " + base::printable(text, 200));
     if (value < minimum || value > maximum)
-        fail("must be " + range.str() + ", is " + text);
+        fail("must be " + range.str() + ", is " + base::printable(text, 200));
     return value;
 }
 
@@ -333,7 +400,7 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
     std::string value = text();
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
         const std::string near = nearest(value, choices);
-        fail("'" + value + "' is not one of " + listed(choices) +
+        fail(shown(value) + " is not one of " + listed(choices) +
              (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
     return value;
@@ -354,13 +421,18 @@ std::vector<double> Node::reals(std::size_t count) const {
 }
 
 std::filesystem::path Node::input_path() const {
-    const std::filesystem::path value = text();
-    const std::filesystem::path base = is_overridden() ? std::filesystem::path() : file().parent_path();
-    return without_dots(base / value);
+    return path_below(is_overridden() ? std::filesystem::path() : file().parent_path());
 }
 
 std::filesystem::path Node::output_path() const {
-    return without_dots(text());
+    return path_below({});
+}
+
+std::filesystem::path Node::path_below(const std::filesystem::path &folder) const {
+    std::filesystem::path path = without_dots(folder / text());
+    if (!base::is_utf8(path.native())) // plugins get paths as UTF-8
+        fail("the path " + shown(path) + " is no UTF-8; rename what is not, here or among the folders above");
+    return path;
 }
 
 } // namespace arhost::yaml

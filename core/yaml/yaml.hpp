@@ -94,7 +94,7 @@ public:
     std::vector<double> reals() const;                  // a sequence of finite numbers
     std::vector<double> reals(std::size_t count) const; // exactly so many
 
-    // Absolute paths, without dots: `..` behind a link leads up from its target, as it does for the kernel.
+    // Absolute paths in UTF-8, without dots: `..` behind a link leads up from its target, as it does for the kernel.
     std::filesystem::path input_path() const;  // from the folder of the document's file (after `--set` as below)
     std::filesystem::path output_path() const; // from the working directory
 
@@ -106,6 +106,7 @@ private:
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}
     std::string scalar(const char *wanted) const;
+    std::filesystem::path path_below(const std::filesystem::path &folder) const;
     std::string option() const; // that overrides this node, or ""
     void replace(const std::string &path, const YAML::Node &value, const std::string &option);
 

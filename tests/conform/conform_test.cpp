@@ -108,7 +108,7 @@ TEST(Conform, TellsHowToRunATestAgainAsItWasRun) {
 }
 
 TEST(Conform, RefusesOptionsThatMakeNoSense) {
-    const std::array<std::array<std::string, 3>, 12> wrong = {
+    const std::array<std::array<std::string, 3>, 13> wrong = {
         {{"--patience", "nan", "'nan' must be a number from 0.001 to 1000"},
          {"--patience", "1e300", "'1e300' must be a number from 0.001 to 1000"},
          {"--seed", "99999999999999999999", "must be a whole number from 0 to 18446744073709551615"},
@@ -120,6 +120,7 @@ TEST(Conform, RefusesOptionsThatMakeNoSense) {
          {"--print", "1=", "must be ID=FILE"},
          {"--print", "99999999999=a.png", "must be ID=FILE"},
          {"--environment", "A=B", "'A=B' must be a variable's name alone"},
+         {"--environment", "A B", "'A B' must be a variable's name alone"},
          {"--environment", "", "must be a variable's name alone"}}};
     for (const auto &[option, value, why] : wrong) {
         ConformRun run;
@@ -200,6 +201,57 @@ TEST(Conform, IsNotWellWhereItsWordsCanNotBeWritten) {
     EXPECT_THAT(run.output(), HasSubstr("can't write what the tests told: No space left on device"));
 }
 
+TEST(Conform, SaysSoWhereTheListCanNotBeWritten) {
+    ConformRun run;
+    run.start({"--list"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("No space left on device"));
+}
+
+// A pipe that is full and that nobody reads.
+TEST(Conform, IsEndedBySignalsWhereNobodyReadsIt) {
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
+        ConformRun run;
+        std::filesystem::create_directory(run.path("tmp"));
+        int ends[2];
+        ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+        ::fcntl(ends[1], F_SETPIPE_SZ, 4096);
+        ASSERT_EQ(::write(ends[1], std::string(4096, ' ').data(), 4096), 4096);
+        run.start({run.link_wrong("none").string(), "--only", "abi.create", "--json", "results.json", "--environment",
+                   "ARHOST_TELLS_DESCRIPTORS"},
+                  [&] {
+                      ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
+                      ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                      ::dup2(ends[1], stream);
+                      std::signal(SIGTERM, SIG_DFL);
+                  });
+        while (std::filesystem::is_empty(run.path("tmp"))) // a test runs: signals are taken
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(500)); // and by now it has something to say
+        ::kill(run.pid(), SIGTERM);
+        EXPECT_EQ(run.wait(), 128 + SIGTERM);
+        EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+        EXPECT_FALSE(run.exists("results.json"));
+        EXPECT_FALSE(has_unfinished_file(run));
+        ::close(ends[0]);
+        ::close(ends[1]);
+    }
+}
+
+TEST(Conform, RefusesToRunWhereAPluginWouldBeBlamed) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] {
+        const rlimit few{16, 16};
+        ::setrlimit(RLIMIT_NOFILE, &few);
+    });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("16 files may be open at once, and "));
+    EXPECT_THAT(run.output(), HasSubstr("raise it: ulimit -n "));
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::setenv("TMPDIR", "/no/such/folder", 1); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that is there"));
+}
+
 TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::signal(SIGCHLD, SIG_IGN); });
@@ -242,7 +294,7 @@ TEST(Conform, EndsWhatATestHasStarted) {
                        "processes"}), // and not less patience: what comes before it must end in time
               1);
     EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
-    EXPECT_NE(::kill(process_beside(run), 0), 0);
+    EXPECT_FALSE(is_alive(process_beside(run)));
 }
 
 TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
@@ -256,12 +308,12 @@ TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
                       std::signal(signal, SIG_DFL); // whatever this test's parent has it at
                   });
         const pid_t process = process_beside(run);
-        EXPECT_EQ(::kill(process, 0), 0);
+        EXPECT_TRUE(is_alive(process));
         EXPECT_FALSE(std::filesystem::is_empty(run.path("tmp")));
         ::kill(run.pid(), signal);
         EXPECT_EQ(run.wait(), 128 + signal);
         EXPECT_THAT(run.output(), HasSubstr("interrupted after 1 of 2 tests\n"));
-        EXPECT_NE(::kill(process, 0), 0);
+        EXPECT_FALSE(is_alive(process));
         EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
         EXPECT_FALSE(run.exists("results.json"));
         EXPECT_FALSE(has_unfinished_file(run));
@@ -493,7 +545,7 @@ TEST(Conform, BlamesNoSinkForAFullDisk) {
 
 TEST(Conform, BlamesASinkThatLeavesNoDescriptor) {
     ConformRun run;
-    run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks"}, [] {
+    run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks", "--jobs", "1"}, [] {
         const rlimit few{100, 100}; // gone after the warm-up
         ::setrlimit(RLIMIT_NOFILE, &few);
     });
@@ -516,7 +568,7 @@ TEST(Conform, WritesJUnitForContinuousIntegration) {
     ConformRun run;
     run.run({run.link_wrong("no_licence").string(), "--only", "abi.*", "--junit", "junit.xml"});
     const std::string xml = run.read("junit.xml");
-    EXPECT_THAT(xml, HasSubstr("tests=\"11\" failures=\"1\" errors=\"0\" skipped=\"0\""));
+    EXPECT_THAT(xml, HasSubstr("tests=\"12\" failures=\"1\" errors=\"0\" skipped=\"0\""));
     EXPECT_THAT(xml, HasSubstr("<testcase classname=\"abi\" name=\"descriptor\""));
     EXPECT_THAT(xml, HasSubstr("<failure type=\"fail\" message=\"the descriptor's licence is empty\">"));
 }

@@ -55,6 +55,7 @@ inline const std::vector<WrongPlugin> wrong_sinks = of_kind(
          "fail",
          {"sink.every-frame", "sink.order"}},
         {"keeps_all_to_its_end", "writes nothing before its end", "fail", {"sink.every-frame", "sink.restart"}},
+        {"writes_each_frame_twice", "writes each frame twice", "fail", {"sink.order"}},
         {"exchanges_frames", "exchanges every fourth frame with the one before", "fail", {"sink.order"}},
         {"newest_first", "writes the newest frame's line before the others", "fail", {"sink.order"}},
         {"writes_the_frame_before", "shows the frame before", "fail", {"sink.last-frame", "sink.restart"}},

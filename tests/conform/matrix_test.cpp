@@ -26,7 +26,7 @@ TEST_P(Matrix, FindsItByTheseTestsAndNoOther) {
     // What hangs is waited for, but not for half a minute.
     const bool hangs = wrong.verdict == "timeout";
     const int status = run.run({plugin.string(), "--only", wrong.kind == "rt" ? "*" : wrong.kind + ".*", "--jobs",
-                                "1", "--patience", hangs ? "0.1" : "3", "--json", "results.json"});
+                                "1", "--patience", hangs ? "0.3" : "3", "--json", "results.json"});
     std::vector<std::string> found_by;
     const nlohmann::json report = run.json("results.json");
     for (const nlohmann::json &result : report.at("results"))

@@ -47,31 +47,31 @@ config::Configuration make_configuration(const char *mode) {
     return config::parse(yaml::Node::parse(text, (scratch() / "run.yaml").string()), scratch() / "plugins");
 }
 
-UniqueFd scene_memory() {
+base::UniqueFd scene_memory() {
     static const scene::Arena arena = scene::test::full_scene().build();
-    UniqueFd fd = checked(::memfd_create("arena", MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
+    base::UniqueFd fd = base::checked(::memfd_create("arena", MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
     if (::write(fd.get(), arena.bytes().data(), arena.bytes().size()) < 0)
-        throw_errno("write to a memfd");
+        base::throw_errno("write to a memfd");
     return fd;
 }
 
-UniqueFd some_descriptor(unsigned kind) {
+base::UniqueFd some_descriptor(unsigned kind) {
     switch (kind % 4) {
     case 0:
         return scene_memory();
     case 1:
-        return checked(::open("/dev/null", O_RDWR | O_CLOEXEC), "/dev/null");
+        return base::checked(::open("/dev/null", O_RDWR | O_CLOEXEC), "/dev/null");
     case 2: // no memory behind it, and its seals shut
-        return checked(::memfd_create("empty", MFD_CLOEXEC), "memfd_create");
+        return base::checked(::memfd_create("empty", MFD_CLOEXEC), "memfd_create");
     default:
-        return checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
+        return base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
     }
 }
 
 // One worker, seen from its own end.
 class Worker {
 public:
-    Worker(pid_t process, Channel channel, UniqueFd doorbell, UniqueFd output, UniqueFd death)
+    Worker(pid_t process, Channel channel, base::UniqueFd doorbell, base::UniqueFd output, base::UniqueFd death)
         : pid(process), channel_(std::move(channel)), doorbell_(std::move(doorbell)), output_(std::move(output)),
           death_(std::move(death)) {}
 
@@ -153,7 +153,7 @@ private:
             finish(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
     }
 
-    void finish(const char *last_words, UniqueFd fd, Input &input) {
+    void finish(const char *last_words, base::UniqueFd fd, Input &input) {
         send(last_words, std::move(fd), input);
         finished_ = true;
     }
@@ -243,10 +243,10 @@ private:
     }
 
     // With `fd` and up to four others, which are a message's most.
-    void send(std::string text, UniqueFd fd, Input &input) const {
+    void send(std::string text, base::UniqueFd fd, Input &input) const {
         input.spoil(std::as_writable_bytes(std::span(text)));
         const unsigned more = input.number() < 200 ? 0 : input.number();
-        std::vector<UniqueFd> fds;
+        std::vector<base::UniqueFd> fds;
         if (fd)
             fds.push_back(std::move(fd));
         for (unsigned i = 0; i < more % 4; ++i)
@@ -265,7 +265,7 @@ private:
     }
 
     Channel channel_;
-    UniqueFd doorbell_, output_, death_;
+    base::UniqueFd doorbell_, output_, death_;
     Mapping host_page_, worker_page_, output_memory_;
     SlotLayout layout_;
     std::optional<CommandConsumer> commands_;
@@ -284,12 +284,12 @@ public:
         spawned.doorbell = std::move(doorbell.host);
         int pipe_ends[2];
         if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
-            throw_errno("pipe2");
+            base::throw_errno("pipe2");
         spawned.output.reset(pipe_ends[0]);
-        spawned.pidfd = checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // signals can't be sent to it
+        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // signals can't be sent to it
         spawned.pid = next_pid_++;
-        workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker), UniqueFd(pipe_ends[1]),
-                              checked(::dup(spawned.pidfd.get()), "dup"));
+        workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker),
+                              base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"));
         return spawned;
     }
 
@@ -330,7 +330,7 @@ void run_host(Bytes bytes) {
     host::Pipeline pipeline(configuration, {reactor, troupe, "", [](arhost_severity, auto &, auto &) {}},
                             [](const host::Progress &) {});
     // Readable for ever: one act after every look of the host.
-    const UniqueFd always = checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
+    const base::UniqueFd always = base::checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
     const auto acting = reactor.watch(always.get(), [&] {
         if (input.empty())
             pipeline.interrupt(); // the second ends it at once

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "plugin_under_test.hpp"
+#include "processes.hpp"
 
 #include <nlohmann/json.hpp>
 

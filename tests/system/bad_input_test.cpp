@@ -131,7 +131,15 @@ const std::vector<Case> cases = {
      replaced(good, "scene.yaml", "none.yaml"),
      small_scene,
      {"run.yaml:5:", "there is no scene file"}},
-    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"another YAML document begins here; keep one"}},
+    {"OpenQuotation",
+     replaced(good, "plugin: rt_counter", "plugin: \"rt_counter"),
+     small_scene,
+     {"run.yaml:5:", "the quotation that begins here does not end"}},
+    {"OutputsThatMeet",
+     good + "timeline: ./counted.txt\n",
+     small_scene,
+     {"run.yaml:", "timeline", "choose another path"}},
+    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"another document begins here; keep one"}},
     {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
     {"SceneWithMissingMesh",
      good,
@@ -347,9 +355,22 @@ TEST(BadCommandLine, IsRefused) {
         {{"--config", "run.yaml", "--set", "outputs.0.plugin=x"}, "--set: outputs[0].plugin: there is no plugin"},
         {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 needs --g1"},
         {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
+        {{"--config", "run.yaml", "--no\033[2J"}, "not expected: --no [2J"},
+        {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "no UTF-8"},
     };
     for (const auto &line : lines) {
         EXPECT_EQ(run.run(line.arguments), 2);
         EXPECT_THAT(run.output(), HasSubstr(line.expected));
+    }
+}
+
+TEST(FullDisk, BehindStandardOutputIsAnError) {
+    ArhostRun run(good);
+    run.write("scene.yaml", small_scene);
+    for (const std::vector<std::string> &arguments :
+         {std::vector<std::string>{"schema"}, {"plugins"}, {"check", "run.yaml"}}) {
+        run.start(arguments, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
+        EXPECT_EQ(run.wait(), 1);
+        EXPECT_THAT(run.output(), HasSubstr("standard output can't be written"));
     }
 }

@@ -273,9 +273,9 @@ TEST(Run, LeavesNoProcessBehindWhenItIsKilled) {
     ::kill(run.pid(), SIGKILL);
     EXPECT_EQ(run.wait(), 128 + SIGKILL);
     for (const pid_t worker : workers) {
-        for (int i = 0; i < 1000 && ::kill(worker, 0) == 0; ++i)
+        for (int i = 0; i < 1000 && is_alive(worker); ++i)
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        EXPECT_NE(::kill(worker, 0), 0) << "a worker outlived its host";
+        EXPECT_FALSE(is_alive(worker)) << "a worker outlived its host";
     }
 }
 

@@ -102,13 +102,20 @@ private:
     pid_t pid_;
 };
 
-// Every frame is there once and in order, and each overlay is its own; only that of the attack may lack.
-void expect_whole_video(const ArhostRun &run) {
+void expect_frames_in_order(const ArhostRun &run) {
     const auto lines = counted(run, "out/counted.txt");
     ASSERT_EQ(lines.size(), frames) << run.output();
     for (std::uint64_t i = 0; i < frames; ++i) {
         ASSERT_EQ(lines[i].sequence, i);
         ASSERT_EQ(lines[i].video, i);
+    }
+}
+
+// And each overlay is its own; only that of the attack may lack.
+void expect_whole_video(const ArhostRun &run) {
+    expect_frames_in_order(run);
+    const auto lines = counted(run, "out/counted.txt");
+    for (std::uint64_t i = 0; i < lines.size(); ++i) {
         if (i != attacked || lines[i].overlay != "none") {
             ASSERT_EQ(lines[i].overlay, std::to_string(i)) << i;
         }
@@ -296,6 +303,25 @@ TEST(Sandbox, ScribbledRingsAndSlotsEndTheirWorker) {
     HostileRun run("scribble");
     expect_ended(run, "broke the contract");
     EXPECT_THAT(run.output(), HasSubstr("make input writable: stopped"));
+}
+
+TEST(Sandbox, APluginForWhichItsMemoryIsTooSmallIsToldSo) {
+    REQUIRE_NO_SANITIZER();
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
+                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 1}\n"
+                  "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("'memory_mb' may be too small"));
+}
+
+// Whatever changes between a check and a use. A wrong pose may be among it, which nothing can tell from a right one.
+TEST(Sandbox, ThreadsThatChangeRingsAndSlotsDoNotHarmTheHost) {
+    for (int i = 0; i < 3; ++i) {
+        HostileRun run("race");
+        ASSERT_EQ(run.attack(), 0) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr("start no race: stopped"));
+        expect_frames_in_order(run);
+    }
 }
 
 TEST(Sandbox, SharedMemoryIsNotTruncated) {

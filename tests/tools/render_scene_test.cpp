@@ -6,11 +6,14 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <sys/wait.h>
 
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string counter = ARHOST_TEST_PLUGIN_DIRECTORY "/rt_counter.so";
 
@@ -27,6 +30,13 @@ protected:
                                     options + " > " + (scratch_.path() / "said.txt").string() + " 2>&1";
         status_ = std::system(command.c_str());
         return read(file);
+    }
+    const fs::path &folder() const { return scratch_.path(); }
+    int status_of(const std::string &arguments) const {
+        const int status = std::system((ARHOST_BINARY_DIRECTORY "/bin/render-scene" + arguments + " > " +
+                                        (scratch_.path() / "said.txt").string() + " 2>&1")
+                                           .c_str());
+        return WEXITSTATUS(status);
     }
     std::string said() const { return read(scratch_.path() / "said.txt"); }
     bool failed() const { return status_ != 0; }
@@ -49,6 +59,24 @@ TEST_F(RenderScene, ShowsWhatMovesWhereItIsAtThatTime) {
     EXPECT_NE(early, late);
     EXPECT_EQ(picture("moving", "--time 8.5"), late) << "a loop takes 6 s";
     EXPECT_EQ(picture("moving", ""), picture("moving", "--time 0"));
+}
+
+TEST_F(RenderScene, ReplacesNothingThatTheSceneReads) {
+    const fs::path scene = folder() / "wood.png";
+    std::ofstream(scene) << "version: 1\n";
+    const std::string named = " " + scene.string() + " --output " + (folder() / "link.png").string();
+    fs::create_hard_link(scene, folder() / "link.png");
+    EXPECT_EQ(status_of(named), 1);
+    EXPECT_THAT(said(), HasSubstr("link.png: is a file that the scene reads; choose another"));
+    EXPECT_EQ(fs::file_size(scene), 11u);
+}
+
+TEST_F(RenderScene, TellsOfWrongUsageInOneLineThatCantSteerATerminal) {
+    EXPECT_EQ(status_of(" a.yaml --output a.png '--no\x1b[2Jsuch'"), 2);
+    EXPECT_THAT(said(), AllOf(HasSubstr("--no [2Jsuch"), Not(HasSubstr("\x1b"))));
+    EXPECT_EQ(status_of(" 'no\x1b[2Jsuch.yaml' --output " + (folder() / "a.png").string()), 1);
+    EXPECT_THAT(said(), AllOf(HasSubstr("no [2Jsuch.yaml"), Not(HasSubstr("\x1b"))));
+    EXPECT_FALSE(fs::exists(folder() / "a.png"));
 }
 
 TEST_F(RenderScene, PassesOverTheTimeWhereNothingMoves) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ray_tracer.hpp"
 
+#include "base/text.hpp"
 #include "config/options.hpp"
 #include "config/plugin_path.hpp"
 #include "ring/json_abi.hpp"
 #include "ring/protocol.hpp"
-#include "ring/text.hpp"
 #include "scene/motion.hpp"
 #include "worker/library.hpp"
 
@@ -33,7 +33,7 @@ constexpr arhost_host host = {sizeof(arhost_host),
                               nullptr,
                               [](const arhost_host *, arhost_severity severity, const char *text) {
                                   if (severity >= ARHOST_SEVERITY_WARNING)
-                                      std::fprintf(stderr, "%s\n", ring::printable(text ? text : "").c_str());
+                                      std::fprintf(stderr, "%s\n", base::printable(text ? text : "").c_str());
                               },
                               [](const arhost_host *, double, const char *) {},
                               [](const arhost_host *) { return 0; },

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+#include "base/file_identity.hpp"
+#include "base/text.hpp"
+#include "base/whole_file.hpp"
 #include "ray_tracer.hpp"
 #include "scene/loader.hpp"
 
@@ -19,7 +22,10 @@
 
 namespace {
 
+namespace base = arhost::base;
 using Vector = std::array<double, 3>;
+
+enum ExitStatus { bad_usage = 2 };
 
 struct View {
     Vector eye{0, -300, 200}, look_at{0, 0, 40}, up{};
@@ -60,9 +66,15 @@ cv::Mat over_checkerboard(const cv::Mat &rgba) {
     return picture;
 }
 
-cv::Mat render(const std::string &file, View view, double time_s, const RayTracer &ray_tracer) {
+cv::Mat render(const std::string &file, View view, double time_s, const RayTracer &ray_tracer,
+               const std::string &output) {
     arhost::scene::LoadCallbacks callbacks;
-    callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
+    callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", base::printable(text).c_str()); };
+    callbacks.reads = [&, of_output = base::identity_of(output)](const std::filesystem::path &read) {
+        if (const auto [path, node] = base::identity_of(read); path == of_output.path || node == of_output.node)
+            throw std::runtime_error(output + ": is a file that the scene reads; choose another");
+    };
+    callbacks.reads(file);
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
     if (const std::string wrong = arhost::scene::validate(arena.bytes()); !wrong.empty())
         throw std::runtime_error(file + ": " + wrong);
@@ -130,12 +142,20 @@ int main(int argc, char **argv) {
     app.add_option("--label", label, "A line of text to write into the picture");
     app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
     app.add_option("--output,-o", output, "The file to write")->required();
-    CLI11_PARSE(app, argc, argv);
+    app.failure_message([](const CLI::App *, const CLI::Error &error) {
+        return base::printable(error.what()) + "\nRun with --help for more information.\n";
+    });
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &error) {
+        return app.exit(error) == 0 ? EXIT_SUCCESS : bad_usage;
+    }
     try {
         if (!cv::haveImageWriter(output))
             throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
+        base::WholeFile file(output);
         const cv::Mat rgba =
-            render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)));
+            render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)), output);
         cv::Mat picture;
         if (transparent)
             cv::cvtColor(rgba, picture, cv::COLOR_RGBA2BGRA);
@@ -146,10 +166,12 @@ int main(int argc, char **argv) {
             if (!label.empty())
                 cv::putText(picture, label, {14, picture.rows / 14}, cv::FONT_HERSHEY_SIMPLEX, picture.rows / 550.0,
                             colour, width, cv::LINE_AA);
-        if (!cv::imwrite(output, picture))
-            throw std::runtime_error(output + ": can't be written");
+        std::vector<unsigned char> bytes;
+        if (!cv::imencode(std::filesystem::path(output).extension(), picture, bytes))
+            throw std::runtime_error(output + ": a picture of such a kind can't be made of this");
+        file.write({bytes.begin(), bytes.end()});
     } catch (const std::exception &error) {
-        std::fprintf(stderr, "render-scene: %s\n", error.what());
+        std::fprintf(stderr, "render-scene: %s\n", base::printable(error.what()).c_str());
         return EXIT_FAILURE;
     }
 }

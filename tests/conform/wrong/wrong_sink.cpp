@@ -207,7 +207,8 @@ private:
     static void write_frame(const std::string &path, const Waiting &frame) {
         if (has("writes_no_file"))
             return;
-        const std::string name = path + std::to_string(frame.sequence), part = path + ".part";
+        const std::uint64_t number = has("writes_each_frame_twice") ? 2 * frame.sequence : frame.sequence;
+        const std::string name = path + std::to_string(number), part = path + ".part";
         if (has("half_files")) {
             const std::size_t half = frame.pixels.size() / 2;
             put(name, frame.pixels.substr(0, half), O_TRUNC);
@@ -225,6 +226,10 @@ private:
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, name.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
+        }
+        if (has("writes_each_frame_twice")) {
+            put(part, frame.pixels, O_TRUNC);
+            fs::rename(part, path + std::to_string(number + 1));
         }
         if (has("writes_more_files")) // whose names sort before the others'
             for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {

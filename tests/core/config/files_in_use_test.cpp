@@ -121,13 +121,37 @@ TEST_F(FilesInUseTest, KnowsWhatAnotherOutputWrites) {
     EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "") << "one file by two names is one output's";
 }
 
+TEST_F(FilesInUseTest, KnowsOutputsThatCanMeetBeforeTheirFilesAreThere) {
+    const auto meet = [&](const std::string &one, const std::string &other) {
+        FilesInUse files;
+        files.write(node(one));
+        const std::string error = error_of([&] { files.write(node(other)); });
+        EXPECT_THAT(error, testing::AnyOf("", HasSubstr("can write a file of the same name"), HasSubstr("already")));
+        return !error.empty();
+    };
+    EXPECT_TRUE(meet("f%d.png", "f1%d.png"));
+    EXPECT_TRUE(meet("f1%d.png", "f%d.png"));
+    EXPECT_TRUE(meet("f%03d.png", "./f%04d.png")) << "both write f1000.png";
+    EXPECT_TRUE(meet("f%d.png", "f%d2.png"));
+    EXPECT_TRUE(meet("f%d.png", "f3.png"));
+    EXPECT_TRUE(meet("f3.png", "f%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "g%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "f-%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "f%d.jpg"));
+    EXPECT_FALSE(meet("f%d.png", "f.png"));
+    EXPECT_FALSE(meet("f%d.png", "there/f%d.png"));
+    fs::create_directory(folder / "there");
+    fs::create_directory_symlink("there", folder / "link");
+    EXPECT_TRUE(meet("link/f%d.png", "there/f7.png"));
+}
+
 TEST_F(FilesInUseTest, TellsOfAnOutputWhenItsFileIsReadLater) {
     file("wood.png");
     FilesInUse files;
     files.write(node("wood.png"));
     files.write(node("new.png"));
     const auto error_about = [&](const std::string &name) {
-        return error_of([&] { files.check_read(arhost::ring::identity_of(folder / name)); });
+        return error_of([&] { files.check_read(arhost::base::identity_of(folder / name)); });
     };
     EXPECT_EQ(error_about("stone.png"), "");
     const std::string refused =

@@ -19,16 +19,16 @@ namespace {
 
 struct PlayedLoader final : supervise::Starter {
     Channel channel;
-    UniqueFd death;
+    base::UniqueFd death;
 
     supervise::Spawned spawn(const fs::path &, const supervise::LogFunction &) override {
         supervise::Spawned spawned;
         std::tie(spawned.channel, channel) = Channel::make_pair();
         spawned.doorbell = make_doorbell().host;
-        spawned.output = UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // silent
-        spawned.pidfd = UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals can't be sent to it
+        spawned.output = base::UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // silent
+        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals can't be sent to it
         spawned.pid = 1 << 22; // above the highest that Linux gives to a process
-        death = UniqueFd(::dup(spawned.pidfd.get()));
+        death = base::UniqueFd(::dup(spawned.pidfd.get()));
         return spawned;
     }
     supervise::Exit wait_exit(pid_t pid) override { return {pid, 0, 0}; }
@@ -52,7 +52,7 @@ struct SceneLoadingTest : testing::Test {
         return failure;
     }
     Json reads(const fs::path &file) const {
-        const FileIdentity identity = identity_of(folder / file);
+        const arhost::base::FileIdentity identity = arhost::base::identity_of(folder / file);
         return {{"type", "reads"}, {"path", identity.path}, {"node", identity.node}};
     }
     arhost::test::ScratchFolder scratch;

@@ -13,7 +13,7 @@ TEST(Channel, CarriesMessagesAndDescriptors) {
     auto [host, worker] = Channel::make_pair();
     int pipe_ends[2];
     ASSERT_EQ(::pipe(pipe_ends), 0);
-    const UniqueFd read_end(pipe_ends[0]), write_end(pipe_ends[1]);
+    const arhost::base::UniqueFd read_end(pipe_ends[0]), write_end(pipe_ends[1]);
     ASSERT_TRUE(host.send({{"type", "attach"}, {"generation", 7}}, {write_end.get()}));
     Message message;
     ASSERT_EQ(worker.receive(message, 1000), ReceiveState::message);

@@ -31,19 +31,19 @@ TEST(SharedMemory, KeepsItsWriterAndLetsNoOtherWriteAfterTheSeal) {
 }
 
 TEST(SharedMemory, IsNotTakenFromAPeerThatCouldResizeIt) {
-    UniqueFd resizable(::memfd_create("test", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    arhost::base::UniqueFd resizable(::memfd_create("test", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     ASSERT_EQ(::ftruncate(resizable.get(), 4096), 0);
     EXPECT_THROW(SharedMemory::adopt(std::move(resizable)), std::runtime_error);
-    EXPECT_THROW(SharedMemory::adopt(UniqueFd(::open("/dev/null", O_RDWR))), std::system_error);
+    EXPECT_THROW(SharedMemory::adopt(arhost::base::UniqueFd(::open("/dev/null", O_RDWR))), std::system_error);
 }
 
 TEST(SharedMemory, IsFrozenOnlyWhenNobodyMapsItWritable) {
     const SharedMemory memory = SharedMemory::create("test", 4096);
     {
         const Mapping writer = memory.map(Access::read_write);
-        EXPECT_THROW(SharedMemory::adopt_and_freeze(UniqueFd(::dup(memory.fd()))), std::system_error);
+        EXPECT_THROW(SharedMemory::adopt_and_freeze(arhost::base::UniqueFd(::dup(memory.fd()))), std::system_error);
     }
-    const SharedMemory frozen = SharedMemory::adopt_and_freeze(UniqueFd(::dup(memory.fd())));
+    const SharedMemory frozen = SharedMemory::adopt_and_freeze(arhost::base::UniqueFd(::dup(memory.fd())));
     EXPECT_EQ(frozen.size(), 4096u);
     EXPECT_THROW(frozen.map(Access::read_write), std::system_error);
 }

@@ -15,12 +15,12 @@ struct Pipe {
     Pipe() {
         int ends[2];
         if (::pipe(ends) != 0)
-            throw_errno("pipe");
+            arhost::base::throw_errno("pipe");
         read.reset(ends[0]);
         write.reset(ends[1]);
     }
     void put() const { EXPECT_EQ(::write(write.get(), "x", 1), 1); }
-    UniqueFd read, write;
+    arhost::base::UniqueFd read, write;
 };
 
 } // namespace

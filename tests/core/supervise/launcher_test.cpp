@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/launcher.hpp"
 
+#include "plugin_under_test.hpp"
+#include "processes.hpp"
+
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -9,6 +12,7 @@
 #include <sys/wait.h>
 
 using namespace arhost::supervise;
+using arhost::test::is_alive;
 
 namespace {
 
@@ -115,7 +119,39 @@ TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
     };
     EXPECT_EQ(reason("/no/such/program"),
               "/no/such/program can't be started: No such file or directory; is it installed beside arhost?");
-    EXPECT_EQ(reason("/bin/true"), "no process can be started: /bin/true was started 5 times, and ended each time");
+    EXPECT_EQ(reason("/bin/true"),
+              "no process can be started: /bin/true was started 5 times, and ended or did not answer each time");
+}
+
+// One that hangs in the kernel, or in a debugger.
+TEST(Launcher, IsReplacedWhereItDoesNotAnswer) {
+    const arhost::test::ScratchFolder scratch;
+    const std::string deaf = scratch.path() / "deaf";
+    std::ofstream(deaf) << "#!/bin/sh\nif mkdir " << deaf << ".once; then sleep 1000 & echo $! > " << deaf
+                        << ".pid; wait; fi\nexec " << program << "\n";
+    std::filesystem::permissions(deaf, std::filesystem::perms::owner_all);
+    Launcher launcher(deaf, std::chrono::milliseconds(500));
+    const Spawned spawned = launcher.spawn("/bin/true", no_log);
+    wait_dead(spawned);
+    EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 0);
+    pid_t child = 0;
+    std::ifstream(deaf + ".pid") >> child;
+    EXPECT_FALSE(is_alive(child)) << "what it had started goes on";
+}
+
+TEST(Launcher, DoesNotHoldUpTheEndWhereItDoesNotEnd) {
+    const arhost::test::ScratchFolder scratch;
+    const std::string deaf = scratch.path() / "deaf";
+    std::ofstream(deaf) << "#!/bin/sh\necho $$ > " << deaf << ".pid\n" << program << "\nexec sleep 1000\n";
+    std::filesystem::permissions(deaf, std::filesystem::perms::owner_all);
+    {
+        Launcher launcher(deaf, std::chrono::milliseconds(500));
+        wait_dead(launcher.spawn("/bin/true", no_log));
+    }
+    pid_t pid = 0;
+    std::ifstream(deaf + ".pid") >> pid;
+    EXPECT_GT(pid, 0);
+    EXPECT_FALSE(is_alive(pid));
 }
 
 // What PR_SET_PDEATHSIG alone would not: it goes on, and has the workers' own processes ended too.
@@ -136,11 +172,9 @@ TEST(Launcher, EndsWithItsHostThoughItIsStopped) {
     ASSERT_EQ(::read(ends[0], pids, sizeof pids), static_cast<ssize_t>(sizeof pids));
     ::waitpid(host, nullptr, 0);
     for (const pid_t pid : pids) {
-        for (int i = 0; i < 5000 && ::kill(pid, 0) == 0; ++i) {
-            ::waitpid(pid, nullptr, WNOHANG); // a launcher of another test has made this process a subreaper
+        for (int i = 0; i < 5000 && is_alive(pid); ++i)
             ::usleep(2000);
-        }
-        EXPECT_NE(::kill(pid, 0), 0);
+        EXPECT_FALSE(is_alive(pid));
         ::kill(pid, SIGKILL);
     }
     ::close(ends[0]);

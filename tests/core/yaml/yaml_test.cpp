@@ -57,16 +57,70 @@ TEST(Yaml, SaysWhereTheSyntaxIsWrong) {
 
 TEST(Yaml, SaysWhereASecondDocumentBegins) {
     EXPECT_THAT(error_of([] { Node::parse("a: 1\n---\nb: 2\n", "a.yaml"); }),
-                HasSubstr("a.yaml:2:1: another YAML document begins here; keep one"));
+                HasSubstr("a.yaml:2:1: YAML syntax: another document begins here; keep one"));
     // What is no document, though it does not end the one before it.
-    EXPECT_THAT(error_of([] { Node::parse("[1, 2], 3\n", "a.yaml"); }), HasSubstr("a.yaml:1:7: another"));
-    EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: another"));
+    EXPECT_THAT(error_of([] { Node::parse("[1, 2], 3\n", "a.yaml"); }),
+                HasSubstr("a.yaml:1:7: YAML syntax: another"));
+    EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: YAML syntax: another"));
+}
+
+// The library takes the text's end for the quotation's, and keys in between would be lost.
+TEST(Yaml, SaysWhereAQuotationBeginsThatDoesNotEnd) {
+    const auto error = [](const std::string &text) { return error_of([&] { Node::parse(text, "a.yaml"); }); };
+    const std::string why = "YAML syntax: the quotation that begins here does not end";
+    EXPECT_EQ(error("a: 1\nb: \"x\nmode: live\n"), "a.yaml:2:4: " + why);
+    EXPECT_EQ(error("a: 1\nb: 'it''s\nmode: live\n"), "a.yaml:2:4: " + why);
+    EXPECT_EQ(error("a: \"x\\\"\n"), "a.yaml:1:4: " + why);
+    EXPECT_EQ(error("a: &b !!str \"x\n"), "a.yaml:1:13: " + why);
+    EXPECT_EQ(error("a: {b: \"x}\n"), "a.yaml:1:8: " + why);
+    EXPECT_EQ(error("\xef\xbb\xbf'a: 1\n"), "a.yaml:1:1: " + why);
+    for (const std::string closed :
+         {"a: 'it''s'", "a: \"\\\"\" # \"", "a: it's", "a: ''", "- &b \"\"\n- *b\n", "a: |\n  \"x\n"})
+        EXPECT_EQ(error(closed), "no error") << closed;
+    EXPECT_THAT(error_of([] { sample().override_value("mode", "'live"); }),
+                HasSubstr("--set mode='live: YAML syntax: "));
+    EXPECT_THAT(error_of([] { sample().override_value("mode", "'live\n"); }), HasSubstr("the quotation that begins"));
+}
+
+TEST(Yaml, SaysWhichLineIsNoUtf8) {
+    EXPECT_EQ(error_of([] { Node::parse("a: é\nb: caf\xe9\n", "a.yaml"); }),
+              "a.yaml:2:1: YAML syntax: this line is no UTF-8, which YAML must be");
+    EXPECT_THAT(error_of([] {
+                    Node::parse(std::string("\xff\xfe"
+                                            "a\0:\0",
+                                            6),
+                                "a.yaml");
+                }),
+                HasSubstr("a.yaml:1:1"));
+    EXPECT_THAT(error_of([] { sample().override_value("mode", "\xe9"); }), HasSubstr("no UTF-8"));
+}
+
+TEST(Yaml, RefusesPathsThatAreNoUtf8) {
+    EXPECT_THAT(error_of([] { Node::parse("a: b.png", "caf\xe9/lab.yaml").require("a").input_path(); }),
+                HasSubstr("/b.png' is no UTF-8; rename"));
+    Node node = Node::parse("a: b", "a.yaml");
+    node.override_text("a", "caf\xe9", "--output");
+    EXPECT_THAT(error_of([&] { node.require("a").output_path(); }), HasSubstr("--output: a: the path"));
+}
+
+TEST(Yaml, RefusesASecondDocumentOnTheCommandLine) {
+    EXPECT_THAT(error_of([] { sample().override_value("mode", "live\n---\nlockstep"); }),
+                HasSubstr("another document begins here"));
+}
+
+TEST(Yaml, ShowsTheBeginningOfAValueThatIsLong) {
+    const std::string error =
+        error_of([] { Node::parse("a: " + std::string(3'000'000, 'x'), "a.yaml").require("a").real(); });
+    EXPECT_LT(error.size(), 300u);
+    EXPECT_THAT(error, HasSubstr("must be a number, is 'xxx"));
 }
 
 TEST(Yaml, SaysWhyAFileCantBeRead) {
     EXPECT_EQ(error_of([] { Node::load("/no/such.yaml"); }),
               "/no/such.yaml: can't be read: No such file or directory");
     EXPECT_EQ(error_of([] { Node::load("/tmp"); }), "/tmp: is a folder, not a YAML file");
+    EXPECT_EQ(error_of([] { Node::load("/proc/self/mem"); }), "/proc/self/mem: can't be read: Input/output error");
+    EXPECT_THAT(error_of([] { Node::load("caf\xe9/lab.yaml"); }), HasSubstr("path is no UTF-8; rename"));
 }
 
 TEST(Yaml, OverridesValuesFromTheCommandLine) {

@@ -312,6 +312,37 @@ static void scribble_on(const tracker *self, void *bytes, size_t size, int writa
         tell(self, "make input writable", mprotect(bytes, size, PROT_READ | PROT_WRITE) == 0);
 }
 
+typedef struct {
+    volatile uint32_t *words;
+    size_t count;
+} memory;
+static memory memories[64];
+static size_t memory_count;
+
+static void note_memory(const tracker *self, void *bytes, size_t size, int writable) {
+    (void)self;
+    if (writable && memory_count < sizeof memories / sizeof *memories)
+        memories[memory_count++] = (memory){bytes, size / sizeof(uint32_t)};
+}
+
+/* Each word is right when the host checks it, and may be another when it uses it. */
+static void *race(void *unused) {
+    uint32_t flip = 1;
+    size_t i, j, twice;
+    for (;; flip = flip * 1664525u + 1013904223u)
+        for (twice = 0; twice < 2; ++twice)
+            for (i = 0; i < memory_count; ++i)
+                for (j = 0; j < memories[i].count; ++j)
+                    memories[i].words[j] ^= flip;
+    return unused;
+}
+
+static void race_the_host(const tracker *self) {
+    pthread_t thread;
+    each_shared(self, note_memory);
+    tell(self, "start no race", pthread_create(&thread, NULL, race, NULL) != 0);
+}
+
 static void truncate_one(const tracker *self, void *bytes, size_t size, int writable) {
     char file[128];
     int fd;
@@ -378,6 +409,8 @@ static void attack(const tracker *self) {
         hold_descriptors(self);
     else if (!strcmp(name, "scribble"))
         each_shared(self, scribble_on);
+    else if (!strcmp(name, "race"))
+        race_the_host(self);
     else if (!strcmp(name, "truncate"))
         each_shared(self, truncate_one);
     else if (!strcmp(name, "flags"))

@@ -124,7 +124,7 @@ typedef struct arhost_option_descriptor {
 } arhost_option_descriptor;
 
 /* A value. Every declared option is passed to `create`, in the descriptor's order: the configured value
- * or the default. */
+ * or the default. A newer host may pass others behind them, which a plugin passes over. */
 typedef struct arhost_option {
     uint32_t struct_size;
     arhost_option_type type;

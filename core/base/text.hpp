@@ -6,7 +6,9 @@
 #include <string>
 #include <string_view>
 
-namespace arhost::ring {
+namespace arhost::base {
+
+bool is_utf8(std::string_view text);
 
 // What is no UTF-8 becomes U+FFFD.
 std::string valid_utf8(std::string_view text);
@@ -16,4 +18,4 @@ std::string valid_utf8(std::string_view text);
 // cut off there, and ends in "…".
 std::string printable(std::string_view text, std::size_t max_size = std::string_view::npos);
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ring/whole_file.hpp"
+#include "base/whole_file.hpp"
 
-#include "ring/file_identity.hpp"
+#include "base/file_identity.hpp"
+#include "base/write_all.hpp"
 
 #include <cerrno>
 #include <cstdlib>
@@ -11,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace arhost::ring {
+namespace arhost::base {
 namespace {
 
 namespace fs = std::filesystem;
@@ -47,21 +48,20 @@ WholeFile::WholeFile(const fs::path &file) : file_(file) {
     if (fs::is_directory(status))
         throw std::runtime_error("can't write " + file.string() + ": it is a folder");
     if (const int fd = standard_stream(file_); fd >= 0) {
-        stream_.reset(::fdopen(::fcntl(fd, F_DUPFD_CLOEXEC, 3), "w"));
+        fd_.reset(::fcntl(fd, F_DUPFD_CLOEXEC, 3));
     } else if (fs::exists(status) && !fs::is_regular_file(status)) {
-        stream_.reset(std::fopen(file_.c_str(), "ae"));
+        fd_.reset(::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
     } else {
         file_ = real_path(file_); // a link stays one
         std::string beside = file_.string() + ".XXXXXX.tmp";
-        const int temporary = ::mkostemps(beside.data(), 4, O_CLOEXEC);
-        if (temporary < 0)
-            refuse();
-        temporary_ = beside;
-        ::fchmod(temporary, mode_of(file_));
-        stream_.reset(::fdopen(temporary, "w"));
+        fd_.reset(::mkostemps(beside.data(), 4, O_CLOEXEC));
+        if (fd_) {
+            temporary_ = beside;
+            ::fchmod(fd_.get(), mode_of(file_));
+        }
     }
-    if (!stream_)
-        refuse();
+    if (!fd_)
+        refuse(errno);
 }
 
 WholeFile::~WholeFile() {
@@ -70,19 +70,23 @@ WholeFile::~WholeFile() {
         fs::remove(temporary_, ignored);
 }
 
-void WholeFile::write(const std::string &text) {
-    if (!stream_)
+void WholeFile::write(const std::string &text, int signals) {
+    if (!fd_)
         return;
-    const bool whole = std::fwrite(text.data(), 1, text.size(), stream_.get()) == text.size();
-    if (std::fclose(stream_.release()) != 0 || !whole)
-        refuse();
+    try {
+        write_all(fd_.get(), text, signals);
+    } catch (const std::system_error &error) {
+        refuse(error.code().value());
+    }
+    if (::close(fd_.release()) != 0) // NFS tells only now
+        refuse(errno);
     if (!temporary_.empty() && ::rename(temporary_.c_str(), file_.c_str()) != 0)
-        refuse();
+        refuse(errno);
     temporary_.clear();
 }
 
-void WholeFile::refuse() const {
-    throw std::runtime_error("can't write " + file_.string() + ": " + std::strerror(errno));
+void WholeFile::refuse(int error) const {
+    throw std::runtime_error("can't write " + file_.string() + ": " + std::strerror(error));
 }
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 // Two paths lead to one file where either is the same.
 struct FileIdentity {
@@ -19,4 +19,4 @@ FileIdentity identity_of(const std::filesystem::path &file);
 // The same for all paths to a file, links included; absolute.
 std::filesystem::path real_path(const std::filesystem::path &file);
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ring/orphans.hpp"
+#include "base/orphans.hpp"
 
 #include <csignal>
 #include <fstream>
@@ -7,7 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 std::set<pid_t> children() {
     std::ifstream file("/proc/thread-self/children");
@@ -33,4 +33,4 @@ void end_orphans(const std::set<pid_t> &kept) {
         ::usleep(1000);
 }
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -6,7 +6,7 @@
 #include <set>
 #include <sys/types.h>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 // Of this thread.
 std::set<pid_t> children();
@@ -18,4 +18,4 @@ int kill_orphans(const std::set<pid_t> &kept);
 // Until there are none, or for half a second: one may hang in the kernel.
 void end_orphans(const std::set<pid_t> &kept);
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ring/file_identity.hpp"
+#include "base/file_identity.hpp"
 
 #include <sys/stat.h>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 namespace fs = std::filesystem;
 
@@ -18,8 +18,12 @@ FileIdentity identity_of(const fs::path &file) {
 
 fs::path real_path(const fs::path &file) {
     std::error_code error;
-    const fs::path canonical = fs::weakly_canonical(fs::absolute(file), error);
-    return error ? fs::absolute(file).lexically_normal() : canonical;
+    fs::path path = fs::absolute(file);
+    constexpr int most_links = 40; // as the kernel has it
+    for (int i = 0; i < most_links && !fs::exists(path, error) && fs::is_symlink(path, error); ++i)
+        path = path.parent_path() / fs::read_symlink(path, error); // which would count as no link
+    const fs::path canonical = fs::weakly_canonical(path, error);
+    return error ? path.lexically_normal() : canonical;
 }
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ring/text.hpp"
+#include "base/text.hpp"
 
 #include <gtest/gtest.h>
 
-using namespace arhost::ring;
+using namespace arhost::base;
 
 TEST(Printable, LeavesTextsOfEveryLanguageAsTheyAre) {
     for (const std::string text : {"", "Embree", "640×480, p50 ½ ms", "Трассировщик", "光線追跡", "🎲"})
@@ -15,6 +15,7 @@ TEST(Printable, IsOneLineThatCantSteerATerminal) {
     EXPECT_EQ(printable("\x1b[2Jgone\a\x7f"), " [2Jgone  ");
     EXPECT_EQ(printable("\u009b2J"), " 2J"); // an escape sequence's beginning, in one character
     EXPECT_EQ(printable("a\u202efdp.exe\u2069\u2028"), "a fdp.exe  "); // would be shown from right to left
+    EXPECT_EQ(printable("1\u200e2\u200f3\u061c4"), "1 2 3 4");
     EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a b");
 }
 
@@ -35,4 +36,6 @@ TEST(Printable, ReplacesWhatIsNoUtf8) {
     EXPECT_EQ(printable("\xc0\xaf").find('/'), std::string::npos);        // longer than need be
     EXPECT_EQ(valid_utf8("\xf0\x9f\x8e"), "\ufffd");                      // cut off
     EXPECT_EQ(valid_utf8("é\n"), "é\n");
+    EXPECT_TRUE(is_utf8("é\n\ufffd"));
+    EXPECT_FALSE(is_utf8("Bas\xe9"));
 }

@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include <utility>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 class UniqueFd {
 public:
@@ -44,4 +44,4 @@ inline UniqueFd checked(int fd, const char *what) {
     return UniqueFd(fd);
 }
 
-} // namespace arhost::ring
+} // namespace arhost::base

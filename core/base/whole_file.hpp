@@ -3,12 +3,12 @@
 // A file that is written once: tried before the work that it tells of, and whole after it or as it was before.
 #pragma once
 
-#include <cstdio>
+#include "base/unique_fd.hpp"
+
 #include <filesystem>
-#include <memory>
 #include <string>
 
-namespace arhost::ring {
+namespace arhost::base {
 
 class WholeFile {
 public:
@@ -19,16 +19,14 @@ public:
     WholeFile(const WholeFile &) = delete;
     WholeFile &operator=(const WholeFile &) = delete;
 
-    void write(const std::string &text); // once; throws likewise
+    // Once; throws likewise, and as write_all (base/write_all.hpp) does where a signal comes.
+    void write(const std::string &text, int signals = -1);
 
 private:
-    struct Close {
-        void operator()(std::FILE *stream) const { std::fclose(stream); }
-    };
-    [[noreturn]] void refuse() const;
+    [[noreturn]] void refuse(int error) const;
 
     std::filesystem::path file_, temporary_; // beside it; none for what is not replaced
-    std::unique_ptr<std::FILE, Close> stream_;
+    UniqueFd fd_;
 };
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ring/text.hpp"
+#include "base/text.hpp"
 
 #include <nlohmann/json.hpp>
 
-namespace arhost::ring {
+namespace arhost::base {
 namespace {
 
 // `c`: one character in UTF-8, whose order is that of its bytes.
 bool is_harmful(std::string_view c) {
     const auto within = [&](std::string_view first, std::string_view last) { return first <= c && c <= last; };
-    return c < " " || within("\x7f", "\u009f") || within("\u2028", "\u202e") || within("\u2066", "\u2069") ||
-           within("\ufffe", "\uffff");
+    return c < " " || within("\x7f", "\u009f") || c == "\u061c" || within("\u200e", "\u200f") ||
+           within("\u2028", "\u202e") || within("\u2066", "\u2069") || within("\ufffe", "\uffff");
 }
 
 } // namespace
+
+bool is_utf8(std::string_view text) {
+    return valid_utf8(text) == text;
+}
 
 std::string valid_utf8(std::string_view text) {
     using Json = nlohmann::json;
@@ -35,4 +39,4 @@ std::string printable(std::string_view text, std::size_t max_size) {
     return line;
 }
 
-} // namespace arhost::ring
+} // namespace arhost::base

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/write_all.hpp"
+
+#include "base/unique_fd.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+namespace arhost::base {
+
+void write_all(int fd, std::string_view bytes, int signals) {
+    while (!bytes.empty()) {
+        pollfd fds[2] = {{fd, POLLOUT, 0}, {signals, POLLIN, 0}};
+        if (::poll(fds, 2, -1) < 0 && errno != EINTR)
+            throw_errno("poll");
+        if (const int signal = take_signal(signals))
+            throw Interrupted(signal, "interrupted while it wrote");
+        if (fds[0].revents == 0)
+            continue;
+        // No more than what a pipe that poll calls ready takes at once.
+        const ssize_t count = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
+        if (count < 0 && errno != EINTR && errno != EAGAIN)
+            throw_errno("write");
+        bytes.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    }
+}
+
+int take_signal(int signals) {
+    pollfd ready{signals, POLLIN, 0};
+    signalfd_siginfo taken{};
+    return ::poll(&ready, 1, 0) > 0 && ::read(signals, &taken, sizeof taken) == sizeof taken
+               ? static_cast<int>(taken.ssi_signo)
+               : 0;
+}
+
+} // namespace arhost::base

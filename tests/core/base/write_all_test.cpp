@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/unique_fd.hpp"
+#include "base/write_all.hpp"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <fcntl.h>
+#include <sys/signalfd.h>
+#include <thread>
+
+using namespace arhost::base;
+
+namespace {
+
+struct WriteAll : testing::Test {
+    WriteAll() {
+        int ends[2];
+        if (::pipe2(ends, O_CLOEXEC) != 0)
+            throw_errno("pipe2");
+        to_read.reset(ends[0]);
+        to_write.reset(ends[1]);
+        sigset_t taken;
+        ::sigemptyset(&taken);
+        ::sigaddset(&taken, SIGUSR1);
+        ::pthread_sigmask(SIG_BLOCK, &taken, nullptr);
+        signals = checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
+    }
+    UniqueFd to_read, to_write, signals;
+};
+
+} // namespace
+
+TEST_F(WriteAll, WritesMoreThanAPipeHolds) {
+    const std::string text(1'000'000, 'x');
+    std::string taken;
+    std::jthread reader([&] {
+        char bytes[5000];
+        for (ssize_t count; (count = ::read(to_read.get(), bytes, sizeof bytes)) > 0;)
+            taken.append(bytes, static_cast<std::size_t>(count));
+    });
+    write_all(to_write.get(), text, signals.get());
+    to_write.reset();
+    reader.join();
+    EXPECT_EQ(taken, text);
+}
+
+TEST_F(WriteAll, IsEndedByASignalWhereNobodyReads) {
+    std::jthread writer([&] {
+        try {
+            write_all(to_write.get(), std::string(1'000'000, 'x'), signals.get());
+            ADD_FAILURE() << "more than the pipe holds was written";
+        } catch (const Interrupted &interrupted) {
+            EXPECT_EQ(interrupted.signal, SIGUSR1);
+        }
+    });
+    ::kill(::getpid(), SIGUSR1);
+}
+
+TEST_F(WriteAll, SaysWhyItCantWrite) {
+    const UniqueFd full(::open("/dev/full", O_WRONLY | O_CLOEXEC));
+    EXPECT_THROW(write_all(full.get(), "x"), std::system_error);
+    EXPECT_NO_THROW(write_all(full.get(), ""));
+    EXPECT_EQ(take_signal(signals.get()), 0);
+    EXPECT_EQ(take_signal(-1), 0);
+}
