@@ -25,6 +25,14 @@ VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
     return alignment ? (size + alignment - 1) / alignment * alignment : size;
 }
 
+// What earlier commands have uploaded or built can be built from.
+void await_inputs(const DeviceFunctions &vk, VkCommandBuffer commands) {
+    barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
+            VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
+            VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR);
+}
+
 VkAccelerationStructureGeometryKHR triangles(VkDeviceAddress vertices, VkDeviceSize stride,
                                              std::uint32_t vertex_count, VkDeviceAddress indices) {
     VkAccelerationStructureGeometryKHR geometry{};
@@ -219,12 +227,11 @@ void Acceleration::build_still(Tree &tree, const arhost_geometry &geometry) {
 
     const VkCommandBuffer commands = submission_.new_commands();
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
+    await_inputs(vk, commands);
     const auto info = build_info(tree, false, aligned(scratch.address(), alignment));
     const VkAccelerationStructureBuildRangeInfoKHR range{tree.count, 0, 0, 0}, *const ranges = &range;
     vk.vkCmdBuildAccelerationStructuresKHR(commands, 1, &info, &ranges);
-    barrier(vk, commands, VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-            VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR, VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-            VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR);
+    await_inputs(vk, commands);
     const VkAccelerationStructureKHR large = tree.structure.get();
     vk.vkCmdResetQueryPool(commands, pool.get(), 0, 1);
     vk.vkCmdWriteAccelerationStructuresPropertiesKHR(
@@ -239,6 +246,7 @@ void Acceleration::build_still(Tree &tree, const arhost_geometry &geometry) {
     const AccelerationStructure whole = std::move(tree.structure);
     create(tree, compacted_size, room(compacted_size));
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
+    await_inputs(vk, commands);
     VkCopyAccelerationStructureInfoKHR copy{};
     copy.sType = VK_STRUCTURE_TYPE_COPY_ACCELERATION_STRUCTURE_INFO_KHR;
     copy.src = whole.get();
@@ -285,6 +293,7 @@ void Acceleration::record_moving(VkCommandBuffer commands, bool refits) const {
     const DeviceFunctions &vk = device_.functions();
     const VkDeviceAddress scratch = aligned(scratch_.address(), device_.physical().tracing.scratch_alignment);
     submission_.begin(commands);
+    await_inputs(vk, commands);
     std::vector<VkAccelerationStructureBuildGeometryInfoKHR> infos;
     std::vector<VkAccelerationStructureBuildRangeInfoKHR> ranges;
     for (const auto &[number, tree] : trees_)
@@ -298,10 +307,7 @@ void Acceleration::record_moving(VkCommandBuffer commands, bool refits) const {
     if (!infos.empty()) {
         vk.vkCmdBuildAccelerationStructuresKHR(commands, static_cast<std::uint32_t>(infos.size()), infos.data(),
                                                each.data());
-        barrier(vk, commands, VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-                VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
-                VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-                VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR);
+        await_inputs(vk, commands);
     }
     const auto info = build_info(top_, false, scratch + top_.scratch_offset);
     const VkAccelerationStructureBuildRangeInfoKHR range{top_.count, 0, 0, 0}, *const top_ranges = &range;

@@ -420,7 +420,7 @@ TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
     const auto relative = std::filesystem::relative(folder.path() / "rt_vulkan", ARHOST_PLUGIN_DIRECTORY).string();
     const auto complaint = [&] {
         PluginUnderTest plugin(relative);
-        EXPECT_EQ(plugin.create(), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(plugin.create({{"path", "plain"}}), ARHOST_ERROR_CONFIGURATION);
         return plugin.log();
     };
     EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is missing")));
