@@ -243,6 +243,15 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.has_textures()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
+    // Lavapipe compiles when a shader is first run, and an image must not wait for it: of a frame without width no
+    // pixel is traced.
+    const VkCommandBuffer commands = submission_.new_commands();
+    std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
+    submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
+    pipeline_->record(commands, set_, 1, 1);
+    submission_.end(commands);
+    submission_.run(commands);
+    submission_.free(commands);
 }
 
 // The commands for the place that an image goes to. Where memory can't be imported, all share one of ours.
