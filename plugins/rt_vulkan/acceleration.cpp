@@ -301,10 +301,9 @@ void Acceleration::record_moving(VkCommandBuffer commands, bool refits) const {
             infos.push_back(build_info(tree, refits, scratch + tree.scratch_offset));
             ranges.push_back({tree.count, 0, 0, 0});
         }
-    std::vector<const VkAccelerationStructureBuildRangeInfoKHR *> each;
-    for (const auto &range : ranges)
-        each.push_back(&range);
     if (!infos.empty()) {
+        std::vector<const VkAccelerationStructureBuildRangeInfoKHR *> each(ranges.size());
+        std::transform(ranges.begin(), ranges.end(), each.begin(), [](const auto &range) { return &range; });
         vk.vkCmdBuildAccelerationStructuresKHR(commands, static_cast<std::uint32_t>(infos.size()), infos.data(),
                                                each.data());
         await_inputs(vk, commands);
