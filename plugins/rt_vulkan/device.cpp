@@ -22,7 +22,7 @@ Memory allocated(const Device &device, VkDeviceSize size, std::uint32_t type, co
 
 } // namespace
 
-Device::Device(const Instance &instance, const PhysicalDevice &physical) : physical_(physical) {
+Device::Device(const Instance &instance, const PhysicalDevice &physical, Path path) : physical_(physical) {
     const InstanceFunctions &from = instance.functions();
     from.vkGetPhysicalDeviceMemoryProperties(physical.handle, &memory_);
     const float priority = 1;
@@ -31,17 +31,43 @@ Device::Device(const Instance &instance, const PhysicalDevice &physical) : physi
     queue.queueFamilyIndex = physical.queue_family;
     queue.queueCount = 1;
     queue.pQueuePriorities = &priority;
-    const char *const import = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+    std::vector<const char *> extensions;
+    if (physical.imports_host_memory)
+        extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipeline{};
+    pipeline.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR;
+    pipeline.rayTracingPipeline = VK_TRUE;
+    VkPhysicalDeviceRayQueryFeaturesKHR query{};
+    query.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR;
+    query.rayQuery = VK_TRUE;
+    VkPhysicalDeviceAccelerationStructureFeaturesKHR trees{};
+    trees.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR;
+    trees.accelerationStructure = VK_TRUE;
+    VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
+    addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+    addresses.pNext = &trees;
+    addresses.bufferDeviceAddress = VK_TRUE;
     VkDeviceCreateInfo info{};
+    if (path != Path::plain) {
+        extensions.push_back(VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME);
+        extensions.push_back(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME);
+        extensions.push_back(path == Path::query ? VK_KHR_RAY_QUERY_EXTENSION_NAME
+                                                 : VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME);
+        trees.pNext = path == Path::query ? static_cast<void *>(&query) : &pipeline;
+        info.pNext = &addresses;
+    }
     info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
-    info.enabledExtensionCount = physical.imports_host_memory ? 1 : 0;
-    info.ppEnabledExtensionNames = &import;
+    info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
+    info.ppEnabledExtensionNames = extensions.data();
     check(from.vkCreateDevice(physical.handle, &info, nullptr, &device_), "opening the Vulkan device");
     const auto load = [&](const char *name) { return from.vkGetDeviceProcAddr(device_, name); };
 #define RT_VULKAN_LOAD(name) functions_.name = reinterpret_cast<PFN_##name>(load(#name));
     RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_LOAD)
+    if (path != Path::plain) {
+        RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_LOAD)
+    }
     if (physical.imports_host_memory) {
         RT_VULKAN_LOAD(vkGetMemoryHostPointerPropertiesEXT)
     }
@@ -78,8 +104,18 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
     if (type < 0)
         throw Failure(ARHOST_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
                                                     "' has no memory that the host can write; choose another");
-    memory_ = allocated(device, needs.size, static_cast<std::uint32_t>(type), nullptr);
+    const bool has_address = usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
+    VkMemoryAllocateFlagsInfo flags{};
+    flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    memory_ = allocated(device, needs.size, static_cast<std::uint32_t>(type), has_address ? &flags : nullptr);
     check(vk.vkBindBufferMemory(device.handle(), get(), memory_.get(), 0), "binding GPU memory");
+    if (has_address) {
+        VkBufferDeviceAddressInfo which{};
+        which.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
+        which.buffer = get();
+        address_ = vk.vkGetBufferDeviceAddress(device.handle(), &which);
+    }
     if (place != Place::device) {
         void *mapped = nullptr;
         check(vk.vkMapMemory(device.handle(), memory_.get(), 0, VK_WHOLE_SIZE, 0, &mapped), "mapping GPU memory");
@@ -172,16 +208,25 @@ void Submission::end(VkCommandBuffer commands) const {
     check(device_.functions().vkEndCommandBuffer(commands), "recording GPU commands");
 }
 
-void Submission::run(VkCommandBuffer commands) const {
+void Submission::run(std::span<const VkCommandBuffer> commands) const {
     const DeviceFunctions &vk = device_.functions();
     const VkFence fence = fence_.get();
     check(vk.vkResetFences(device_.handle(), 1, &fence), "resetting a fence");
     VkSubmitInfo info{};
     info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    info.commandBufferCount = 1;
-    info.pCommandBuffers = &commands;
+    info.commandBufferCount = static_cast<std::uint32_t>(commands.size());
+    info.pCommandBuffers = commands.data();
     check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "starting the GPU's work");
     check(vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX), "waiting for the GPU");
+}
+
+void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
+             VkPipelineStageFlags to, VkAccessFlags used) {
+    VkMemoryBarrier memory{};
+    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+    memory.srcAccessMask = written;
+    memory.dstAccessMask = used;
+    vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
 void upload(const Device &device, const Submission &submission, const Buffer &to,

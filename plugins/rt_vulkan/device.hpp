@@ -30,14 +30,24 @@ namespace rt_vulkan {
                                                                 use(vkCreateFence) use(vkDestroyFence)               \
                                                                     use(vkWaitForFences) use(vkResetFences)
 
+// Of the paths by the device's own trees; NULL on the plain one.
+#define RT_VULKAN_TRACING_FUNCTIONS(use)                                                                             \
+    use(vkGetBufferDeviceAddress) use(vkCreateAccelerationStructureKHR) use(vkDestroyAccelerationStructureKHR)       \
+        use(vkGetAccelerationStructureBuildSizesKHR) use(vkGetAccelerationStructureDeviceAddressKHR)                 \
+            use(vkCmdBuildAccelerationStructuresKHR) use(vkCmdCopyAccelerationStructureKHR)                          \
+                use(vkCmdWriteAccelerationStructuresPropertiesKHR) use(vkCreateRayTracingPipelinesKHR)               \
+                    use(vkGetRayTracingShaderGroupHandlesKHR) use(vkCmdTraceRaysKHR)
+
 struct DeviceFunctions {
     RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_DECLARE)
+    RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_DECLARE)
     PFN_vkGetMemoryHostPointerPropertiesEXT vkGetMemoryHostPointerPropertiesEXT; // NULL: it can't import
 };
 
 class Device {
 public:
-    Device(const Instance &instance, const PhysicalDevice &physical);
+    // With what `path` needs.
+    Device(const Instance &instance, const PhysicalDevice &physical, Path path = Path::plain);
     ~Device();
     Device(const Device &) = delete;
     Device &operator=(const Device &) = delete;
@@ -90,6 +100,7 @@ using PipelineLayout = Owned<VkPipelineLayout, &DeviceFunctions::vkDestroyPipeli
 using ShaderModule = Owned<VkShaderModule, &DeviceFunctions::vkDestroyShaderModule>;
 using PipelineCache = Owned<VkPipelineCache, &DeviceFunctions::vkDestroyPipelineCache>;
 using Pipeline = Owned<VkPipeline, &DeviceFunctions::vkDestroyPipeline>;
+using AccelerationStructure = Owned<VkAccelerationStructureKHR, &DeviceFunctions::vkDestroyAccelerationStructureKHR>;
 
 // Calls a vkCreate… and owns what it makes.
 template <class Owner, class Handle, class Create, class Info>
@@ -114,6 +125,8 @@ public:
 
     VkBuffer get() const { return buffer_.get(); }
     VkDeviceSize size() const { return size_; }
+    // For the device, of one that was made with VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
+    VkDeviceAddress address() const { return address_; }
     explicit operator bool() const { return memory_.get() != VK_NULL_HANDLE; }
     std::span<std::byte> mapped() const { return {mapped_, static_cast<std::size_t>(size_)}; }
 
@@ -122,6 +135,7 @@ private:
     Memory memory_;
     Owned<VkBuffer, &DeviceFunctions::vkDestroyBuffer> buffer_;
     VkDeviceSize size_ = 0; // bytes
+    VkDeviceAddress address_ = 0;
     std::byte *mapped_ = nullptr;
 };
 
@@ -133,13 +147,18 @@ public:
     void free(VkCommandBuffer commands) const;
     void begin(VkCommandBuffer commands, VkCommandBufferUsageFlags flags = 0) const;
     void end(VkCommandBuffer commands) const;
-    void run(VkCommandBuffer commands) const;
+    void run(std::span<const VkCommandBuffer> commands) const;
+    void run(VkCommandBuffer commands) const { run({&commands, 1}); }
 
 private:
     const Device &device_;
     CommandPool pool_;
     Fence fence_;
 };
+
+// What is written by one step is there for another.
+void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
+             VkPipelineStageFlags to, VkAccessFlags used);
 
 // Writes parts, one behind the other, to a device buffer by way of a small one that the host can write.
 void upload(const Device &device, const Submission &submission, const Buffer &to,

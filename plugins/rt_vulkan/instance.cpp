@@ -68,7 +68,65 @@ int rank(VkPhysicalDeviceType type) {
     }
 }
 
+// The paths by the device's own trees, where it has the extensions for them.
+void add_tracing(const InstanceFunctions &from, PhysicalDevice &device, bool may_query, bool may_have_pipeline) {
+    if (!may_query && !may_have_pipeline)
+        return;
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipeline{};
+    pipeline.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR;
+    VkPhysicalDeviceRayQueryFeaturesKHR query{};
+    query.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR;
+    VkPhysicalDeviceAccelerationStructureFeaturesKHR trees{};
+    trees.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR;
+    VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
+    addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+    VkPhysicalDeviceFeatures2 features{};
+    features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    VkPhysicalDeviceRayTracingPipelinePropertiesKHR pipeline_limits{};
+    pipeline_limits.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR;
+    VkPhysicalDeviceAccelerationStructurePropertiesKHR limits{};
+    limits.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR;
+    VkPhysicalDeviceProperties2 properties{};
+    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+    features.pNext = &addresses;
+    addresses.pNext = &trees;
+    properties.pNext = &limits;
+    if (may_query)
+        trees.pNext = &query;
+    if (may_have_pipeline) {
+        query.pNext = &pipeline;
+        if (!may_query)
+            trees.pNext = &pipeline;
+        limits.pNext = &pipeline_limits;
+    }
+    from.vkGetPhysicalDeviceFeatures2(device.handle, &features);
+    from.vkGetPhysicalDeviceProperties2(device.handle, &properties);
+    if (!addresses.bufferDeviceAddress || !trees.accelerationStructure)
+        return;
+    if (query.rayQuery)
+        device.paths.push_back(Path::query);
+    if (pipeline.rayTracingPipeline)
+        device.paths.push_back(Path::pipeline);
+    device.tracing = {limits.maxInstanceCount,
+                      limits.maxPrimitiveCount,
+                      limits.minAccelerationStructureScratchOffsetAlignment,
+                      pipeline_limits.shaderGroupHandleSize,
+                      pipeline_limits.shaderGroupHandleAlignment,
+                      pipeline_limits.shaderGroupBaseAlignment};
+}
+
 } // namespace
+
+const char *name_of(Path path) {
+    return path == Path::plain ? "plain" : path == Path::query ? "query" : "pipeline";
+}
+
+std::string list_of(const std::vector<Path> &paths) {
+    std::string text;
+    for (const Path path : paths)
+        text += (text.empty() ? "" : ", ") + std::string(name_of(path));
+    return text;
+}
 
 void check(VkResult result, const char *what) {
     if (result >= 0)
@@ -138,7 +196,7 @@ void Instance::create(bool validate) {
     VkApplicationInfo application{};
     application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
     application.pApplicationName = "arhost";
-    application.apiVersion = VK_API_VERSION_1_1;
+    application.apiVersion = VK_API_VERSION_1_2; // the most that is made use of
     VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_);
     const VkValidationFeatureEnableEXT feature = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
     VkValidationFeaturesEXT features{};
@@ -195,11 +253,13 @@ std::vector<PhysicalDevice> Instance::devices() const {
         functions_.vkEnumerateDeviceExtensionProperties(handle, nullptr, &extension_count, nullptr);
         std::vector<VkExtensionProperties> extensions(extension_count);
         functions_.vkEnumerateDeviceExtensionProperties(handle, nullptr, &extension_count, extensions.data());
-        PhysicalDevice device{};
-        device.imports_host_memory =
-            std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties &extension) {
-                return !std::strcmp(extension.extensionName, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+        const auto has = [&](const char *name) {
+            return std::any_of(extensions.begin(), extensions.end(), [&](const VkExtensionProperties &extension) {
+                return !std::strcmp(extension.extensionName, name);
             });
+        };
+        PhysicalDevice device{};
+        device.imports_host_memory = has(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
         if (device.imports_host_memory)
             id.pNext = &import;
         functions_.vkGetPhysicalDeviceProperties2(handle, &properties);
@@ -208,6 +268,11 @@ std::vector<PhysicalDevice> Instance::devices() const {
         device.uuid = hexadecimal(id.deviceUUID);
         device.properties = properties.properties;
         device.import_alignment = import.minImportedHostPointerAlignment;
+        const bool has_trees = properties.properties.apiVersion >= VK_API_VERSION_1_2 &&
+                               has(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME) &&
+                               has(VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME);
+        add_tracing(functions_, device, has_trees && has(VK_KHR_RAY_QUERY_EXTENSION_NAME),
+                    has_trees && has(VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME));
 
         std::uint32_t family_count = 0;
         functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, nullptr);
@@ -256,6 +321,18 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     if (!chosen)
         refuse("no device is");
     return *chosen;
+}
+
+Path choose_path(const PhysicalDevice &device, const std::string &wanted) {
+    // On a processor the device's trees are as much code as ours, and twice as slow (README.md).
+    if (wanted == "auto")
+        return device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? Path::plain : device.paths.back();
+    for (const Path path : device.paths)
+        if (wanted == name_of(path))
+            return path;
+    throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'path': the Vulkan device '" + device.name + "' has no '" +
+                                                  wanted + "'; it has " + list_of(device.paths) +
+                                                  ": give one of these, auto, or another device");
 }
 
 } // namespace rt_vulkan

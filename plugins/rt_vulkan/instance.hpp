@@ -16,12 +16,28 @@ namespace rt_vulkan {
 
 #define RT_VULKAN_INSTANCE_FUNCTIONS(use)                                                                            \
     use(vkDestroyInstance) use(vkEnumeratePhysicalDevices) use(vkGetPhysicalDeviceProperties2)                       \
-        use(vkGetPhysicalDeviceMemoryProperties) use(vkGetPhysicalDeviceQueueFamilyProperties)                       \
-            use(vkEnumerateDeviceExtensionProperties) use(vkCreateDevice) use(vkGetDeviceProcAddr)
+        use(vkGetPhysicalDeviceFeatures2) use(vkGetPhysicalDeviceMemoryProperties)                                   \
+            use(vkGetPhysicalDeviceQueueFamilyProperties) use(vkEnumerateDeviceExtensionProperties)                  \
+                use(vkCreateDevice) use(vkGetDeviceProcAddr)
 
 struct InstanceFunctions {
 #define RT_VULKAN_DECLARE(name) PFN_##name name;
     RT_VULKAN_INSTANCE_FUNCTIONS(RT_VULKAN_DECLARE)
+};
+
+// How rays find what they hit.
+enum class Path {
+    plain,   // trees of ours, walked in a compute shader
+    query,   // the device's own trees, asked in a compute shader (VK_KHR_ray_query)
+    pipeline // the same by a pipeline for ray tracing (VK_KHR_ray_tracing_pipeline)
+};
+const char *name_of(Path path);
+
+// What the device says of its tracing of rays; all 0 where it has neither path for it.
+struct TracingLimits {
+    std::uint64_t most_objects, most_primitives;
+    std::uint32_t scratch_alignment;                              // bytes
+    std::uint32_t handle_size, handle_alignment, table_alignment; // bytes, of shader binding tables
 };
 
 // What is known of a device without making use of it.
@@ -32,7 +48,9 @@ struct PhysicalDevice {
     std::uint32_t queue_family; // one that computes; VK_QUEUE_FAMILY_IGNORED: it has none
     std::uint32_t timestamp_bits;
     bool imports_host_memory;
-    VkDeviceSize import_alignment; // bytes
+    VkDeviceSize import_alignment;        // bytes
+    std::vector<Path> paths{Path::plain}; // the fastest of a GPU last
+    TracingLimits tracing;
 };
 
 class Instance {
@@ -65,6 +83,12 @@ private:
 
 // The one that `wanted` names: its number in the list, its UUID, or a part of its name; "auto": the fastest kind.
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted);
+
+// The one that `wanted` names; "auto": the fastest that the device has.
+Path choose_path(const PhysicalDevice &device, const std::string &wanted);
+
+// "plain, query"
+std::string list_of(const std::vector<Path> &paths);
 
 // Throws what `result` means, naming what was tried.
 void check(VkResult result, const char *what);

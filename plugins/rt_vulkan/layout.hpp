@@ -16,7 +16,8 @@ struct Object {
     float object_from_world[4][4]; // columns
     float transform[3][4], normal_transform[3][4];
     std::uint32_t material, role, mask, flags;
-    std::uint32_t root, first_index, first_normal, first_texcoord;
+    std::uint32_t root; // of its tree of ours; where the device has its own, the mesh's first primitive
+    std::uint32_t first_index, first_normal, first_texcoord;
 };
 
 struct Material {
@@ -115,7 +116,8 @@ enum Binding : std::uint32_t {
     history_binding,
     image_binding,
     drawn_binding,
-    binding_count
+    binding_count,                // of buffers
+    trees_binding = binding_count // the device's own, on the paths that have them
 };
 
 // The shaders' specialization constants, by their numbers.

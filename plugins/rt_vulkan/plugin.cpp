@@ -47,14 +47,15 @@ public:
         devices.reserve(found.size());
         for (const PhysicalDevice &device : found)
             devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
-                               &device == &choose_device(found, "auto"), device.name, device.uuid, "paths: plain"});
+                               &device == &choose_device(found, "auto"), device.name, device.uuid,
+                               "paths: " + list_of(device.paths)});
         return devices;
     }
 
     Plugin(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), shader_(read_shader(own_folder() / "rt_vulkan_plain.spv")),
-          instance_(host, options.boolean("validate")),
-          physical_(choose_device(instance_.devices(), options.text("device"))) {
+        : host_(host), instance_(host, options.boolean("validate")),
+          physical_(choose_device(instance_.devices(), options.text("device"))),
+          shaders_(read_shaders(own_folder(), choose_path(physical_, options.text("path")))) {
         settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
@@ -62,9 +63,9 @@ public:
     }
 
     void start(const arhost_raytracer_setup &setup) {
-        renderer_.emplace(setup, settings_, host_, instance_, physical_, shader_);
-        host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path plain, " +
-                   std::to_string(setup.scene->objects.count) + " objects" +
+        renderer_.emplace(setup, settings_, host_, instance_, physical_, shaders_);
+        host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path " + name_of(shaders_.path) +
+                   ", " + std::to_string(setup.scene->objects.count) + " objects" +
                    (instance_.validates() ? ", with the validation layers" : ""));
     }
 
@@ -90,24 +91,25 @@ public:
 
 private:
     arhost::Host host_;
-    std::vector<std::uint32_t> shader_;
     Instance instance_;
     PhysicalDevice physical_;
+    Shaders shaders_;
     Settings settings_;
     std::optional<Renderer> renderer_;
 };
 
 constexpr const char *glass[] = {"tree", "path", nullptr};
-constexpr const char *paths[] = {"auto", "plain", nullptr};
+constexpr const char *paths[] = {"auto", "plain", "query", "pipeline", nullptr};
 constexpr const char *needs[] = {"gpu", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "device", "auto",
                    "Which Vulkan device: its number, its UUID or a part of its name; auto: the fastest kind."),
-    arhost::option(ARHOST_OPTION_TEXT, "path", "auto",
-                   "How rays find what they hit: 'plain' walks trees in a compute shader; auto: the fastest that the "
-                   "device has.",
-                   0, 0, paths),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "path", "auto",
+        "How rays find what they hit: 'plain' walks trees in a compute shader, 'query' and 'pipeline' have "
+        "the device's units for ray tracing do it; auto: the fastest that the device has.",
+        0, 0, paths),
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, most_samples),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),

@@ -7,9 +7,7 @@
 #include <array>
 #include <chrono>
 #include <condition_variable>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -20,7 +18,6 @@ namespace {
 using arhost::Failure;
 
 constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
-constexpr std::uint32_t group_side = 8; // of the shader's invocations
 // Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
 constexpr std::size_t most_targets = 8; // places that images come to again (arhost/raytracer.h)
@@ -68,15 +65,6 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     return device;
 }
 
-void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
-             VkPipelineStageFlags to, VkAccessFlags used) {
-    VkMemoryBarrier memory{};
-    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-    memory.srcAccessMask = written;
-    memory.dstAccessMask = used;
-    vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
-}
-
 // Tells the host that a driver is at work, which says nothing itself; but not for ever, as it may hang.
 class Heartbeat {
 public:
@@ -97,86 +85,21 @@ private:
     std::jthread thread_;
 };
 
-// Where the driver's compiled shaders are kept; empty: nowhere.
-std::filesystem::path pipeline_cache_file() {
-    const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
-    return caches && *caches ? std::filesystem::path(caches) / "rt_vulkan.pipelines" : std::filesystem::path();
-}
-
-std::vector<char> contents(const std::filesystem::path &file) {
-    std::error_code ignored;
-    if (!std::filesystem::is_regular_file(file, ignored)) // reading a folder would throw
-        return {};
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-PipelineCache read_pipeline_cache(const Device &device) {
-    std::vector<char> data;
-    if (const auto file = pipeline_cache_file(); !file.empty())
-        data = contents(file);
-    VkPipelineCacheCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO;
-    info.initialDataSize = data.size(); // the driver looks at its header, and ignores another driver's
-    info.pInitialData = data.data();
-    return make<PipelineCache, VkPipelineCache>(device, device.functions().vkCreatePipelineCache, info,
-                                                "making a pipeline cache");
-}
-
-// Renamed into place, so that no one reads half of it. A cache that can't be written is no fault.
-void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
-    const auto file = pipeline_cache_file();
-    if (file.empty())
-        return;
-    std::size_t size = 0;
-    const auto get = device.functions().vkGetPipelineCacheData;
-    if (get(device.handle(), cache.get(), &size, nullptr) != VK_SUCCESS)
-        return;
-    std::vector<char> data(size);
-    if (get(device.handle(), cache.get(), &size, data.data()) != VK_SUCCESS || data == contents(file))
-        return;
-    std::filesystem::path temporary = file;
-    temporary += ".new";
-    std::ofstream stream(temporary, std::ios::binary);
-    stream.write(data.data(), static_cast<std::streamsize>(size));
-    stream.close();
-    std::error_code ignored;
-    if (stream)
-        std::filesystem::rename(temporary, file, ignored);
-}
-
 } // namespace
 
-std::vector<std::uint32_t> read_shader(const std::filesystem::path &file) {
-    constexpr std::uint32_t magic = 0x07230203, header_words = 5, end_of_function = 56;
-    const std::vector<char> bytes = contents(file);
-    if (bytes.empty())
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
-                      "the shader '" + file.string() + "' is missing or can't be read; install arhost again");
-    std::vector<std::uint32_t> words(bytes.size() / 4);
-    std::memcpy(words.data(), bytes.data(), words.size() * 4);
-    // Drivers crash on what is no SPIR-V: its instructions must follow one another up to the last function's end.
-    std::size_t at = header_words;
-    std::uint32_t last = 0;
-    bool sound = bytes.size() % 4 == 0 && words.size() > header_words && words[0] == magic;
-    while (sound && at < words.size()) {
-        const std::uint32_t length = words[at] >> 16;
-        last = words[at] & 0xffff;
-        sound = length > 0 && length <= words.size() - at;
-        at += length;
-    }
-    if (!sound || last != end_of_function)
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
-                      "the shader '" + file.string() + "' is damaged: no whole SPIR-V; install arhost again");
-    return words;
-}
-
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
-                   const Instance &instance, const PhysicalDevice &physical, std::span<const std::uint32_t> shader)
+                   const Instance &instance, const PhysicalDevice &physical, const Shaders &shaders)
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
-      scene_(*setup.scene, host), device_(instance, checked(physical)), submission_(device_) {
-    make_buffers(intrinsics_);
-    make_pipeline(shader, setup.scene->max_depth);
+      stage_(shaders.pipeline_stage()), scene_(*setup.scene, shaders.path == Path::plain, host),
+      device_(instance, checked(physical), shaders.path), submission_(device_) {
+    make_buffers(intrinsics_, shaders.path);
+    if (shaders.path != Path::plain) {
+        const Heartbeat heartbeat(host_, "building the trees");
+        acceleration_.emplace(device_, submission_, *setup.scene, scene_.objects(), buffers_[indices_binding], stage_,
+                              host_);
+    }
+    make_set(shaders);
+    make_pipeline(shaders, setup.scene->max_depth);
     if (host_.cancelled())
         throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the shader was compiled");
     if (physical.timestamp_bits) {
@@ -196,7 +119,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     scene_.forget_still_parts();
 }
 
-Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size) {
+Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size,
+                             VkBufferUsageFlags further_usage) {
     std::size_t size = std::max<std::size_t>(least_size, 16); // none may be empty
     std::size_t filled = 0;
     for (const Bytes &part : parts)
@@ -210,19 +134,20 @@ Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std:
                                                     " at most: use smaller ones, another device or rt_embree");
     Buffer buffer(device_, size,
                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | further_usage,
                   Buffer::Place::device);
     upload(device_, submission_, buffer, parts);
     return buffer;
 }
 
-void Renderer::make_buffers(const arhost_intrinsics &intrinsics) {
+void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
     const bool has_slopes = settings_.samples > 1 || settings_.accumulate;
     const std::size_t pixels = std::size_t{intrinsics.width} * intrinsics.height;
     std::size_t moving_size = 0;
     for (std::uint32_t i = objects_binding; i <= tables_binding; ++i) {
         const auto binding = static_cast<Binding>(i);
-        buffers_[binding] = make_buffer(binding, scene_.parts(binding), 0);
+        buffers_[binding] = make_buffer(binding, scene_.parts(binding), 0,
+                                        binding == indices_binding && path != Path::plain ? tree_input_usage : 0);
         moving_size += scene_.moving_size(binding);
     }
     {
@@ -241,64 +166,72 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics) {
     read_ = Buffer(device_, sizeof(std::int32_t) * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
 }
 
-void Renderer::make_pipeline(std::span<const std::uint32_t> shader, std::uint32_t max_depth) {
+void Renderer::make_set(const Shaders &shaders) {
     const DeviceFunctions &vk = device_.functions();
-    std::array<VkDescriptorSetLayoutBinding, binding_count> bindings{};
-    std::array<VkDescriptorBufferInfo, binding_count> infos{};
-    std::array<VkWriteDescriptorSet, binding_count> writes{};
-    for (std::uint32_t i = 0; i < binding_count; ++i) {
+    constexpr const char *what = "describing the shader's buffers";
+    // The device's trees come last, where there are any.
+    const std::uint32_t count = binding_count + (acceleration_ ? 1 : 0);
+    std::array<VkDescriptorSetLayoutBinding, binding_count + 1> bindings{};
+    for (std::uint32_t i = 0; i < count; ++i) {
         bindings[i].binding = i;
-        bindings[i].descriptorType =
-            i == frame_binding ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+        bindings[i].descriptorType = i == frame_binding   ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER
+                                     : i == trees_binding ? VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR
+                                                          : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
         bindings[i].descriptorCount = 1;
-        bindings[i].stageFlags = VK_SHADER_STAGE_COMPUTE_BIT;
+        bindings[i].stageFlags = shaders.stage_flags();
     }
     VkDescriptorSetLayoutCreateInfo set_info{};
     set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-    set_info.bindingCount = binding_count;
+    set_info.bindingCount = count;
     set_info.pBindings = bindings.data();
-    set_layout_ = make<DescriptorSetLayout, VkDescriptorSetLayout>(device_, vk.vkCreateDescriptorSetLayout, set_info,
-                                                                   "describing the shader's buffers");
+    set_layout_ =
+        make<DescriptorSetLayout, VkDescriptorSetLayout>(device_, vk.vkCreateDescriptorSetLayout, set_info, what);
     const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
-                                          {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, binding_count - 1}};
+                                          {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, binding_count - 1},
+                                          {VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, 1}};
     VkDescriptorPoolCreateInfo pool_info{};
     pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
     pool_info.maxSets = 1;
-    pool_info.poolSizeCount = 2;
+    pool_info.poolSizeCount = acceleration_ ? 3 : 2;
     pool_info.pPoolSizes = sizes;
-    pool_ = make<DescriptorPool, VkDescriptorPool>(device_, vk.vkCreateDescriptorPool, pool_info,
-                                                   "describing the shader's buffers");
+    pool_ = make<DescriptorPool, VkDescriptorPool>(device_, vk.vkCreateDescriptorPool, pool_info, what);
     const VkDescriptorSetLayout layout = set_layout_.get();
     VkDescriptorSetAllocateInfo allocation{};
     allocation.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
     allocation.descriptorPool = pool_.get();
     allocation.descriptorSetCount = 1;
     allocation.pSetLayouts = &layout;
-    check(vk.vkAllocateDescriptorSets(device_.handle(), &allocation, &set_), "describing the shader's buffers");
-    for (std::uint32_t i = 0; i < binding_count; ++i) {
-        infos[i] = {buffers_[i].get(), 0, VK_WHOLE_SIZE};
+    check(vk.vkAllocateDescriptorSets(device_.handle(), &allocation, &set_), what);
+    std::array<VkDescriptorBufferInfo, binding_count> infos{};
+    std::array<VkWriteDescriptorSet, binding_count + 1> writes{};
+    const VkAccelerationStructureKHR top = acceleration_ ? acceleration_->top() : VK_NULL_HANDLE;
+    VkWriteDescriptorSetAccelerationStructureKHR trees{};
+    trees.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET_ACCELERATION_STRUCTURE_KHR;
+    trees.accelerationStructureCount = 1;
+    trees.pAccelerationStructures = &top;
+    for (std::uint32_t i = 0; i < count; ++i) {
         writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
         writes[i].dstSet = set_;
         writes[i].dstBinding = i;
         writes[i].descriptorCount = 1;
         writes[i].descriptorType = bindings[i].descriptorType;
-        writes[i].pBufferInfo = &infos[i];
+        if (i == trees_binding) {
+            writes[i].pNext = &trees;
+        } else {
+            infos[i] = {buffers_[i].get(), 0, VK_WHOLE_SIZE};
+            writes[i].pBufferInfo = &infos[i];
+        }
     }
-    vk.vkUpdateDescriptorSets(device_.handle(), binding_count, writes.data(), 0, nullptr);
+    vk.vkUpdateDescriptorSets(device_.handle(), count, writes.data(), 0, nullptr);
 
     VkPipelineLayoutCreateInfo layout_info{};
     layout_info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
     layout_info.setLayoutCount = 1;
     layout_info.pSetLayouts = &layout;
-    layout_ = make<PipelineLayout, VkPipelineLayout>(device_, vk.vkCreatePipelineLayout, layout_info,
-                                                     "describing the shader's buffers");
-    VkShaderModuleCreateInfo module_info{};
-    module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    module_info.codeSize = shader.size_bytes();
-    module_info.pCode = shader.data();
-    const auto module =
-        make<ShaderModule, VkShaderModule>(device_, vk.vkCreateShaderModule, module_info, "reading the shader");
+    layout_ = make<PipelineLayout, VkPipelineLayout>(device_, vk.vkCreatePipelineLayout, layout_info, what);
+}
 
+void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     // Where glass sends two rays on, one waits at each depth.
     const bool branches = scene_.has_glass() && !settings_.one_path;
     const Specialization constants{branches ? static_cast<std::int32_t>(max_depth) + 1 : 1,
@@ -308,28 +241,17 @@ void Renderer::make_pipeline(std::span<const std::uint32_t> shader, std::uint32_
                                    ray_dimensions_,
                                    settings_.samples > 1 || settings_.accumulate,
                                    scene_.has_textures()};
-    std::array<VkSpecializationMapEntry, sizeof constants / 4> entries;
-    for (std::uint32_t i = 0; i < entries.size(); ++i)
-        entries[i] = {i, 4 * i, 4};
-    const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
-                                              sizeof constants, &constants};
-    VkComputePipelineCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-    info.stage.module = module.get();
-    info.stage.pName = "main";
-    info.stage.pSpecializationInfo = &specialization;
-    info.layout = layout_.get();
-    const PipelineCache cache = read_pipeline_cache(device_);
-    VkPipeline pipeline = VK_NULL_HANDLE;
-    {
-        const Heartbeat heartbeat(host_, "compiling the shader");
-        check(vk.vkCreateComputePipelines(device_.handle(), cache.get(), 1, &info, nullptr, &pipeline),
-              "compiling the shader");
-    }
-    pipeline_ = Pipeline(device_, pipeline);
-    keep_pipeline_cache(device_, cache);
+    const Heartbeat heartbeat(host_, "compiling the shader");
+    pipeline_.emplace(device_, shaders, layout_.get(), constants);
+    // Lavapipe compiles when a shader is first run, and an image must not wait for it: of a frame without width no
+    // pixel is traced.
+    const VkCommandBuffer commands = submission_.new_commands();
+    std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
+    submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
+    pipeline_->record(commands, set_, 1, 1);
+    submission_.end(commands);
+    submission_.run(commands);
+    submission_.free(commands);
 }
 
 // The commands for the place that an image goes to. Where memory can't be imported, all share one of ours.
@@ -377,14 +299,11 @@ void Renderer::record(const Target &target) const {
     const std::int32_t nothing[4] = {std::numeric_limits<std::int32_t>::max(),
                                      std::numeric_limits<std::int32_t>::max(), 0, 0};
     vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, sizeof nothing, nothing);
-    barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
-            VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
-    vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_.get());
-    vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_.get(), 0, 1, &set_, 0, nullptr);
-    vk.vkCmdDispatch(commands, (intrinsics_.width + group_side - 1) / group_side,
-                     (intrinsics_.height + group_side - 1) / group_side, 1);
-    barrier(vk, commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
-            VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT);
+    barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, stage_,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    pipeline_->record(commands, set_, intrinsics_.width, intrinsics_.height);
+    barrier(vk, commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
+            VK_ACCESS_TRANSFER_READ_BIT);
     // Row by row where there is room between them, which stays as it is.
     const VkDeviceSize row = VkDeviceSize{4} * intrinsics_.width;
     std::vector<VkBufferCopy> rows;
@@ -422,8 +341,12 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         image.stride < 4 * image.width || image.stride % 4)
         throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
     look(camera, frame_);
-    if (motion)
+    std::vector<VkCommandBuffer> commands;
+    if (motion) {
         scene_.move(*motion);
+        if (acceleration_)
+            commands.push_back(acceleration_->move(*motion));
+    }
     if (motion || image_count_ == 0)
         write_moving_parts();
     frame_.object_count = scene_.frame().object_count;
@@ -448,7 +371,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         still_camera_.reset();
         throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
     }
-    submission_.run(target.commands);
+    commands.push_back(target.commands);
+    submission_.run(commands);
     history_samples_ += settings_.accumulate ? frame_.sample_count : 0;
     return read_back(target, image);
 }

@@ -3,13 +3,12 @@
 // From a camera to an image: one dispatch, whose commands are recorded once for each place that images go to.
 #pragma once
 
-#include "device.hpp"
+#include "acceleration.hpp"
+#include "pipeline.hpp"
 #include "scene_data.hpp"
 #include "view.hpp"
 
-#include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace rt_vulkan {
@@ -21,9 +20,6 @@ struct Settings {
     bool one_path = false;           // glass sends one ray on, chosen at random, in place of two
 };
 
-// A shader's words; throws, naming the file, where it is missing or no SPIR-V.
-std::vector<std::uint32_t> read_shader(const std::filesystem::path &file);
-
 struct Rectangle {
     std::uint32_t x, y, width, height; // px
 };
@@ -31,7 +27,7 @@ struct Rectangle {
 class Renderer {
 public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
-             const Instance &instance, const PhysicalDevice &physical, std::span<const std::uint32_t> shader);
+             const Instance &instance, const PhysicalDevice &physical, const Shaders &shaders);
 
     // Returns the part of the image that holds all alpha above 0; empty: width 0. `motion` may be NULL.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
@@ -50,9 +46,11 @@ private:
         Buffer buffer;
         VkCommandBuffer commands = VK_NULL_HANDLE;
     };
-    void make_buffers(const arhost_intrinsics &intrinsics);
-    Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size);
-    void make_pipeline(std::span<const std::uint32_t> shader, std::uint32_t max_depth);
+    void make_buffers(const arhost_intrinsics &intrinsics, Path path);
+    Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size,
+                       VkBufferUsageFlags further_usage = 0);
+    void make_set(const Shaders &shaders);
+    void make_pipeline(const Shaders &shaders, std::uint32_t max_depth);
     Target &target_of(const arhost_image &image);
     void record(const Target &target) const;
     void write_moving_parts();
@@ -61,20 +59,22 @@ private:
     arhost::Host host_;
     Settings settings_;
     arhost_intrinsics intrinsics_;
+    VkPipelineStageFlags stage_; // of the device's work, which the shaders run in
     SceneData scene_;
     Device device_;
     Submission submission_;
     std::uint32_t ray_dimensions_ = 2;
     Frame frame_{};
     std::array<Buffer, binding_count> buffers_;
-    Buffer moving_;   // what the host writes of what moves, part by part
-    Buffer read_;     // the part that is drawn
-    QueryPool clock_; // none where the device has none
+    Buffer moving_;                            // what the host writes of what moves, part by part
+    Buffer read_;                              // the part that is drawn
+    std::optional<Acceleration> acceleration_; // none on the plain path
+    QueryPool clock_;                          // none where the device has none
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
     PipelineLayout layout_;
-    Pipeline pipeline_;
+    std::optional<ImagePipeline> pipeline_;
     std::vector<Target> targets_;
     bool wrote_in_place_ = false;
     std::uint64_t image_count_ = 0;

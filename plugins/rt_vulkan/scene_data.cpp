@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 namespace rt_vulkan {
 namespace {
@@ -20,10 +21,6 @@ constexpr std::uint32_t most_in_leaf = 4;
 
 const std::byte *bytes(const arhost_scene &arena) {
     return reinterpret_cast<const std::byte *>(&arena);
-}
-
-template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
-    return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
 }
 
 bool is_identity(const float *m) {
@@ -108,9 +105,18 @@ Bytes bytes_of(const auto &vector) {
     return std::as_bytes(std::span(vector));
 }
 
+// Primitives in the geometry's order, as the device's own trees number them.
+Tree without_nodes(std::size_t count) {
+    Tree tree;
+    tree.order.resize(count);
+    std::iota(tree.order.begin(), tree.order.end(), 0u);
+    return tree;
+}
+
 } // namespace
 
-SceneData::SceneData(const arhost_scene &arena, const arhost::Host &host) : arena_(arena), host_(host) {
+SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Host &host)
+    : arena_(arena), has_trees_(has_trees), host_(host) {
     for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
         materials_.push_back(material_of(material));
     for (const arhost_light &light : elements<arhost_light>(arena, arena.lights))
@@ -123,7 +129,8 @@ SceneData::SceneData(const arhost_scene &arena, const arhost::Host &host) : aren
     const auto objects = elements<arhost_object>(arena, arena.objects);
     for (const arhost_object &object : objects)
         anything_moves_ |= object.moves || object.deforms;
-    nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top tree's
+    if (has_trees)
+        nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top tree's
     for (const arhost_object &object : objects)
         if (object.deforms)
             add_normals(mesh_of(object.geometry, true), geometries[object.geometry]);
@@ -150,7 +157,7 @@ void SceneData::look_up() const {
     host_.progress(-1, "building the trees");
 }
 
-std::vector<Box> SceneData::boxes_of(const arhost_geometry &geometry, Points points) const {
+std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points) {
     std::vector<Box> boxes;
     if (geometry.type == ARHOST_SPHERES) {
         boxes.reserve(geometry.positions.count);
@@ -168,7 +175,7 @@ std::vector<Box> SceneData::boxes_of(const arhost_geometry &geometry, Points poi
         return boxes;
     }
     boxes.reserve(geometry.indices.count);
-    const std::byte *corners = bytes(arena_) + geometry.indices.offset;
+    const std::byte *corners = bytes(arena) + geometry.indices.offset;
     for (std::uint32_t i = 0; i < geometry.indices.count; ++i, corners += geometry.indices.stride) {
         std::uint32_t corner[3];
         std::memcpy(corner, corners, sizeof corner);
@@ -186,10 +193,10 @@ std::vector<Box> SceneData::boxes_of(const arhost_geometry &geometry, Points poi
 SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[number];
     const Points points{bytes(arena_) + geometry.positions.offset, geometry.positions.stride};
-    const std::vector<Box> boxes = boxes_of(geometry, points);
+    const std::vector<Box> boxes = boxes_of(arena_, geometry, points);
     Mesh &mesh = meshes_[number];
-    mesh.root = static_cast<std::uint32_t>(nodes_.size());
     mesh.first_primitive = static_cast<std::uint32_t>(primitives_.size());
+    mesh.root = has_trees_ ? static_cast<std::uint32_t>(nodes_.size()) : mesh.first_primitive;
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
     mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
     mesh.local = empty_box();
@@ -198,9 +205,13 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
         return mesh;
     for (const Box &box : boxes)
         include(mesh.local, box);
-    mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
-    mesh.built_area = relative_area(mesh.tree);
-    nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.tree.nodes.size()));
+    if (has_trees_) {
+        mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
+        mesh.built_area = relative_area(mesh.tree);
+        nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.tree.nodes.size()));
+    } else {
+        mesh.tree = without_nodes(boxes.size());
+    }
     primitives_.resize(primitives_.size() + boxes.size());
     write_tree(mesh, geometry, points);
     if (!deforms)
@@ -345,7 +356,7 @@ void SceneData::build_top() {
         numbers.push_back(i);
     }
     objects_in_top_ = static_cast<std::uint32_t>(boxes.size());
-    if (boxes.empty())
+    if (boxes.empty() || !has_trees_)
         return;
     const Tree tree = build_tree(boxes, 1, top_depth, [this] { look_up(); });
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
@@ -373,7 +384,15 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     if (mesh.is_empty)
         return;
     const Points points{reinterpret_cast<const std::byte *>(deformed.positions), 3 * sizeof(float)};
-    const std::vector<Box> boxes = boxes_of(geometry, points);
+    if (has_trees_)
+        refit_tree(mesh, boxes_of(arena_, geometry, points));
+    write_tree(mesh, geometry, points);
+    if (mesh.first_normal != ARHOST_NONE && deformed.normals)
+        std::copy_n(deformed.normals, std::size_t{3} * geometry.normals.count,
+                    attributes_.begin() + mesh.first_normal);
+}
+
+void SceneData::refit_tree(Mesh &mesh, std::span<const Box> boxes) {
     refit(mesh.tree, boxes);
     if (relative_area(mesh.tree) > tolerable_decay * mesh.built_area) {
         mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
@@ -382,10 +401,6 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     }
     std::copy_n(mesh.tree.nodes[0].low, 3, mesh.local.low);
     std::copy_n(mesh.tree.nodes[0].high, 3, mesh.local.high);
-    write_tree(mesh, geometry, points);
-    if (mesh.first_normal != ARHOST_NONE && deformed.normals)
-        std::copy_n(deformed.normals, std::size_t{3} * geometry.normals.count,
-                    attributes_.begin() + mesh.first_normal);
 }
 
 void SceneData::add_textures() {

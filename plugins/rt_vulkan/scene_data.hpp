@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The arena as the shaders read it, and the trees over it. What moves lies at the beginning of each array, so that
-// one copy brings it to the device.
+// The arena as the shaders read it, and trees over it, where they are to be ours. What moves lies at the beginning of
+// each array, so that one copy brings it to the device.
 #pragma once
 
 #include "bvh.hpp"
@@ -19,10 +19,21 @@ namespace rt_vulkan {
 
 using Bytes = std::span<const std::byte>;
 
+template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&arena) + buffer.offset), buffer.count};
+}
+
+struct Points {
+    const std::byte *first;
+    std::uint32_t stride; // bytes
+};
+// Of each triangle or sphere.
+std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points);
+
 class SceneData {
 public:
-    // Builds the trees. `arena` outlives this.
-    SceneData(const arhost_scene &arena, const arhost::Host &host);
+    // `has_trees`: with trees of ours. `arena` outlives this.
+    SceneData(const arhost_scene &arena, bool has_trees, const arhost::Host &host);
 
     // Brings what moves to its places.
     void move(const arhost_motion &motion);
@@ -34,6 +45,7 @@ public:
     // What never changes is forgotten: it lies on the device by now.
     void forget_still_parts();
 
+    std::span<const Object> objects() const { return objects_; }
     // The frame's fields that the scene gives.
     Frame frame() const;
     bool has_glass() const { return has_glass_; }
@@ -47,29 +59,26 @@ private:
         std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord;
         Box local;
         bool is_empty;
-        // Where it deforms:
-        Tree tree;
+        // Where it deforms, or for a moment:
+        Tree tree;             // without nodes where trees are not ours
         double built_area = 0; // relative_area() when its tree was built
-    };
-    struct Points {
-        const std::byte *first;
-        std::uint32_t stride; // bytes
     };
 
     Mesh &mesh_of(std::uint32_t geometry, bool deforms);
     void add_normals(Mesh &mesh, const arhost_geometry &geometry);
     void add_texcoords(Mesh &mesh, const arhost_geometry &geometry);
-    std::vector<Box> boxes_of(const arhost_geometry &geometry, Points points) const;
     void write_tree(const Mesh &mesh, const arhost_geometry &geometry, Points points);
     void add_object(const arhost_object &object, const Mesh &mesh);
     void place(Object &object, const float *world_from_object) const;
     void deform(const arhost_deformed_geometry &deformed);
+    void refit_tree(Mesh &mesh, std::span<const Box> boxes);
     void build_top();
     void add_textures();
     void add_tables();
     void look_up() const; // throws where the host cancels
 
     const arhost_scene &arena_;
+    bool has_trees_;
     arhost::Host host_;
     std::map<std::uint32_t, Mesh> meshes_; // by geometry
     std::vector<std::array<float, 12>> places_;

@@ -8,6 +8,7 @@
 #include "scene.glsl"
 #include "random.glsl"
 #include "texture.glsl"
+#include "hits.glsl"
 #include "trace_plain.glsl"
 #include "surface.glsl"
 #include "lights.glsl"

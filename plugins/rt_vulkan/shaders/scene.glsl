@@ -30,7 +30,7 @@ struct Object {
     mat4x3 object_from_world;
     mat3 transform, normal_transform; // from the object to the world: of directions, and of normals
     uint material, role, mask, flags;
-    uint root;                                      // of its tree, among the nodes
+    uint root; // of its tree, among the nodes; where the device has its own, its mesh's first primitive
     uint first_index, first_normal, first_texcoord; // NONE where there are none
 };
 

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -87,8 +88,10 @@ arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> co
     return in;
 }
 
-void expect_same_picture(const arhost_camera &view, const Options &options) {
-    const Picture got = picture_by("rt_vulkan", rich_scene(), view, options);
+void expect_same_picture(const arhost_camera &view, const Options &options, const std::string &path = "auto") {
+    Options own = options;
+    own["path"] = path;
+    const Picture got = picture_by("rt_vulkan", rich_scene(), view, own);
     const Likeness like = likeness(got, picture_by("rt_embree", rich_scene(), view, options));
     EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
     EXPECT_EQ(like.alphas_off_inside, 0) << like;
@@ -148,6 +151,87 @@ TEST_F(RichScene, AgainAndAgainIsTheSameBytes) {
     EXPECT_EQ(tracer.render(from_the_side(small)).pixels(), first);
 }
 
+// ---- Each path --------------------------------------------------------------------------------------
+
+namespace {
+
+arhost_camera of_moving(const arhost_intrinsics &intrinsics = small) {
+    return camera({25, -330, 150}, {0, 0, 50}, {0, 0, 1}, intrinsics);
+}
+
+const std::string moving_scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
+const auto all_paths = testing::Values("plain", "query", "pipeline");
+
+std::string name_of_path(const testing::TestParamInfo<std::string> &info) {
+    return info.param;
+}
+
+} // namespace
+
+class EachPath : public testing::TestWithParam<std::string> {
+protected:
+    void SetUp() override { ARHOST_REQUIRE_VULKAN(GetParam()); }
+};
+INSTANTIATE_TEST_SUITE_P(Paths, EachPath, all_paths, name_of_path);
+
+TEST_P(EachPath, GivesRtEmbreesPicture) {
+    expect_same_picture(from_the_side(small), {}, GetParam());
+}
+
+TEST_P(EachPath, IsToldOf) {
+    Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+    EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
+}
+
+// Things are where they should be however long they have moved, on trees that have been refitted, and then built.
+TEST_P(EachPath, FollowsWhatMoves) {
+    const arhost_intrinsics tiny = pinhole(48, 36, 48);
+    Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan"),
+        embree(scene::load_scene(moving_scene));
+    ASSERT_EQ(tracer.start(tiny), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(embree.start(tiny), ARHOST_OK);
+    scene::MotionEvaluator evaluator(tracer.scene());
+    constexpr int frames = 130; // more than two times as many refits as there are between buildings
+    for (int frame = 0; frame < frames; ++frame) {
+        const arhost_motion motion = evaluator.at(0.1 * frame);
+        Picture got(tiny), expected(tiny);
+        ASSERT_EQ(tracer.try_render(of_moving(tiny), got, &motion), ARHOST_OK) << tracer.plugin().log();
+        if (frame % 13)
+            continue;
+        ASSERT_EQ(embree.try_render(of_moving(tiny), expected, &motion), ARHOST_OK);
+        const Likeness like = likeness(got, expected);
+        EXPECT_LE(like.alphas_off, like.pixels / 500) << "frame " << frame << ": " << like;
+        EXPECT_EQ(like.alphas_off_inside, 0) << "frame " << frame << ": " << like;
+        EXPECT_GE(like.psnr, 40) << "frame " << frame << ": " << like;
+    }
+}
+
+TEST_P(EachPath, TakesOneSceneAfterAnother) {
+    LoggingHost logging;
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, false);
+    const auto devices = instance.devices();
+    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
+    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_path(device, GetParam()));
+    const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
+        scene::Arena arena = std::move(scene).build();
+        const arhost_raytracer_setup setup{sizeof setup,   small.width,     small.height, 0,
+                                           &arena.scene(), &view.intrinsics};
+        rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shaders);
+        Picture picture(small);
+        const rt_vulkan::Rectangle drawn = renderer.render(view, picture.image());
+        EXPECT_EQ(drawn.width > 0, picture.alphas().rbegin()->first > 0);
+        return picture.pixels();
+    };
+    const auto first = picture_of(rich_scene(), from_the_side(small));
+    const auto second = picture_of(scene::load_scene(moving_scene), of_moving());
+    EXPECT_NE(first, second);
+    const auto nothing = picture_of(scene::ArenaBuilder(), of_moving());
+    EXPECT_EQ(std::count(nothing.begin(), nothing.end(), Pixel{0, 0, 0, 0}), small.width * small.height);
+    EXPECT_EQ(picture_of(rich_scene(), from_the_side(small)), first);
+}
+
 // ---- Where images go -------------------------------------------------------------------------------
 
 // Page-aligned memory, as that of slots, goes to the device itself; what is beside the rows stays as it is.
@@ -160,11 +244,11 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
     const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
     if (!device.imports_host_memory)
         GTEST_SKIP() << device.name << " lacks VK_EXT_external_memory_host";
-    const auto shader = rt_vulkan::read_shader(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv");
+    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::Path::plain);
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
-    rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shader);
+    rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shaders);
 
     const std::uint32_t stride = 4 * small.width + 64;
     const std::size_t size = std::size_t{stride} * small.height, pages = (size + 4095) / 4096 * 4096;
@@ -256,6 +340,28 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
 }
 
+TEST(Path, IsChosenByWhatTheDeviceHas) {
+    using rt_vulkan::Path;
+    rt_vulkan::PhysicalDevice device{};
+    device.name = "Little GPU";
+    device.properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU;
+    const auto chosen = [&](const char *wanted) { return rt_vulkan::choose_path(device, wanted); };
+    EXPECT_EQ(chosen("auto"), Path::plain);
+    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("query"); }),
+                testing::AllOf(HasSubstr("option 'path'"), HasSubstr("'Little GPU' has no 'query'"),
+                               HasSubstr("it has plain")));
+    device.paths = {Path::plain, Path::query};
+    EXPECT_EQ(chosen("auto"), Path::query);
+    EXPECT_EQ(chosen("plain"), Path::plain);
+    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }), HasSubstr("it has plain, query"));
+    device.paths = {Path::plain, Path::query, Path::pipeline};
+    EXPECT_EQ(chosen("auto"), Path::pipeline);
+    EXPECT_EQ(chosen("query"), Path::query);
+    device.properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_CPU;
+    EXPECT_EQ(chosen("auto"), Path::plain);
+    EXPECT_EQ(chosen("pipeline"), Path::pipeline);
+}
+
 TEST(Device, OptionThatNamesNoneIsRefused) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
@@ -278,8 +384,8 @@ TEST(Device, IsListedByTheHost) {
     for (const auto &device : rt_vulkan::Instance(Host(&logging.host), false).devices()) {
         EXPECT_THAT(text, HasSubstr(device.name));
         EXPECT_THAT(text, HasSubstr(device.uuid));
+        EXPECT_THAT(text, HasSubstr("paths: " + rt_vulkan::list_of(device.paths)));
     }
-    EXPECT_THAT(text, HasSubstr("paths: plain"));
 }
 
 TEST(Device, WithoutWhatIsNeededIsRefused) {
@@ -288,14 +394,14 @@ TEST(Device, WithoutWhatIsNeededIsRefused) {
     const Host host(&logging.host);
     const rt_vulkan::Instance instance(host, false);
     const rt_vulkan::PhysicalDevice sound = instance.devices()[0];
-    const auto shader = rt_vulkan::read_shader(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv");
+    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::Path::plain);
     scene::Arena arena = rich_scene().build();
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &small};
     const auto complaint = [&](auto spoil) {
         rt_vulkan::PhysicalDevice device = sound;
         spoil(device);
         return refusal(ARHOST_ERROR_UNSUPPORTED,
-                       [&] { rt_vulkan::Renderer(setup, {}, host, instance, device, shader); });
+                       [&] { rt_vulkan::Renderer(setup, {}, host, instance, device, shaders); });
     };
     EXPECT_THAT(complaint([](auto &device) { device.properties.apiVersion = VK_API_VERSION_1_0; }),
                 testing::AllOf(HasSubstr(sound.name), HasSubstr("1.1 is needed"), HasSubstr("option 'device'")));
@@ -309,18 +415,18 @@ TEST(Device, WithoutWhatIsNeededIsRefused) {
 
 TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
     const ScratchFolder folder;
-    const auto plugin_file = folder.path() / "rt_vulkan.so", shader_file = folder.path() / "rt_vulkan_plain.spv";
+    const auto plugin_file = folder.path() / "rt_vulkan.so", shader_file = folder.path() / "rt_vulkan_plain.comp.spv";
     std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan.so", plugin_file);
     const auto relative = std::filesystem::relative(folder.path() / "rt_vulkan", ARHOST_PLUGIN_DIRECTORY).string();
     const auto complaint = [&] {
         PluginUnderTest plugin(relative);
-        EXPECT_EQ(plugin.create(), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(plugin.create({{"path", "plain"}}), ARHOST_ERROR_CONFIGURATION);
         return plugin.log();
     };
     EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is missing")));
     std::ofstream(shader_file) << "This is no shader, but long enough to be taken for one.";
     EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is damaged")));
-    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.spv", shader_file,
+    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.comp.spv", shader_file,
                                std::filesystem::copy_options::overwrite_existing);
     const auto whole = std::filesystem::file_size(shader_file);
     for (const auto size : {whole - 4, whole - 1, whole / 2, std::uintmax_t{20}}) {
@@ -393,8 +499,17 @@ TEST_F(Validation, HearsOfAHazard) {
     EXPECT_THAT(logging.text, HasSubstr("HAZARD"));
 }
 
-TEST_F(Validation, HasNothingToSay) {
-    Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}}, "rt_vulkan");
+class ValidationOfPath : public Validation, public testing::WithParamInterface<std::string> {
+protected:
+    void SetUp() override {
+        ARHOST_REQUIRE_VULKAN(GetParam());
+        Validation::SetUp();
+    }
+};
+INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
+
+TEST_P(ValidationOfPath, HasNothingToSay) {
+    Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     for (int frame = 0; frame < 3; ++frame) {
         Picture picture(small);
@@ -405,16 +520,15 @@ TEST_F(Validation, HasNothingToSay) {
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
 }
 
-TEST_F(Validation, HasNothingToSayOfMotion) {
-    const std::filesystem::path file = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
-    Tracer tracer(scene::load_scene(file), {{"validate", "true"}}, "rt_vulkan");
+TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
+    Tracer tracer(scene::load_scene(moving_scene), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     std::vector<std::vector<Pixel>> pictures;
     for (const double time_s : {0.0, 0.7, 0.0}) {
         const arhost_motion motion = evaluator.at(time_s);
         Picture picture(small);
-        EXPECT_EQ(tracer.try_render(from_the_side(small), picture, &motion), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK);
         pictures.push_back(picture.pixels());
     }
     EXPECT_NE(pictures[0], pictures[1]);

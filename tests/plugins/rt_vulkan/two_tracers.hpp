@@ -7,18 +7,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 
 namespace arhost::test {
 
-// What rt_vulkan says against making it here, "" where there is a device.
-inline std::string no_vulkan() {
+// Mesa 25's lavapipe spends half a minute on the best code for a shader of ours, which small pictures don't repay.
+inline const bool compiles_quickly =
+    ::setenv("GALLIVM_PERF", "nopt", 0) == 0 && ::setenv("LP_NATIVE_VECTOR_WIDTH", "128", 0) == 0;
+
+// What rt_vulkan says against making it here, "" where there is a device that has the path.
+inline std::string no_vulkan(const std::string &path = "auto") {
     PluginUnderTest plugin("rt_vulkan");
-    return plugin.create() == ARHOST_OK ? "" : plugin.log();
+    return plugin.create({{"path", path}}) == ARHOST_OK ? "" : plugin.log();
 }
-#define ARHOST_REQUIRE_VULKAN()                                                                                      \
-    if (const std::string missing = ::arhost::test::no_vulkan(); !missing.empty())                                   \
+#define ARHOST_REQUIRE_VULKAN(...)                                                                                   \
+    if (const std::string missing = ::arhost::test::no_vulkan(__VA_ARGS__); !missing.empty())                        \
     GTEST_SKIP() << missing
 
 struct Likeness {

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The shaders of a path, compiled by the driver for a scene, and the command that runs them for each pixel.
+#pragma once
+
+#include "device.hpp"
+#include "layout.hpp"
+
+#include <filesystem>
+#include <vector>
+
+namespace rt_vulkan {
+
+struct Shader {
+    VkShaderStageFlagBits stage;
+    std::vector<std::uint32_t> words; // SPIR-V
+};
+
+struct Shaders {
+    Path path;
+    std::vector<Shader> stages;
+
+    VkShaderStageFlags stage_flags() const;
+    // The step of the device's work that they run in.
+    VkPipelineStageFlags pipeline_stage() const;
+};
+
+// A path's shaders, as they lie in `folder`; throws, naming the file, where one is missing or no SPIR-V.
+Shaders read_shaders(const std::filesystem::path &folder, Path path);
+
+inline constexpr std::uint32_t group_side = 8; // of a compute shader's invocations
+
+class ImagePipeline {
+public:
+    // Compiles, which takes a while, unless the driver's result has been kept from an earlier time.
+    ImagePipeline(const Device &device, const Shaders &shaders, VkPipelineLayout layout,
+                  const Specialization &constants);
+
+    void record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width, std::uint32_t height) const;
+
+private:
+    void compile(const Shaders &shaders, std::span<const VkPipelineShaderStageCreateInfo> stages,
+                 const PipelineCache &cache);
+    void make_table();
+
+    const Device &device_;
+    VkPipelineLayout layout_;
+    Pipeline pipeline_;
+    // Of the pipeline for ray tracing: its shader binding table.
+    Buffer table_;
+    VkStridedDeviceAddressRegionKHR generate_{}, miss_{}, hit_{};
+};
+
+} // namespace rt_vulkan

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Rays, and where they meet triangles and spheres. Of the paths each has its own
+//     Hit trace(Ray ray, bool any, bool passes_backs)
+// which gives the nearest hit; with `any`, one that may be another. A surface that faces away does not count where
+// `passes_backs`.
+
+struct Ray {
+    vec3 origin, direction;
+    float end; // of the way, in lengths of `direction`
+    uint mask;
+};
+
+struct Hit {
+    float way; // in lengths of the ray's direction
+    vec2 at;   // of a triangle: the shares of its second and third corner
+    vec3 facet; // the facet's normal in the object's axes, of any length
+    uint object, primitive; // object NONE: nothing
+};
+
+Hit no_hit(Ray ray) {
+    return Hit(ray.end, vec2(0.0), vec3(0.0), NONE, NONE);
+}
+
+// Where numbers have left the range of floats, among facets of 1e-15 mm say, nothing is hit.
+bool can_hit(Ray ray) {
+    return frame.object_count != 0u && largest(ray.origin) < 1e18 && largest(ray.direction) < 1e18 &&
+           dot(ray.direction, ray.direction) >= 0.0;
+}
+
+void to_axes_of(uint object, Ray ray, out vec3 origin, out vec3 direction) {
+    origin = ray.origin;
+    direction = ray.direction;
+    if ((objects[object].flags & HAS_TRANSFORM) != 0u) {
+        origin = objects[object].object_from_world * vec4(ray.origin, 1.0);
+        direction = objects[object].object_from_world * vec4(ray.direction, 0.0);
+    }
+}
+
+vec2 texcoord_at(uint object, uint number, vec2 at) {
+    uint first = objects[object].first_index + 3u * number, base = objects[object].first_texcoord;
+    vec3 share = vec3(1.0 - at.x - at.y, at.x, at.y);
+    vec2 sum = vec2(0.0);
+    for (int i = 0; i < 3; ++i) {
+        uint from = base + 2u * indices[first + uint(i)];
+        sum += vec2(attributes[from], attributes[from + 1u]) * share[i];
+    }
+    return sum;
+}
+
+bool is_hole(uint object, uint primitive, vec2 at) {
+    if (!has_holes || (objects[object].flags & HAS_HOLES) == 0u)
+        return false;
+    uint material = objects[object].material;
+    vec2 place = texcoord_at(object, primitives[primitive].number, at);
+    return sample_texture(materials[material].colour_texture, place).a < materials[material].alpha_cutoff;
+}
+
+// As Embree's: the numbers are to agree to the last bits.
+bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
+    precise vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
+    precise vec3 to_corner = primitives[primitive].corner - origin;
+    precise vec3 facet = cross(edge_2, edge_1), moment = cross(to_corner, direction);
+    precise float along = dot(facet, direction);
+    float turned = along < 0.0 ? -1.0 : 1.0, size = abs(along);
+    precise float u = dot(moment, edge_2) * turned, v = dot(moment, edge_1) * turned;
+    if (size == 0.0 || !(u >= 0.0) || !(v >= 0.0) || !(u + v <= size))
+        return false;
+    precise float way = dot(facet, to_corner) * turned;
+    if (!(way > 0.0) || !(way <= size * hit.way))
+        return false;
+    float share = 1.0 / size;
+    hit.way = way * share;
+    hit.at = vec2(u, v) * share;
+    hit.facet = facet;
+    return true;
+}
+
+bool hits_sphere(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
+    precise vec3 to_centre = primitives[primitive].corner - origin;
+    float radius = primitives[primitive].edge_1.x, share = 1.0 / dot(direction, direction);
+    precise float middle = dot(to_centre, direction) * share;
+    precise vec3 across = to_centre - direction * middle;
+    precise float left = radius * radius - dot(across, across);
+    if (!(left >= 0.0))
+        return false;
+    precise float half_way = sqrt(left * share);
+    float front = middle - half_way, back = middle + half_way;
+    bool from_outside = front >= 0.0 && front <= hit.way;
+    if (!from_outside && !(back >= 0.0 && back <= hit.way))
+        return false;
+    hit.way = from_outside ? front : back;
+    hit.at = vec2(0.0);
+    hit.facet = direction * (from_outside ? -half_way : half_way) - across;
+    return true;
+}
+
+vec3 facet_of(uint primitive) {
+    precise vec3 facet = cross(primitives[primitive].edge_2, primitives[primitive].edge_1);
+    return facet;
+}
+
+// What the device has found in trees of its own, by our formulas, so that the paths agree to the last bits. At an
+// edge, where ours may find nothing, as the device has it.
+Hit hit_of(Ray ray, uint object, uint primitive, float way, vec2 at) {
+    vec3 origin, direction;
+    to_axes_of(object, ray, origin, direction);
+    Hit hit = Hit(INFINITY, vec2(0.0), vec3(0.0), object, primitive);
+    if ((objects[object].flags & IS_SPHERES) != 0u ? hits_sphere(primitive, origin, direction, hit)
+                                                   : hits_triangle(primitive, origin, direction, hit))
+        return hit;
+    return Hit(way, at, facet_of(primitive), object, primitive);
+}

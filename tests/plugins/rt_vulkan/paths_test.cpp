@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The same picture by the device's own trees as by ours, scene by scene, from afar and from near.
+#include "scene_views.hpp"
+
+namespace arhost::test {
+
+class SamePictureByPath : public testing::TestWithParam<std::tuple<std::string, View>> {};
+
+TEST_P(SamePictureByPath, AsThePlainPathGives) {
+    const auto &[path, view] = GetParam();
+    ARHOST_REQUIRE_VULKAN(path);
+    const std::filesystem::path file = file_of(view);
+    Tracer traced(scene::load_scene(file), {{"samples", view.samples}, {"path", path}}, "rt_vulkan"),
+        plain(scene::load_scene(file), {{"samples", view.samples}, {"path", "plain"}}, "rt_vulkan");
+    ASSERT_EQ(traced.start(small), ARHOST_OK) << traced.plugin().log();
+    ASSERT_EQ(plain.start(small), ARHOST_OK) << plain.plugin().log();
+    scene::MotionEvaluator motion(traced.scene());
+    int shown = 0;
+    for (const double nearness : nearnesses) {
+        const arhost_camera camera = camera_for(traced.scene(), nearness);
+        const arhost_motion then = motion.at(view.time_s);
+        Picture got(small), expected(small);
+        ASSERT_EQ(traced.try_render(camera, got, &then), ARHOST_OK) << traced.plugin().log();
+        ASSERT_EQ(plain.try_render(camera, expected, &then), ARHOST_OK) << plain.plugin().log();
+        const std::string name = view.name + (nearness < 1 ? "-near-" : "-far-") + path;
+        keep(got, name);
+        const Likeness like = likeness(got, expected);
+        std::cout << name << ": " << like << std::endl;
+        // Which of two facets is hit where they meet, or lie in one plane, each device decides in its own way.
+        EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
+        EXPECT_EQ(like.alphas_off_inside, 0) << like;
+        if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
+            EXPECT_GE(like.psnr, 45) << like;
+        }
+        shown += like.inside;
+    }
+    EXPECT_GT(shown, 200) << "hardly anything to compare";
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SamePictureByPath,
+                         testing::Combine(testing::Values("query", "pipeline"), every_scene), [](const auto &info) {
+                             return std::get<0>(info.param) + "_" + name_of_view(std::get<1>(info.param));
+                         });
+
+} // namespace arhost::test

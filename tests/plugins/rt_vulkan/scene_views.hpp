@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every scene, from afar and from near: what pictures are compared of.
+#pragma once
+
+#include "scene/loader.hpp"
+#include "scene/motion.hpp"
+#include "two_tracers.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace arhost::test {
+
+struct View {
+    std::string name, scene; // below the project's folder
+    std::string samples = "1";
+    double time_s = 0;
+};
+inline std::ostream &operator<<(std::ostream &stream, const View &view) {
+    return stream << view.name;
+}
+
+inline const arhost_intrinsics small = pinhole(128, 96, 128);
+
+// Where the dissertation's marker lies, as its camera sees it; `nearness` 1 is from afar.
+inline arhost_camera camera_for(const arhost_scene &scene, double nearness) {
+    const double away = -330 * nearness, up = 150 * nearness;
+    return scene.axes == ARHOST_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, small)
+                                     : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, small);
+}
+
+inline const double nearnesses[] = {1.0, 0.45};
+
+inline std::filesystem::path file_of(const View &view) {
+    return std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
+}
+
+// For eyes: ARHOST_KEEP_PICTURES=FOLDER.
+inline void keep(const Picture &picture, const std::string &name) {
+    const char *folder = std::getenv("ARHOST_KEEP_PICTURES");
+    if (!folder)
+        return;
+    cv::Mat image(static_cast<int>(picture.height), static_cast<int>(picture.width), CV_8UC4);
+    for (std::uint32_t y = 0; y < picture.height; ++y)
+        for (std::uint32_t x = 0; x < picture.width; ++x) {
+            const Pixel p = picture.at(x, y);
+            image.at<cv::Vec4b>(static_cast<int>(y), static_cast<int>(x)) =
+                cv::Vec4b(static_cast<std::uint8_t>(p[2]), static_cast<std::uint8_t>(p[1]),
+                          static_cast<std::uint8_t>(p[0]), static_cast<std::uint8_t>(p[3]));
+        }
+    cv::imwrite(std::string(folder) + "/" + name + ".png", image);
+}
+
+inline bool has_glass(const arhost_scene &scene) {
+    const auto *materials =
+        reinterpret_cast<const arhost_material *>(reinterpret_cast<const char *>(&scene) + scene.materials.offset);
+    return std::any_of(materials, materials + scene.materials.count,
+                       [](const arhost_material &material) { return material.model == ARHOST_GLASS; });
+}
+
+inline const auto every_scene = testing::Values(
+    View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},
+    View{"room", "tests/plugins/rt_embree/golden/room.yaml", "4"}, View{"demo", "config/scenes/demo.yaml"},
+    View{"moving", "config/scenes/moving.yaml", "4", 1.3}, View{"optix-b", "config/scenes/optix-b.yaml"},
+    View{"optix-cgd", "config/scenes/optix-cgd.yaml"}, View{"optix-cgl", "config/scenes/optix-cgl.yaml"},
+    View{"optix-cs", "config/scenes/optix-cs.yaml"}, View{"optix-gd", "config/scenes/optix-gd.yaml"},
+    View{"optix-gl", "config/scenes/optix-gl.yaml"}, View{"optix-hb", "config/scenes/optix-hb.yaml"},
+    View{"optix-skybox-buddha", "config/scenes/optix-skybox-buddha.yaml"},
+    View{"optix-skybox-bunny", "config/scenes/optix-skybox-bunny.yaml"},
+    View{"optix-skybox-dragon", "config/scenes/optix-skybox-dragon.yaml"},
+    View{"optix-skybox-lucy", "config/scenes/optix-skybox-lucy.yaml"},
+    View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"},
+    View{"vkray-b", "config/scenes/vkray-b.yaml"}, View{"vkray-cmd", "config/scenes/vkray-cmd.yaml"},
+    View{"vkray-cs", "config/scenes/vkray-cs.yaml"}, View{"vkray-hb", "config/scenes/vkray-hb.yaml"},
+    View{"vkray-hbf", "config/scenes/vkray-hbf.yaml"}, View{"vkray-md", "config/scenes/vkray-md.yaml"});
+
+inline std::string name_of_view(const View &view) {
+    std::string name = view.name;
+    std::replace(name.begin(), name.end(), '-', '_');
+    return name;
+}
+
+} // namespace arhost::test
