@@ -19,9 +19,9 @@ constexpr const char *kept[] = {
     // windows
     "DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY", "XLOCALEDIR", "GDK_*", "QT_*", "SDL_*",
     // GPUs, and what stands in for them
-    "VK_*", "MESA_*", "LIBGL_*", "GALLIUM_*", "LP_*", "EGL_*", "GBM_*", "DRI_*", "__EGL_*", "__GL*", "__NV_*",
-    "__VK_*", "RADV_*", "ACO_*", "AMD_DEBUG", "ANV_*", "INTEL_DEBUG", "ZINK_*", "LIBVA_*", "VDPAU_*", "CUDA_*",
-    "NVIDIA_DRIVER_CAPABILITIES", "NVIDIA_VISIBLE_DEVICES", "OPTIX_*", "OCL_*", "ROCR_VISIBLE_DEVICES",
+    "VK_*", "MESA_*", "LIBGL_*", "GALLIUM_*", "GALLIVM_*", "LP_*", "EGL_*", "GBM_*", "DRI_*", "__EGL_*", "__GL*",
+    "__NV_*", "__VK_*", "RADV_*", "ACO_*", "AMD_DEBUG", "ANV_*", "INTEL_DEBUG", "ZINK_*", "LIBVA_*", "VDPAU_*",
+    "CUDA_*", "NVIDIA_DRIVER_CAPABILITIES", "NVIDIA_VISIBLE_DEVICES", "OPTIX_*", "OCL_*", "ROCR_VISIBLE_DEVICES",
     "HIP_VISIBLE_DEVICES", "HSA_*",
     // computing
     "OMP_*", "GOMP_*", "KMP_*", "MKL_*", "OPENBLAS_*", "TBB_*", "EMBREE_*", "OPENCV_*", "HWY_*",

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A run whose Vulkan device is gone: the host's other ray tracer goes on.
+#include "arhost_run.hpp"
+#include "two_tracers.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+namespace arhost::test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int frames = 400;
+
+// The machine's drivers, as the loader is told of them, where the test can take them away.
+std::string copy_drivers(const fs::path &folder) {
+    fs::create_directories(folder);
+    std::string list;
+    for (const char *place : {"/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"}) {
+        std::error_code ignored;
+        for (const auto &driver : fs::directory_iterator(place, ignored)) {
+            fs::copy_file(driver.path(), folder / driver.path().filename(), fs::copy_options::skip_existing);
+            list += (list.empty() ? "" : ":") + (folder / driver.path().filename()).string();
+        }
+    }
+    return list;
+}
+
+class DriverThatGoes : public testing::Test {
+protected:
+    void SetUp() override {
+#if defined(__SANITIZE_ADDRESS__)
+        GTEST_SKIP() << "what drivers leak would be the worker's fault";
+#endif
+        ARHOST_REQUIRE_VULKAN();
+    }
+    DriverThatGoes() : drivers_(run_.path("drivers")), list_(copy_drivers(drivers_)) {
+        run_.write("scene.yaml", small_scene);
+    }
+    void start(const char *more) {
+        run_.write("run.yaml",
+                   "version: 1\nsource: {plugin: source_counter, options: {frames: " + std::to_string(frames) +
+                       ", width: 64, height: 48, delay_ms: 5}}\n"
+                       "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                       "raytracer: {plugin: rt_vulkan, scene: scene.yaml, allow: [gpu], reads: [drivers]" +
+                       more + "}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\nstats: stats.json\n");
+        run_.start({"--config", "run.yaml"}, [this] {
+            ::setenv("VK_DRIVER_FILES", list_.c_str(), 1);
+            ::setenv("VK_ICD_FILENAMES", list_.c_str(), 1);
+        });
+    }
+    // Of the frames that have come to the output so far.
+    std::ptrdiff_t overlaid() const {
+        const auto lines =
+            run_.exists("out/counted.txt") ? counted(run_, "out/counted.txt") : std::vector<CountedLine>();
+        return std::ranges::count_if(lines, [](const CountedLine &line) { return line.kind != ARHOST_OVERLAY_NONE; });
+    }
+    void take_drivers_away() {
+        while (run_.running() && overlaid() < 20)
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        fs::remove_all(drivers_);
+        ASSERT_GT(run_.worker("rt_vulkan"), 0) << run_.output();
+        ::kill(run_.worker("rt_vulkan"), SIGKILL); // as a lost device ends it
+    }
+
+    ArhostRun run_;
+
+private:
+    fs::path drivers_;
+    std::string list_;
+};
+
+} // namespace
+
+TEST_F(DriverThatGoes, HandsOverToTheFallbackInMidRun) {
+    start(", fallback: rt_embree");
+    take_drivers_away();
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+    EXPECT_THAT(run_.output(), HasSubstr("falling back to rt_embree"));
+    const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));
+    EXPECT_EQ(stats["frames"]["composited"], frames);
+    EXPECT_GE(stats["frames"]["augmented"], frames - 5) << "those of the moment alone are without";
+    EXPECT_GE(overlaid(), frames - 5);
+}
+
+TEST_F(DriverThatGoes, LeavesTheVideoAsItIsWhereThereIsNoFallback) {
+    start("");
+    take_drivers_away();
+    EXPECT_EQ(run_.wait(), 1) << run_.output();
+    EXPECT_THAT(run_.output(), HasSubstr("Vulkan"));
+    const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));
+    EXPECT_EQ(stats["frames"]["composited"], frames);
+}
+
+} // namespace arhost::test
