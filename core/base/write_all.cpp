@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstdio>
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
@@ -13,6 +15,13 @@
 namespace arhost::base {
 
 void write_all(int fd, std::string_view bytes, int signals) {
+    // A terminal that poll calls ready may take less than is written, and then waits. Opened anew it need not, and
+    // for others who have it open nothing changes.
+    const UniqueFd terminal(::isatty(fd) ? ::open(("/proc/self/fd/" + std::to_string(fd)).c_str(),
+                                                  O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)
+                                         : -1);
+    if (terminal)
+        fd = terminal.get();
     while (!bytes.empty()) {
         pollfd fds[2] = {{fd, POLLOUT, 0}, {signals, POLLIN, 0}};
         if (::poll(fds, 2, -1) < 0 && errno != EINTR)
@@ -27,6 +36,10 @@ void write_all(int fd, std::string_view bytes, int signals) {
             throw_errno("write");
         bytes.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
     }
+}
+
+bool stdout_is_written() {
+    return std::fflush(stdout) == 0 && !std::ferror(stdout);
 }
 
 int take_signal(int signals) {

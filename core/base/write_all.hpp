@@ -18,6 +18,9 @@ struct Interrupted : std::runtime_error {
 // `signals`: a signalfd, what comes there ends it; -1: nothing does. Throws Interrupted, and std::system_error.
 void write_all(int fd, std::string_view bytes, int signals = -1);
 
+// Of what went there by stdio and streams: a full disk is told no sooner. True: all of it was taken.
+bool stdout_is_written();
+
 // Takes what has come there, and does not wait; 0: nothing has.
 int take_signal(int signals);
 

@@ -80,6 +80,13 @@ std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     return files;
 }
 
+// Name or pattern, behind links.
+fs::path written_by(const yaml::Node &output) {
+    const fs::path path = output.output_path();
+    return pattern_of(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
+                                       : base::real_path(path);
+}
+
 [[noreturn]] void refuse(const yaml::Node &output, const std::string &file_read) {
     const bool same_name = base::real_path(output.output_path()) == file_read;
     output.fail("'" + output.text() + "' is a file that this run reads" + (same_name ? "" : " (" + file_read + ")") +
@@ -108,11 +115,10 @@ void FilesInUse::write(const yaml::Node &output) {
             output.fail("another output writes '" + output.text() + "' already; choose another path");
         else if (use)
             refuse(output, use->path);
-    const fs::path path = output.output_path();
+    const fs::path path = written_by(output);
     for (const yaml::Node &other : outputs_)
-        if (const fs::path theirs = other.output_path();
-            can_meet(path.filename(), theirs.filename()) &&
-            base::real_path(path.parent_path()) == base::real_path(theirs.parent_path()))
+        if (const fs::path theirs = written_by(other);
+            path.parent_path() == theirs.parent_path() && can_meet(path.filename(), theirs.filename()))
             output.fail("another output, '" + other.text() + "', can write a file of the same name as '" +
                         output.text() + "'; choose another path");
     for (const FileIdentity &file : files)

@@ -183,7 +183,7 @@ void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);
     } catch (const std::system_error &error) {
-        throw std::runtime_error("can't write what the tests told: " + error.code().message());
+        throw std::runtime_error("standard output can't be written: " + error.code().message());
     }
 }
 
@@ -233,10 +233,25 @@ Report run(const RunSettings &settings, const std::string &pattern, bool quiet) 
 void expect_descriptors(unsigned jobs) {
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
-    if (const rlim_t needed = 64 + 4 * jobs; limit.rlim_cur < needed)
+    const rlim_t needed = 64 + 4 * jobs;
+    if (limit.rlim_cur < needed && limit.rlim_max >= needed) {
+        limit.rlim_cur = needed;
+        ::setrlimit(RLIMIT_NOFILE, &limit);
+    }
+    if (limit.rlim_cur < needed)
         throw std::runtime_error(
             fmt::format("{} files may be open at once, and {} are needed; raise it: ulimit -n {}", limit.rlim_cur,
                         needed, needed));
+}
+
+// Plugins get paths as UTF-8: those that their options have, and of the folder for what they write.
+void expect_utf8(const std::vector<std::string> &settings) {
+    std::error_code none; // is told where it is missed
+    std::vector<std::string> texts = settings;
+    texts.push_back(fs::temp_directory_path(none));
+    for (const std::string &text : texts)
+        if (!base::is_utf8(text))
+            throw std::runtime_error("'" + text + "' is no UTF-8, as what a plugin is given must be; rename it");
 }
 
 // A report replaces what is there, unless that is a pipe or a device.
@@ -281,11 +296,16 @@ base::UniqueFd take_signals() {
     return base::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
 }
 
-// The last line, where somebody reads it.
-void say(const std::string &line) {
-    pollfd ready{STDERR_FILENO, POLLOUT, 0};
-    if (::poll(&ready, 1, 0) > 0)
-        fmt::print(stderr, "{}\n", line);
+// The last line; whoever does not read it ends this by another signal.
+void say(const std::string &line, int signals) noexcept {
+    try {
+        base::write_all(STDERR_FILENO, line + "\n", signals);
+    } catch (const std::exception &) { // nobody is told
+    }
+}
+bool is_read(int fd) {
+    pollfd ready{fd, POLLOUT, 0};
+    return ::poll(&ready, 1, 0) > 0;
 }
 
 } // namespace
@@ -342,8 +362,9 @@ int main(int argc, char **argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 ? 0 : usage_or_suite_failed;
+        return app.exit(error) == 0 && base::stdout_is_written() ? 0 : usage_or_suite_failed;
     }
+    const base::UniqueFd signals = take_signals();
     try {
         if (only_list) {
             print(list(pattern));
@@ -360,24 +381,26 @@ int main(int argc, char **argv) {
         settings.subject.policy_options = policy_options.texts();
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
+        expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
         expect_files_of_their_own({json, junit, html}, settings.subject);
-        base::WholeFile json_file(json), junit_file(junit), html_file(html); // a pipe's may wait for its reader
-        const base::UniqueFd signals = take_signals();
         settings.signals = signals.get();
+        base::WholeFile json_file(json, settings.signals), junit_file(junit, settings.signals),
+            html_file(html, settings.signals);
         const Report report = run(settings, pattern, quiet);
         print(as_summary(report), settings.signals);
         if (report.results.empty())
             throw std::runtime_error("--only " + pattern + ": no test of this kind of plugin has such a name");
-        json_file.write(as_json(report), settings.signals);
-        junit_file.write(as_junit(report), settings.signals);
-        html_file.write(as_html(report), settings.signals);
+        json_file.write(as_json(report));
+        junit_file.write(as_junit(report));
+        html_file.write(as_html(report));
         return report.exit_status();
     } catch (const base::Interrupted &interrupted) {
-        say(interrupted.what());
+        if (is_read(STDERR_FILENO))
+            say(interrupted.what(), settings.signals);
         return 128 + interrupted.signal;
     } catch (const std::exception &error) {
-        say("error: " + base::printable(error.what()));
+        say("error: " + base::printable(error.what()), settings.signals);
         return usage_or_suite_failed;
     }
 }

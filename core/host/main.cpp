@@ -2,6 +2,7 @@
 //
 // arhost: the command line.
 #include "base/text.hpp"
+#include "base/write_all.hpp"
 #include "host/commands.hpp"
 #include "host/new_plugin.hpp"
 
@@ -33,10 +34,9 @@ int refuse(const std::string &why, int exit_status) {
     return exit_status;
 }
 
-// A full disk is told at the end, if not before.
-void expect_stdout_written() {
-    if (std::fflush(stdout) != 0 || std::ferror(stdout))
-        throw std::runtime_error("standard output can't be written");
+int told(int status) {
+    return arhost::base::stdout_is_written() ? status
+                                             : refuse("standard output can't be written", arhost::host::run_failed);
 }
 
 } // namespace
@@ -148,8 +148,7 @@ int main(int argc, char **argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
-        const int status = app.exit(error) == 0 ? success : bad_configuration;
-        return std::fflush(stdout) == 0 ? status : run_failed;
+        return told(app.exit(error) == 0 ? success : bad_configuration);
     }
     const auto command = [&]() -> int {
         if (*schema_command)
@@ -172,9 +171,7 @@ int main(int argc, char **argv) {
         return run(arguments, launcher);
     };
     try {
-        const int status = command();
-        expect_stdout_written();
-        return status;
+        return told(command());
     } catch (const arhost::yaml::Error &error) {
         return refuse(error.what(), bad_configuration);
     } catch (

@@ -138,6 +138,9 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
     if (fs::symlink_status(folder).type() != fs::file_type::not_found)
         throw std::runtime_error(folder.string() +
                                  " is there already, and is left as it is; choose another name or --into");
+    if (!base::is_utf8(fs::absolute(folder).native()))
+        throw std::runtime_error(folder.string() +
+                                 ": the path is no UTF-8; arhost would not take the plugin from there");
     const fs::path templates = prefix / "share/arhost/templates";
     if (!fs::is_directory(templates))
         throw std::runtime_error("the SDK's templates are missing: " + templates.string() + "; install arhost again");

@@ -67,10 +67,14 @@ void Launcher::start() {
 std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
     const auto deadline = Clock::now() + patience_;
     pollfd ready{socket_.get(), POLLIN, 0};
-    for (int count; (count = ::poll(&ready, 1, 50)) <= 0;) {
+    for (bool is_late = false;;
+         is_late = Clock::now() > deadline) { // asked first: this process may have been stopped
+        const int count = ::poll(&ready, 1, is_late ? 0 : 50);
+        if (count > 0)
+            break;
         if (count < 0 && errno != EINTR)
             base::throw_errno("poll of the launcher");
-        if (Clock::now() > deadline)
+        if (is_late)
             return std::nullopt;
         ::kill(pid_, SIGCONT);
     }
@@ -82,7 +86,9 @@ std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
 
 void Launcher::lose() {
     ::kill(pid_, SIGKILL); // should only its socket be shut
-    ::waitpid(pid_, nullptr, 0);
+    // One that hangs in the kernel, or whose end a debugger has not looked at, is left alone.
+    for (int i = 0; i < 500 && ::waitpid(pid_, nullptr, WNOHANG) == 0; ++i)
+        ::usleep(1000);
     std::vector<UniqueFd> fds;
     // What it had still told. Its end of the socket may be open in who is to die below.
     for (Reply reply; socket_ && receive_struct(socket_.get(), reply, fds, MSG_DONTWAIT);)

@@ -103,8 +103,8 @@ public:
     void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t, const std::string &) override {
         std::size_t i = static_cast<std::size_t>(std::max(mark.pos, 0));
         while (i < text_.size() && (text_[i] == '&' || text_[i] == '!')) // its properties come first
-            i = text_.find_first_not_of(" \t\r\n", text_.find_first_of(" \t\r\n", i));
-        if (i < text_.size() && (text_[i] == '"' || text_[i] == '\''))
+            i = behind_blanks(text_[i] == '!' && is_quote(i + 1) ? i + 1 : text_.find_first_of(" \t\r\n,[]{}", i));
+        if (is_quote(i))
             last_quotation_ = i;
     }
     void OnSequenceStart(const YAML::Mark &, const std::string &, YAML::anchor_t,
@@ -127,14 +127,27 @@ public:
     }
 
 private:
+    bool is_quote(std::size_t i) const { return i < text_.size() && (text_[i] == '"' || text_[i] == '\''); }
+    std::size_t behind_blanks(std::size_t i) const { // and comments
+        while ((i = text_.find_first_not_of(" \t\r\n", i)) < text_.size() && text_[i] == '#')
+            i = text_.find('\n', i);
+        return i;
+    }
+
     const std::string &text_;
     std::optional<std::size_t> last_quotation_;
 };
 
 // Throws YAML::ParserException, also for what the library lets pass.
 YAML::Node read(std::string text) {
-    if (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which marks do not count
+    while (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which marks do not count
         text.erase(0, 3);
+    // The library takes some of them for the text's end, or for UTF-16.
+    if (const auto c = std::ranges::find_if(
+            text, [](unsigned char c) { return (c < ' ' && c != '\t' && c != '\n' && c != '\r') || c == 0x7f; });
+        c != text.end())
+        throw YAML::ParserException(mark_of(text, static_cast<std::size_t>(c - text.begin())),
+                                    "a control character stands here, which YAML must not have");
     if (!base::is_utf8(text)) {
         std::size_t line = 0, end = 0;
         while (end = std::min(text.find('\n', line), text.size()), base::is_utf8({&text[line], end - line}))
@@ -183,7 +196,8 @@ Node Node::load(const std::filesystem::path &file) {
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
         throw Error(file.string() + ": is no regular file");
     if (!base::is_utf8(std::filesystem::absolute(file).native())) // nor would the paths in it be
-        throw Error(file.string() + ": the file's path is no UTF-8; rename what is not, it or a folder above");
+        throw Error(std::filesystem::absolute(file).string() +
+                    ": the file's path is no UTF-8; rename what is not, it or a folder above");
     std::string content;
     errno = 0;
     try {

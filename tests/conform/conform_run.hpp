@@ -23,6 +23,7 @@ public:
         return wait();
     }
     pid_t pid() const { return run_.pid(); }
+    bool running() const { return run_.running(); }
     void write(const std::string &name, const std::string &text) const { run_.write(name, text); }
     bool exists(const std::string &name) const { return run_.exists(name); }
     std::string output() const { return run_.output(); }

@@ -198,7 +198,7 @@ TEST(Conform, IsNotWellWhereItsWordsCanNotBeWritten) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("can't write what the tests told: No space left on device"));
+    EXPECT_THAT(run.output(), HasSubstr("standard output can't be written: No space left on device"));
 }
 
 TEST(Conform, SaysSoWhereTheListCanNotBeWritten) {
@@ -206,6 +206,20 @@ TEST(Conform, SaysSoWhereTheListCanNotBeWritten) {
     run.start({"--list"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("No space left on device"));
+}
+
+TEST(Conform, EndsAsItShouldWhereNobodyCanBeTold) {
+    for (const char *stream : {"/dev/full", "pipe"}) {
+        ConformRun run;
+        run.start({"nosuch.so"}, [&] {
+            int ends[2];
+            if (stream != std::string("pipe") || ::pipe2(ends, O_CLOEXEC) != 0)
+                ::dup2(::open("/dev/full", O_WRONLY), STDERR_FILENO);
+            else
+                ::dup2(ends[1], STDERR_FILENO); // whose other end is shut by exec
+        });
+        EXPECT_EQ(run.wait(), 2) << stream;
+    }
 }
 
 // A pipe that is full and that nobody reads.
@@ -225,7 +239,7 @@ TEST(Conform, IsEndedBySignalsWhereNobodyReadsIt) {
                       ::dup2(ends[1], stream);
                       std::signal(SIGTERM, SIG_DFL);
                   });
-        while (std::filesystem::is_empty(run.path("tmp"))) // a test runs: signals are taken
+        while (run.running() && std::filesystem::is_empty(run.path("tmp"))) // a test runs: signals are taken
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
         std::this_thread::sleep_for(std::chrono::milliseconds(500)); // and by now it has something to say
         ::kill(run.pid(), SIGTERM);
@@ -250,6 +264,10 @@ TEST(Conform, RefusesToRunWhereAPluginWouldBeBlamed) {
     run.start({rt_embree, "--only", "abi.load"}, [] { ::setenv("TMPDIR", "/no/such/folder", 1); });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that is there"));
+    std::filesystem::create_directory(run.path("caf\xe9"));
+    run.start({rt_embree, "--only", "abi.load"}, [&] { ::setenv("TMPDIR", run.path("caf\xe9").c_str(), 1); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("is no UTF-8, as what a plugin is given must be"));
 }
 
 TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {

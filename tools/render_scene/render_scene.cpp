@@ -4,6 +4,7 @@
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "base/whole_file.hpp"
+#include "base/write_all.hpp"
 #include "ray_tracer.hpp"
 #include "scene/loader.hpp"
 
@@ -14,6 +15,7 @@
 
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -103,6 +105,8 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 } // namespace
 
 int main(int argc, char **argv) {
+    std::signal(SIGPIPE, SIG_IGN); // a full disk, and who reads no more, are errors
+    std::signal(SIGXFSZ, SIG_IGN);
     CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
     std::string scene, output, label, ray_tracer = "rt_embree";
     View view;
@@ -148,10 +152,11 @@ int main(int argc, char **argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 ? EXIT_SUCCESS : bad_usage;
+        return app.exit(error) == 0 && base::stdout_is_written() ? EXIT_SUCCESS : bad_usage;
     }
     try {
-        if (!cv::haveImageWriter(output))
+        const std::string kind = std::filesystem::path(output).extension();
+        if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
             throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
         base::WholeFile file(output);
         const cv::Mat rgba =
@@ -167,8 +172,8 @@ int main(int argc, char **argv) {
                 cv::putText(picture, label, {14, picture.rows / 14}, cv::FONT_HERSHEY_SIMPLEX, picture.rows / 550.0,
                             colour, width, cv::LINE_AA);
         std::vector<unsigned char> bytes;
-        if (!cv::imencode(std::filesystem::path(output).extension(), picture, bytes))
-            throw std::runtime_error(output + ": a picture of such a kind can't be made of this");
+        if (!cv::imencode(kind, picture, bytes))
+            throw std::runtime_error(output + ": the picture can't be encoded");
         file.write({bytes.begin(), bytes.end()});
     } catch (const std::exception &error) {
         std::fprintf(stderr, "render-scene: %s\n", base::printable(error.what()).c_str());

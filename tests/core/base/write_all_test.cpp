@@ -6,6 +6,8 @@
 
 #include <csignal>
 #include <fcntl.h>
+#include <pty.h>
+#include <sys/ioctl.h>
 #include <sys/signalfd.h>
 #include <thread>
 
@@ -54,6 +56,20 @@ TEST_F(WriteAll, IsEndedByASignalWhereNobodyReads) {
             EXPECT_EQ(interrupted.signal, SIGUSR1);
         }
     });
+    int waiting = 0; // bytes in the pipe
+    while (waiting < 4096 * 16)
+        ASSERT_EQ(::ioctl(to_read.get(), FIONREAD, &waiting), 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50)); // it waits, most times: the signal ends it either way
+    ::kill(::getpid(), SIGUSR1);
+}
+
+TEST_F(WriteAll, IsEndedByASignalWhereATerminalIsHalted) {
+    int main_end = -1, other_end = -1;
+    ASSERT_EQ(::openpty(&main_end, &other_end, nullptr, nullptr, nullptr), 0);
+    const UniqueFd reader(main_end), terminal(other_end);
+    std::jthread writer(
+        [&] { EXPECT_THROW(write_all(terminal.get(), std::string(1'000'000, 'x'), signals.get()), Interrupted); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     ::kill(::getpid(), SIGUSR1);
 }
 

@@ -143,6 +143,8 @@ TEST_F(FilesInUseTest, KnowsOutputsThatCanMeetBeforeTheirFilesAreThere) {
     fs::create_directory(folder / "there");
     fs::create_directory_symlink("there", folder / "link");
     EXPECT_TRUE(meet("link/f%d.png", "there/f7.png"));
+    fs::create_symlink("f-0001.png", folder / "to_none.json");
+    EXPECT_TRUE(meet("f-%04d.png", "to_none.json"));
 }
 
 TEST_F(FilesInUseTest, TellsOfAnOutputWhenItsFileIsReadLater) {

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <fstream>
 #include <poll.h>
+#include <sys/ptrace.h>
 #include <sys/wait.h>
 
 using namespace arhost::supervise;
@@ -123,19 +124,50 @@ TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
               "no process can be started: /bin/true was started 5 times, and ended or did not answer each time");
 }
 
-// One that hangs in the kernel, or in a debugger.
+// A debugger has it: it does not answer, and its end is the debugger's to see first.
+TEST(Launcher, IsReplacedWhereADebuggerHoldsIt) {
+    Launcher launcher(program, std::chrono::milliseconds(500));
+    const Spawned first = launcher.spawn("/usr/bin/yes", no_log);
+    const pid_t held = parent_of(first.pid);
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    const pid_t debugger = ::fork();
+    if (debugger == 0) {
+        const char holds = ::ptrace(PTRACE_SEIZE, held, nullptr, nullptr) == 0 &&
+                           ::ptrace(PTRACE_INTERRUPT, held, nullptr, nullptr) == 0;
+        (void)!::write(ends[1], &holds, 1);
+        for (;;)
+            ::pause();
+    }
+    char holds = 0;
+    ASSERT_EQ(::read(ends[0], &holds, 1), 1);
+    if (holds) {
+        const Spawned second = launcher.spawn("/bin/true", no_log);
+        wait_dead(second);
+        EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(second.pid).wait_status), 0);
+        EXPECT_FALSE(is_alive(first.pid));
+    }
+    ::kill(debugger, SIGKILL);
+    ::waitpid(debugger, nullptr, 0);
+    ::close(ends[0]);
+    ::close(ends[1]);
+    if (!holds)
+        GTEST_SKIP() << "this machine lets no process hold another";
+}
+
 TEST(Launcher, IsReplacedWhereItDoesNotAnswer) {
     const arhost::test::ScratchFolder scratch;
     const std::string deaf = scratch.path() / "deaf";
     std::ofstream(deaf) << "#!/bin/sh\nif mkdir " << deaf << ".once; then sleep 1000 & echo $! > " << deaf
                         << ".pid; wait; fi\nexec " << program << "\n";
     std::filesystem::permissions(deaf, std::filesystem::perms::owner_all);
-    Launcher launcher(deaf, std::chrono::milliseconds(500));
+    Launcher launcher(deaf, std::chrono::seconds(2));
     const Spawned spawned = launcher.spawn("/bin/true", no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 0);
     pid_t child = 0;
     std::ifstream(deaf + ".pid") >> child;
+    EXPECT_GT(child, 0);
     EXPECT_FALSE(is_alive(child)) << "what it had started goes on";
 }
 

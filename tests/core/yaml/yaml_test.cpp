@@ -73,9 +73,13 @@ TEST(Yaml, SaysWhereAQuotationBeginsThatDoesNotEnd) {
     EXPECT_EQ(error("a: \"x\\\"\n"), "a.yaml:1:4: " + why);
     EXPECT_EQ(error("a: &b !!str \"x\n"), "a.yaml:1:13: " + why);
     EXPECT_EQ(error("a: {b: \"x}\n"), "a.yaml:1:8: " + why);
+    EXPECT_EQ(error("a: !!str # why\n  \"x\nb: 1\n"), "a.yaml:2:3: " + why);
+    EXPECT_EQ(error("a: &b # \"why\"\n  'x\nb: 1\n"), "a.yaml:2:3: " + why);
+    EXPECT_EQ(error("a: !\"x\nb: 1\n"), "a.yaml:1:5: " + why);
+    EXPECT_EQ(error("\xef\xbb\xbf\xef\xbb\xbf'a: 1\n"), "a.yaml:1:1: " + why);
     EXPECT_EQ(error("\xef\xbb\xbf'a: 1\n"), "a.yaml:1:1: " + why);
-    for (const std::string closed :
-         {"a: 'it''s'", "a: \"\\\"\" # \"", "a: it's", "a: ''", "- &b \"\"\n- *b\n", "a: |\n  \"x\n"})
+    for (const std::string closed : {"a: 'it''s'", "a: \"\\\"\" # \"", "a: it's", "a: ''", "- &b \"\"\n- *b\n",
+                                     "a: |\n  \"x\n", "[!!str,x \"y]", "a: !!str # \"\n  x"})
         EXPECT_EQ(error(closed), "no error") << closed;
     EXPECT_THAT(error_of([] { sample().override_value("mode", "'live"); }),
                 HasSubstr("--set mode='live: YAML syntax: "));
@@ -91,8 +95,11 @@ TEST(Yaml, SaysWhichLineIsNoUtf8) {
                                             6),
                                 "a.yaml");
                 }),
-                HasSubstr("a.yaml:1:1"));
+                HasSubstr("a.yaml:1:"));
     EXPECT_THAT(error_of([] { sample().override_value("mode", "\xe9"); }), HasSubstr("no UTF-8"));
+    EXPECT_EQ(error_of([] { Node::parse(std::string("a: 1\nb: x\0y", 11), "a.yaml"); }),
+              "a.yaml:2:5: YAML syntax: a control character stands here, which YAML must not have");
+    EXPECT_THAT(error_of([] { Node::parse(std::string("a\0:\0 \0'\0", 8), "a.yaml"); }), HasSubstr("a.yaml:1:2"));
 }
 
 TEST(Yaml, RefusesPathsThatAreNoUtf8) {
