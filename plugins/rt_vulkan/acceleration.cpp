@@ -139,7 +139,6 @@ Acceleration::Place Acceleration::room(VkDeviceSize size) {
     }
     const Place place{blocks_.back().get(), filled_};
     filled_ = std::min(aligned(filled_ + size, structure_alignment), blocks_.back().size());
-    size_ += size;
     return place;
 }
 
