@@ -21,10 +21,6 @@ constexpr VkBufferUsageFlags storage_usage =
 constexpr VkBufferUsageFlags scratch_usage =
     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
 
-VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
-    return alignment ? (size + alignment - 1) / alignment * alignment : size;
-}
-
 // What earlier commands have uploaded or built can be built from.
 void await_inputs(const DeviceFunctions &vk, VkCommandBuffer commands) {
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
@@ -143,7 +139,6 @@ Acceleration::Place Acceleration::room(VkDeviceSize size) {
     }
     const Place place{blocks_.back().get(), filled_};
     filled_ = std::min(aligned(filled_ + size, structure_alignment), blocks_.back().size());
-    size_ += size;
     return place;
 }
 
@@ -267,7 +262,7 @@ void Acceleration::build_moving() {
         create(tree, needed.accelerationStructureSize, room(needed.accelerationStructureSize));
         tree.scratch_offset = scratch_size;
         tree.scratch_size = std::max(needed.buildScratchSize, needed.updateScratchSize);
-        scratch_size = aligned(scratch_size + tree.scratch_size, std::max<VkDeviceSize>(alignment, 1));
+        scratch_size = aligned(scratch_size + tree.scratch_size, alignment);
     };
     for (auto &[number, tree] : trees_)
         if (tree.vertices_offset) {

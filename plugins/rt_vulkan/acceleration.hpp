@@ -26,8 +26,6 @@ public:
                  const arhost::Host &host);
 
     VkAccelerationStructureKHR top() const { return top_.structure.get(); }
-    // The device's memory that all trees lie in.
-    VkDeviceSize size() const { return size_; } // bytes
 
     // Tells where things are now. What is returned brings the trees there, and is to run before the next image.
     VkCommandBuffer move(const arhost_motion &motion);
@@ -66,7 +64,6 @@ private:
     VkPipelineStageFlags readers_;
     std::vector<Buffer> blocks_;
     VkDeviceSize filled_ = 0;             // bytes of the last block
-    VkDeviceSize size_ = 0;               // bytes
     std::map<std::uint32_t, Tree> trees_; // by geometry
     Tree top_{};
     // What the host writes: the instances, then the vertices that deform.

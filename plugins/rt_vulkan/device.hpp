@@ -110,6 +110,11 @@ Owner make(const Device &device, Create create, const Info &info, const char *wh
     return Owner(device, handle);
 }
 
+// The next multiple of `alignment`, where there is such a demand.
+inline VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
+    return alignment ? (size + alignment - 1) / alignment * alignment : size;
+}
+
 // A buffer and its memory.
 class Buffer {
 public:

@@ -21,10 +21,6 @@ constexpr VkShaderStageFlagBits pipeline_stages[] = {
 constexpr const char *pipeline_files[] = {"pipeline.rgen", "pipeline.rmiss", "pipeline.rchit", "pipeline.rahit",
                                           "pipeline.rint"};
 
-VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
-    return (size + alignment - 1) / alignment * alignment;
-}
-
 // Where the driver's compiled shaders are kept; empty: nowhere.
 std::filesystem::path pipeline_cache_file() {
     const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
