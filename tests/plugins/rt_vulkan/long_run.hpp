@@ -26,6 +26,13 @@ struct LongRun {
     };
     std::vector<State> states; // once the plugin has stopped, after each scene
     std::string log;
+
+    std::size_t messages() const { // of the validation layers
+        std::size_t count = 0;
+        for (std::size_t at = 0; (at = log.find("Vulkan validation: ", at)) != std::string::npos; ++at)
+            ++count;
+        return count;
+    }
 };
 
 // What has been freed is given back first: else how it lies in pieces would count.
