@@ -6,8 +6,8 @@
 2. Where the device is a GPU, the dissertation's scenes, by path.
 3. A long run with changes of the scene: memory, descriptors, the validation layers' messages.
 
-A processor compiles the paths `query` and `pipeline` for minutes, so that it traces by `plain` alone, unless
---all-paths is said. What drivers compile is kept in build/gpu."""
+A processor traces by `plain` alone, unless --all-paths is said: by lavapipe's own trees an image of the bunny takes
+seconds. What drivers compile is kept in build/gpu."""
 import json
 import os
 import pathlib
@@ -39,8 +39,9 @@ def beside_bare(is_gpu, paths):
     """The unlit bunny is nothing but visibility; the others are for orientation."""
     size, rounds = ((800, 600), 101) if is_gpu else ((400, 300), 31)
     rounds = 3 if QUICK else rounds
-    print(f"an image by rt_vulkan beside a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of {rounds} "
-          f"rounds in turn\n  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14} {'start, s':>9}")
+    print(f"an image by rt_vulkan beside a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "
+          f"{rounds} rounds in turn\n"
+          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14} {'start, s':>9}")
     missed = []
     for name in ("bunny", "demo", "optix-cs", "optix-gl"):
         rows, _ = traced(*(("bunny", size, rounds, paths) if name == "bunny" else
@@ -58,7 +59,7 @@ def dissertation(paths):
     takes."""
     for width, height in ((800, 600), (1280, 720)):
         for title, scenes in TABLES.items():
-            print(f"{title}: {width}x{height}, frames a second (the dissertation's at 800x600 on a GTX 1060, held to 60)\n"
+            print(f"{title}: {width}x{height}, frames a second (its own at 800x600 by a GTX 1060, 60 at most)\n"
                   f"  {'scene':6} {'its own':>8}  {'path':9} {'rt_vulkan':>10} {'on the GPU':>11} {'read back':>10}")
             for name, (scene, view, _, alone) in scenes.items():
                 rows, said = traced(scene_file(scene), (width, height), 5 if QUICK else 101, paths, VIEWS[scene][view])
@@ -78,8 +79,8 @@ def main():
     if is_gpu:
         dissertation(paths)
     else:
-        print("the dissertation's scenes are left out: no GPU is among the Vulkan devices here, and frames a second, the GPU's "
-              "share and the way back of a processor would say nothing of one. Above is what a processor can show.")
+        print("the dissertation's scenes are left out: no GPU is among the Vulkan devices here, and a processor's frames a "
+              "second, shares and ways back say nothing of one's. Above is what a processor can show.")
     # Not for speed: quickly compiled code will do where a processor runs it.
     images, every = (400, 20) if QUICK else (10_000, 100)
     run = [PROGRAM, "run", str(images), str(every), *(scene_file(name) for name in ("demo", "optix-cs", "moving"))]
