@@ -21,6 +21,7 @@ constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitive
 // Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
 constexpr std::size_t most_targets = 8; // places that images come to again (arhost/raytracer.h)
+enum Moment : std::uint32_t { begun, traced, copied, moment_count }; // of the GPU's clock, in an image
 
 std::string mebibytes(std::uint64_t size) {
     return std::to_string((size + (1u << 20) - 1) >> 20) + " MiB";
@@ -106,7 +107,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         VkQueryPoolCreateInfo info{};
         info.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
         info.queryType = VK_QUERY_TYPE_TIMESTAMP;
-        info.queryCount = 2;
+        info.queryCount = moment_count;
         clock_ = make<QueryPool, VkQueryPool>(device_, device_.functions().vkCreateQueryPool, info,
                                               "making the GPU's clock");
     }
@@ -286,8 +287,8 @@ void Renderer::record(const Target &target) const {
     const VkCommandBuffer commands = target.commands;
     submission_.begin(commands);
     if (clock_.get()) {
-        vk.vkCmdResetQueryPool(commands, clock_.get(), 0, 2);
-        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), 0);
+        vk.vkCmdResetQueryPool(commands, clock_.get(), 0, moment_count);
+        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), begun);
     }
     VkDeviceSize offset = 0;
     for (const Binding binding : moving_bindings)
@@ -301,9 +302,11 @@ void Renderer::record(const Target &target) const {
     vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, sizeof nothing, nothing);
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, stage_,
             VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
-    pipeline_->record(commands, set_, intrinsics_.width, intrinsics_.height);
+    record_shader(commands);
     barrier(vk, commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
             VK_ACCESS_TRANSFER_READ_BIT);
+    if (clock_.get())
+        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_.get(), traced);
     // Row by row where there is room between them, which stays as it is.
     const VkDeviceSize row = VkDeviceSize{4} * intrinsics_.width;
     std::vector<VkBufferCopy> rows;
@@ -319,8 +322,12 @@ void Renderer::record(const Target &target) const {
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
             VK_ACCESS_HOST_READ_BIT);
     if (clock_.get())
-        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_.get(), 1);
+        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_.get(), copied);
     submission_.end(commands);
+}
+
+void Renderer::record_shader(VkCommandBuffer commands) const {
+    pipeline_->record(commands, set_, intrinsics_.width, intrinsics_.height);
 }
 
 void Renderer::write_moving_parts() {
@@ -378,20 +385,26 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 }
 
 Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
+    const auto begin = std::chrono::steady_clock::now();
     wrote_in_place_ = target.rgba != nullptr;
     if (!wrote_in_place_)
         for (std::uint32_t y = 0; y < image.height; ++y)
             std::memcpy(image.rgba + std::size_t{image.stride} * y,
                         target.buffer.mapped().data() + std::size_t{target.stride} * y, target.stride);
+    read_back_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     ++image_count_;
-    std::uint64_t ticks[2];
+    std::uint64_t ticks[moment_count];
     if (clock_.get() &&
-        device_.functions().vkGetQueryPoolResults(device_.handle(), clock_.get(), 0, 2, sizeof ticks, ticks,
-                                                  sizeof *ticks, VK_QUERY_RESULT_64_BIT) == VK_SUCCESS) {
-        const std::uint32_t bits = device_.physical().timestamp_bits;
-        const std::uint64_t passed =
-            (ticks[1] - ticks[0]) & (bits < 64 ? (std::uint64_t{1} << bits) - 1 : ~std::uint64_t{0});
-        gpu_ms_ += static_cast<double>(passed) * double{device_.physical().properties.limits.timestampPeriod} * 1e-6;
+        device_.functions().vkGetQueryPoolResults(device_.handle(), clock_.get(), 0, moment_count, sizeof ticks,
+                                                  ticks, sizeof *ticks, VK_QUERY_RESULT_64_BIT) == VK_SUCCESS) {
+        const auto ms_since = [&](Moment moment) {
+            const std::uint32_t bits = device_.physical().timestamp_bits;
+            const std::uint64_t passed =
+                (ticks[copied] - ticks[moment]) & (bits < 64 ? (std::uint64_t{1} << bits) - 1 : ~std::uint64_t{0});
+            return static_cast<double>(passed) * double{device_.physical().properties.limits.timestampPeriod} * 1e-6;
+        };
+        gpu_ms_ += ms_since(begun);
+        read_back_ms_ += ms_since(traced);
     }
     std::int32_t drawn[4];
     std::memcpy(drawn, read_.mapped().data(), sizeof drawn);

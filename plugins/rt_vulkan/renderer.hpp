@@ -37,6 +37,11 @@ public:
     bool wrote_in_place() const { return wrote_in_place_; }
     std::uint64_t image_count() const { return image_count_; }
     double gpu_ms() const { return gpu_ms_; } // of all images; 0 where the device has no clock
+    // For benchmarks. Of all images: the way from the device's memory to the place that they go to.
+    double read_back_ms() const { return read_back_ms_; }
+    // The shader alone, as of the last image: nothing is copied.
+    void record_shader(VkCommandBuffer commands) const;
+    const Submission &submission() const { return submission_; }
 
 private:
     // Where images go: an image's memory itself, or memory of ours (rgba NULL).
@@ -78,7 +83,7 @@ private:
     std::vector<Target> targets_;
     bool wrote_in_place_ = false;
     std::uint64_t image_count_ = 0;
-    double gpu_ms_ = 0;
+    double gpu_ms_ = 0, read_back_ms_ = 0;
 
     // Of accumulation: how much has been summed up so far, and for which camera.
     std::uint32_t history_samples_ = 0;

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How long rt_vulkan takes for an image, beside a bare trace of the same primary rays by the same trace() in a shader
+// that writes the distance and nothing else; and what it leaves behind in a long run:
+//
+//   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]   a JSON line for each
+//   path rt-vulkan-bench run IMAGES EVERY SCENE.yaml…   another scene every so many images; exits 1 where a target is
+//   missed
+#include "bunny.hpp"
+#include "long_run.hpp"
+#include "renderer.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <numeric>
+
+namespace {
+
+using namespace arhost;
+
+arhost_camera camera_from(const double *eye_and_target, bool z_up, std::uint32_t width, std::uint32_t height) {
+    const double f = height / 2 / 0.41421356237309503; // the dissertation's lens of 45 degrees
+    const double *p = eye_and_target;
+    return test::camera({p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {0, z_up ? 0.0 : 1.0, z_up ? 1.0 : 0.0},
+                        test::pinhole(width, height, f));
+}
+
+// The unlit bunny: as nearly nothing but visibility as a scene can be (rt_embree_bench.cpp, `primary`).
+scene::Arena unlit_bunny() {
+    auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);
+    mesh.normals.clear();
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0.2f);
+    arhost_material grey = scene::make_material(ARHOST_DIFFUSE);
+    std::fill_n(grey.ambient, 3, 0.7f);
+    builder.add_object(name, builder.add_triangles(mesh), builder.add_material(grey));
+    return std::move(builder).build();
+}
+
+double ms_of(const std::function<void()> &call) {
+    const auto start = std::chrono::steady_clock::now();
+    call();
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+}
+
+// Pages, so that the device may write to them itself.
+class ImageMemory {
+public:
+    explicit ImageMemory(const arhost_intrinsics &in)
+        : image_{sizeof image_, 4 * in.width, in.width, in.height, nullptr},
+          bytes_(static_cast<std::uint8_t *>(
+                     std::aligned_alloc(4096, (4ul * in.width * in.height + 4095) / 4096 * 4096)),
+                 &std::free) {
+        image_.rgba = bytes_.get();
+    }
+    const arhost_image &image() const { return image_; }
+    std::size_t count(const std::function<bool(std::uint32_t)> &is_meant) const {
+        std::size_t found = 0;
+        for (std::size_t i = 0; i < std::size_t{image_.width} * image_.height; ++i) {
+            std::uint32_t pixel;
+            std::memcpy(&pixel, image_.rgba + 4 * i, sizeof pixel);
+            found += is_meant(pixel);
+        }
+        return found;
+    }
+
+private:
+    arhost_image image_;
+    std::unique_ptr<std::uint8_t, decltype(&std::free)> bytes_;
+};
+
+nlohmann::json measured(const rt_vulkan::Instance &instance, const rt_vulkan::PhysicalDevice &device,
+                        const arhost::Host &host, rt_vulkan::Path path, const scene::Arena &arena,
+                        const arhost_camera &view, int rounds) {
+    const arhost_scene &scene = arena.scene();
+    const arhost_raytracer_setup setup{sizeof setup, view.intrinsics.width, view.intrinsics.height, 0,
+                                       &scene,       &view.intrinsics};
+    const auto started = [&](const char *shaders) {
+        return std::make_unique<rt_vulkan::Renderer>(setup, rt_vulkan::Settings{}, host, instance, device,
+                                                     rt_vulkan::read_shaders(shaders, path));
+    };
+    std::unique_ptr<rt_vulkan::Renderer> plugin;
+    const double start_s = 1e-3 * ms_of([&] { plugin = started(ARHOST_PLUGIN_DIRECTORY); });
+    const auto bare = started(ARHOST_BARE_SHADERS);
+
+    scene::MotionEvaluator evaluator(scene);
+    const arhost_motion motion = evaluator.at(0);
+    const arhost_motion *moving = scene.duration_s > 0 ? &motion : nullptr;
+    const ImageMemory picture(view.intrinsics), distances(view.intrinsics);
+    plugin->render(view, picture.image(), moving); // to warm up
+    bare->render(view, distances.image(), moving);
+    const std::size_t drawn = picture.count([](std::uint32_t pixel) { return pixel >> 24 == 255; });
+    const std::size_t hit = distances.count([](std::uint32_t bits) { return bits < 0x7f800000; });
+
+    const VkCommandBuffer commands = bare->submission().new_commands();
+    bare->submission().begin(commands);
+    bare->record_shader(commands);
+    bare->submission().end(commands);
+    const double gpu_before = plugin->gpu_ms(), read_back_before = plugin->read_back_ms();
+    std::vector<double> frames, bares;
+    for (int i = 0; i < rounds; ++i) {
+        const auto frame = [&] { frames.push_back(ms_of([&] { plugin->render(view, picture.image(), moving); })); };
+        const auto trace = [&] { bares.push_back(ms_of([&] { bare->submission().run(commands); })); };
+        i % 2 ? frame() : trace();
+        i % 2 ? trace() : frame();
+    }
+    const double whole = std::accumulate(frames.begin(), frames.end(), 0.0);
+    return {{"path", rt_vulkan::name_of(path)},
+            {"start_s", start_s},
+            {"frame_ms", median(frames)},
+            {"bare_ms", median(bares)},
+            {"drawn", drawn},
+            {"hit", hit},
+            {"gpu_share", (plugin->gpu_ms() - gpu_before) / whole},
+            {"read_back_share", (plugin->read_back_ms() - read_back_before) / whole},
+            {"in_place", plugin->wrote_in_place()}};
+}
+
+int trace(const std::vector<std::string> &words) {
+    const std::string &what = words[1];
+    const auto width = static_cast<std::uint32_t>(std::stoul(words[2])),
+               height = static_cast<std::uint32_t>(std::stoul(words[3]));
+    const bool is_bunny = what == "bunny";
+    double from[6] = {0, 50, 170, 0, 50, 169};
+    for (std::size_t i = 0; i < 6 && words.size() == 12; ++i)
+        from[i] = std::stod(words[6 + i]);
+    const scene::Arena arena = is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(what)).build();
+
+    const arhost_host printing = bench::printing_host("rt-vulkan-bench");
+    const arhost::Host host(&printing);
+    const rt_vulkan::Instance instance(host, false);
+    const auto devices = instance.devices();
+    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
+    const std::vector<rt_vulkan::Path> paths =
+        words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_path(device, words[5])};
+    for (const rt_vulkan::Path path : paths) {
+        nlohmann::json line = measured(
+            instance, device, host, path, arena,
+            camera_from(from, arena.scene().axes == ARHOST_Z_UP && !is_bunny, width, height), std::stoi(words[4]));
+        line["device"] = device.name;
+        line["is_gpu"] = device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
+        std::printf("%s\n", line.dump().c_str());
+        std::fflush(stdout);
+    }
+    return 0;
+}
+
+// Without the validation layers, which take memory of their own, and with them.
+int run(const std::vector<std::string> &words) {
+    constexpr double most_growth_mib = 2;
+    const int images = std::stoi(words[1]), every = std::stoi(words[2]);
+    const std::vector<std::filesystem::path> scenes(words.begin() + 3, words.end());
+    bool has_missed = false;
+    const auto judged = [&](bool is_met) {
+        has_missed |= !is_met;
+        return is_met ? "" : ", MISSED";
+    };
+    std::printf("%d images, another of %zu scenes every %d\n", images, scenes.size(), every);
+    const test::LongRun plain = test::long_run(scenes, images / every, every, {});
+    // In the first half caches fill.
+    const test::LongRun::State &middle = plain.states[plain.states.size() / 2], &last = plain.states.back();
+    const double growth_mib = last.memory_mib - middle.memory_mib;
+    std::printf("  memory at half time and at the end  %.1f, %.1f MiB (target: %g MiB more at most%s)\n",
+                middle.memory_mib, last.memory_mib, most_growth_mib, judged(growth_mib <= most_growth_mib));
+    std::printf("  descriptors                         %td, %td (target: no more%s)\n", middle.files, last.files,
+                judged(last.files <= middle.files));
+    std::fflush(stdout);
+    const test::LongRun validated = test::long_run(scenes, images / every, every, {{"validate", "true"}});
+    std::printf("  the validation layers' messages     %zu (target: none%s)\n", validated.messages(),
+                judged(validated.messages() == 0));
+    if (validated.messages())
+        std::fprintf(stderr, "%s", validated.log.c_str());
+    return has_missed;
+}
+
+} // namespace
+
+int main(int argc, char **argv) try {
+    const std::vector<std::string> words(argv + 1, argv + argc);
+    if ((words.size() == 6 || words.size() == 12) && words[0] == "trace")
+        return trace(words);
+    if (words.size() > 3 && words[0] == "run")
+        return run(words);
+    std::fprintf(stderr,
+                 "usage: rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]\n"
+                 "       rt-vulkan-bench run IMAGES EVERY SCENE.yaml...\n");
+    return 2;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "rt-vulkan-bench: %s\n", error.what());
+    return 1;
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Start and stop with scenes that take turns: nothing is left behind (`tools/bench gpu` does so for 10,000 images).
+#include "long_run.hpp"
+#include "two_tracers.hpp"
+
+#include <gtest/gtest.h>
+
+namespace arhost::test {
+namespace {
+
+const std::vector<std::filesystem::path> scenes{ARHOST_SOURCE_DIRECTORY "/config/scenes/demo.yaml",
+                                                ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml"};
+constexpr int changes = 10, images = 10;
+
+TEST(LongRun, LeavesNothingBehind) {
+    ARHOST_REQUIRE_VULKAN();
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers keep what has been freed";
+#endif
+    const LongRun run = long_run(scenes, changes, images, {});
+    const LongRun::State &middle = run.states[changes / 2], &last = run.states.back();
+    EXPECT_EQ(last.files, middle.files);
+    // A scene's buffers, or its compiled shader, would be several times as much in these four changes.
+    EXPECT_LE(last.memory_mib, middle.memory_mib + 4);
+}
+
+TEST(LongRun, LetsTheValidationLayersBeSilent) {
+    ARHOST_REQUIRE_VULKAN();
+    PluginUnderTest plugin("rt_vulkan");
+    if (plugin.create({{"validate", "true"}}) != ARHOST_OK)
+        GTEST_SKIP() << plugin.log();
+    const LongRun run = long_run(scenes, changes, images, {{"validate", "true"}});
+    EXPECT_EQ(run.messages(), 0u) << run.log;
+}
+
+} // namespace
+} // namespace arhost::test
