@@ -41,14 +41,14 @@ def beside_bare(is_gpu, paths):
     rounds = 3 if QUICK else rounds
     print(f"an image by rt_vulkan beside a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "
           f"{rounds} rounds in turn\n"
-          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14} {'start, s':>9}")
+          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14}")
     missed = []
     for name in ("bunny", "demo", "optix-cs", "optix-gl"):
         rows, _ = traced(*(("bunny", size, rounds, paths) if name == "bunny" else
                            (scene_file(name), size, rounds, paths, VIEWS[name][0])))
         for row in rows:
             print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} "
-                  f"{100 * row['bare_ms'] / row['frame_ms']:12.1f} % {row['start_s']:9.1f}", flush=True)
+                  f"{100 * row['bare_ms'] / row['frame_ms']:12.1f} %", flush=True)
             if name == "bunny" and row["drawn"] != row["hit"]:
                 missed.append(f"{row['path']}: the bare trace hits {row['hit']} pixels, and {row['drawn']} are drawn")
     return missed
