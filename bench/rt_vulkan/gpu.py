@@ -35,6 +35,10 @@ def traced(scene, size, rounds, paths, view=None):
     return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
 
 
+def note(scene, said):
+    return "   a stand-in for the scan" if "stands in for it" in said else coarser(scene, said)
+
+
 def beside_bare(is_gpu, paths):
     """The unlit bunny is nothing but visibility; the others are for orientation."""
     size, rounds = ((800, 600), 101) if is_gpu else ((400, 300), 31)
@@ -44,11 +48,12 @@ def beside_bare(is_gpu, paths):
           f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14}")
     missed = []
     for name in ("bunny", "demo", "optix-cs", "optix-gl"):
-        rows, _ = traced(*(("bunny", size, rounds, paths) if name == "bunny" else
-                           (scene_file(name), size, rounds, paths, VIEWS[name][0])))
+        rows, said = traced(*(("bunny", size, rounds, paths) if name == "bunny" else
+                              (scene_file(name), size, rounds, paths, VIEWS[name][0])))
         for row in rows:
-            print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} "
-                  f"{100 * row['bare_ms'] / row['frame_ms']:12.1f} %", flush=True)
+            speed = 100 * row["bare_ms"] / row["frame_ms"]
+            print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} {speed:12.1f} %"
+                  f"{note(name, said) if name != 'bunny' else ''}", flush=True)
             if name == "bunny" and row["drawn"] != row["hit"]:
                 missed.append(f"{row['path']}: the bare trace hits {row['hit']} pixels, and {row['drawn']} are drawn")
     return missed
@@ -64,9 +69,8 @@ def dissertation(paths):
             for name, (scene, view, _, alone) in scenes.items():
                 rows, said = traced(scene_file(scene), (width, height), 5 if QUICK else 101, paths, VIEWS[scene][view])
                 for row in rows:
-                    note = "   a stand-in for the scan" if "stands in for it" in said else coarser(scene, said)
                     print(f"  {name:6} {alone:8.2f}  {row['path']:9} {1000 / row['frame_ms']:10.2f} "
-                          f"{100 * row['gpu_share']:9.1f} % {100 * row['read_back_share']:8.1f} %{note}", flush=True)
+                          f"{100 * row['gpu_share']:9.1f} % {100 * row['read_back_share']:8.1f} %{note(scene, said)}", flush=True)
 
 
 def main():

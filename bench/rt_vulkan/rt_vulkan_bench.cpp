@@ -129,7 +129,10 @@ int trace(const std::vector<std::string> &words) {
     double from[6] = {0, 50, 170, 0, 50, 169};
     for (std::size_t i = 0; i < 6 && words.size() == 12; ++i)
         from[i] = std::stod(words[6 + i]);
-    const scene::Arena arena = is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(what)).build();
+    scene::LoadCallbacks callbacks; // gpu.py reads there which mesh it was
+    callbacks.info = callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
+    const scene::Arena arena =
+        is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(what), callbacks).build();
 
     const arhost_host printing = bench::printing_host("rt-vulkan-bench");
     const arhost::Host host(&printing);
