@@ -28,8 +28,8 @@ arhost_camera camera_from(const double *eye_and_target, bool z_up, std::uint32_t
                         test::pinhole(width, height, f));
 }
 
-// Neighbours in space become neighbours in the list, along a curve of Morton's. Lavapipe builds its trees in the
-// triangles' order: by these the scan's own would take it seconds an image.
+// Neighbours in space become neighbours in the list, along a curve of Morton's. Lavapipe seems to build its trees in
+// the triangles' order: by these the scan's own would take it seconds an image.
 void sort_in_space(scene::TriangleMesh &mesh) {
     const auto place = [&](const auto &triangle) {
         const glm::vec3 &p = mesh.positions[triangle[0]]; // within 128 mm of the origin
