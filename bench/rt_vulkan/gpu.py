@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""rt_vulkan on the device that is here: gpu.py [--quick] [--all-paths]
+"""rt_vulkan on the device that is here: gpu.py [--quick]
 
 1. The unlit bunny and whole scenes beside a bare trace of the same primary rays.
 2. Where the device is a GPU, the dissertation's scenes, by path.
 3. A long run with changes of the scene: memory, descriptors, the validation layers' messages.
 
-A processor traces by `plain` alone, unless --all-paths is said: by lavapipe's own trees an image of the bunny takes
-seconds. What drivers compile is kept in build/gpu."""
+Whole scenes on a processor are traced by `plain` alone, which the plugin takes there, as each path compiles for long.
+What drivers compile is kept in build/gpu."""
 import json
 import os
 import pathlib
@@ -35,26 +35,31 @@ def traced(scene, size, rounds, paths, view=None):
     return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
 
 
-def beside_bare(is_gpu, paths):
+def note(scene, said):
+    return "   a stand-in for the scan" if "stands in for it" in said else coarser(scene, said)
+
+
+def beside_bare(is_gpu):
     """The unlit bunny is nothing but visibility; the others are for orientation."""
-    size, rounds = ((800, 600), 101) if is_gpu else ((400, 300), 31)
+    size, rounds, paths = ((800, 600), 101, "all") if is_gpu else ((400, 300), 31, "auto")
     rounds = 3 if QUICK else rounds
     print(f"an image by rt_vulkan beside a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "
           f"{rounds} rounds in turn\n"
-          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14} {'start, s':>9}")
+          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14}")
     missed = []
     for name in ("bunny", "demo", "optix-cs", "optix-gl"):
-        rows, _ = traced(*(("bunny", size, rounds, paths) if name == "bunny" else
-                           (scene_file(name), size, rounds, paths, VIEWS[name][0])))
+        rows, said = traced(*(("bunny", size, rounds, "all") if name == "bunny" else
+                              (scene_file(name), size, rounds, paths, VIEWS[name][0])))
         for row in rows:
-            print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} "
-                  f"{100 * row['bare_ms'] / row['frame_ms']:12.1f} % {row['start_s']:9.1f}", flush=True)
+            speed = 100 * row["bare_ms"] / row["frame_ms"]
+            print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} {speed:12.1f} %"
+                  f"{note(name, said) if name != 'bunny' else ''}", flush=True)
             if name == "bunny" and row["drawn"] != row["hit"]:
                 missed.append(f"{row['path']}: the bare trace hits {row['hit']} pixels, and {row['drawn']} are drawn")
     return missed
 
 
-def dissertation(paths):
+def dissertation():
     """Frames a second of its scenes; of a frame's time, what the GPU's clock counts and what the way back to the host
     takes."""
     for width, height in ((800, 600), (1280, 720)):
@@ -62,22 +67,21 @@ def dissertation(paths):
             print(f"{title}: {width}x{height}, frames a second (its own at 800x600 by a GTX 1060, 60 at most)\n"
                   f"  {'scene':6} {'its own':>8}  {'path':9} {'rt_vulkan':>10} {'on the GPU':>11} {'read back':>10}")
             for name, (scene, view, _, alone) in scenes.items():
-                rows, said = traced(scene_file(scene), (width, height), 5 if QUICK else 101, paths, VIEWS[scene][view])
+                rows, said = traced(scene_file(scene), (width, height), 5 if QUICK else 101, "all", VIEWS[scene][view])
                 for row in rows:
-                    note = "   a stand-in for the scan" if "stands in for it" in said else coarser(scene, said)
                     print(f"  {name:6} {alone:8.2f}  {row['path']:9} {1000 / row['frame_ms']:10.2f} "
-                          f"{100 * row['gpu_share']:9.1f} % {100 * row['read_back_share']:8.1f} %{note}", flush=True)
+                          f"{100 * row['gpu_share']:9.1f} % {100 * row['read_back_share']:8.1f} %"
+                          f"{note(scene, said)}", flush=True)
 
 
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
     probe, _ = traced("bunny", (16, 16), 1, "auto")
     is_gpu = probe[0]["is_gpu"]
-    paths = "all" if is_gpu or "--all-paths" in sys.argv else "auto"
     print(f"gpu: {probe[0]['device']}")
-    missed = beside_bare(is_gpu, paths)
+    missed = beside_bare(is_gpu)
     if is_gpu:
-        dissertation(paths)
+        dissertation()
     else:
         print("the dissertation's scenes are left out: no GPU is among the Vulkan devices here, and a processor's frames a "
               "second, shares and ways back say nothing of one's. Above is what a processor can show.")

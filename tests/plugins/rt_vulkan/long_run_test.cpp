@@ -15,14 +15,11 @@ constexpr int changes = 10, images = 10;
 
 TEST(LongRun, LeavesNothingBehind) {
     ARHOST_REQUIRE_VULKAN();
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "sanitizers keep what has been freed";
-#endif
     const LongRun run = long_run(scenes, changes, images, {});
     const LongRun::State &middle = run.states[changes / 2], &last = run.states.back();
     EXPECT_EQ(last.files, middle.files);
-    // A scene's buffers, or its compiled shader, would be several times as much in these four changes.
-    EXPECT_LE(last.memory_mib, middle.memory_mib + 4);
+    // A MiB that each of the four starts in between left behind would be too much.
+    EXPECT_LE(last.memory_mib, middle.memory_mib + 3);
 }
 
 TEST(LongRun, LetsTheValidationLayersBeSilent) {
