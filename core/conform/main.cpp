@@ -364,7 +364,7 @@ int main(int argc, char **argv) {
     } catch (const CLI::ParseError &error) {
         return app.exit(error) == 0 && base::stdout_is_written() ? 0 : usage_or_suite_failed;
     }
-    const base::UniqueFd signals = take_signals();
+    base::UniqueFd signals;
     try {
         if (only_list) {
             print(list(pattern));
@@ -384,6 +384,7 @@ int main(int argc, char **argv) {
         expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
         expect_files_of_their_own({json, junit, html}, settings.subject);
+        signals = take_signals(); // not where a test is run, which is ended as any program
         settings.signals = signals.get();
         base::WholeFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <csignal>
+#include <deque>
 #include <fcntl.h>
 #include <iostream>
 #include <sys/prctl.h>
@@ -36,8 +37,11 @@ void work(Context &context) {
     std::cin >> work.frames >> work.size.width >> work.size.height >> work.folder;
     SinkRun run(context, work.folder);
     run.start(0, work.size);
-    for (std::uint64_t n = 0; n < work.frames; ++n) {
-        run.write(n, n + 1);
+    std::deque<SealedOutput> frames; // made before: behind a frame's byte the next is being written
+    for (std::uint64_t n = 0; n < work.frames; ++n)
+        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = work.size});
+    for (const SealedOutput &frame : frames) {
+        run.write(frame);
         if (::write(result_fd, ".", 1) != 1)
             break;
     }
