@@ -68,9 +68,13 @@ Process::~Process() {
 }
 
 void Process::send(const Json &body, std::initializer_list<int> fds) {
+    if (spawned_.channel.send(body, fds, false))
+        return;
     // A worker whose queue is full has stopped listening; a dead one is noticed by its pidfd.
-    if (!spawned_.channel.send(body, fds, false) && errno == EAGAIN)
+    if (errno == EAGAIN)
         end("does not take messages");
+    else if (errno == ETOOMANYREFS)
+        end("can't be given its memory: this user's processes have too many descriptors under way in messages");
 }
 
 void Process::send_in_turn(const Json &body, std::initializer_list<int> fds) {

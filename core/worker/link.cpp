@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/link.hpp"
 
+#include <cerrno>
 #include <poll.h>
+#include <stdexcept>
+#include <unistd.h>
 
 namespace arhost::worker {
 
@@ -24,8 +27,15 @@ Message Link::receive() const {
 }
 
 void Link::send(const Json &body, std::initializer_list<int> fds) const {
-    if (!channel_.send(body, fds))
-        throw HostGone("the host has closed the channel");
+    // The kernel counts the descriptors that are under way for all processes of a user, and others may have too many.
+    constexpr int most_tries = 500;
+    for (int tries = 0; !channel_.send(body, fds); ++tries) {
+        if (errno != ETOOMANYREFS)
+            throw HostGone("the host has closed the channel");
+        if (tries == most_tries)
+            throw std::runtime_error("this user's processes have too many descriptors under way in messages");
+        ::usleep(10'000);
+    }
 }
 
 void Link::log(arhost_severity severity, const std::string &text) const {

@@ -299,6 +299,53 @@ TEST(Sandbox, DescriptorsAreLeftForOthers) {
     expect_whole_video(run);
 }
 
+// 1,500 of them, of another program of the user's, which no sandbox bounds; fewer where that may not either.
+class DescriptorsUnderWay {
+public:
+    DescriptorsUnderWay() {
+        constexpr std::size_t messages = 6, each = 250;
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends_) != 0)
+            return;
+        char byte = 0;
+        iovec part{&byte, 1};
+        alignas(cmsghdr) char ancillary[CMSG_SPACE(each * sizeof(int))] = {};
+        msghdr message{};
+        message.msg_iov = &part;
+        message.msg_iovlen = 1;
+        message.msg_control = ancillary;
+        message.msg_controllen = sizeof ancillary;
+        cmsghdr *rights = CMSG_FIRSTHDR(&message);
+        rights->cmsg_level = SOL_SOCKET;
+        rights->cmsg_type = SCM_RIGHTS;
+        rights->cmsg_len = CMSG_LEN(each * sizeof(int));
+        for (std::size_t i = 0; i < each; ++i)
+            std::memcpy(CMSG_DATA(rights) + i * sizeof(int), &ends_[0], sizeof(int));
+        for (std::size_t i = 0; i < messages; ++i)
+            (void)!::sendmsg(ends_[1], &message, MSG_DONTWAIT);
+    }
+    ~DescriptorsUnderWay() {
+        ::close(ends_[0]);
+        ::close(ends_[1]);
+    }
+    DescriptorsUnderWay(const DescriptorsUnderWay &) = delete;
+    DescriptorsUnderWay &operator=(const DescriptorsUnderWay &) = delete;
+
+private:
+    int ends_[2] = {-1, -1};
+};
+
+// The scene loader waits until it may hand over what it has loaded.
+TEST(Sandbox, ASceneIsLoadedThoughOthersHaveManyDescriptorsUnderWay) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", small_scene);
+    {
+        const DescriptorsUnderWay many;
+        run.start({"check", "run.yaml"});
+        std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    }
+    EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
 TEST(Sandbox, ScribbledRingsAndSlotsEndTheirWorker) {
     HostileRun run("scribble");
     expect_ended(run, "broke the contract");
