@@ -3,6 +3,7 @@
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
+#include "base/usage.hpp"
 #include "base/whole_file.hpp"
 #include "conform/report.hpp"
 
@@ -319,9 +320,7 @@ int main(int argc, char **argv) {
                  "128 and a signal's number: interrupted.",
                  "arhost conform");
     app.get_formatter()->column_width(34);
-    app.failure_message([](const CLI::App *, const CLI::Error &error) {
-        return base::printable(error.what()) + "\nRun with --help for more information.\n";
-    });
+    app.failure_message(base::usage_failure);
     RunSettings settings;
     std::vector<std::string> option_texts, print_texts;
     std::string plugin, pattern = "*", json, junit, html, child_test;

@@ -2,6 +2,7 @@
 //
 // arhost: the command line.
 #include "base/text.hpp"
+#include "base/usage.hpp"
 #include "base/write_all.hpp"
 #include "host/commands.hpp"
 #include "host/new_plugin.hpp"
@@ -51,9 +52,7 @@ int main(int argc, char **argv) {
     app.set_version_flag("--version", "arhost " ARHOST_VERSION);
     app.require_subcommand(0, 1);
     app.get_formatter()->column_width(34);
-    app.failure_message([](const CLI::App *, const CLI::Error &error) {
-        return arhost::base::printable(error.what()) + "\nRun with --help for more information.\n";
-    });
+    app.failure_message(arhost::base::usage_failure);
 
     Arguments arguments;
     const auto add_configuration_options = [&](CLI::App &command) {

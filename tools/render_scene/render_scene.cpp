@@ -3,6 +3,7 @@
 // A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
+#include "base/usage.hpp"
 #include "base/whole_file.hpp"
 #include "base/write_all.hpp"
 #include "ray_tracer.hpp"
@@ -146,9 +147,7 @@ int main(int argc, char **argv) {
     app.add_option("--label", label, "A line of text to write into the picture");
     app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
     app.add_option("--output,-o", output, "The file to write")->required();
-    app.failure_message([](const CLI::App *, const CLI::Error &error) {
-        return base::printable(error.what()) + "\nRun with --help for more information.\n";
-    });
+    app.failure_message(base::usage_failure);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &error) {
