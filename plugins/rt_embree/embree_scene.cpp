@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "embree_scene.hpp"
 
+#include "common_view/arena.hpp"
+
 #include <arhost/shading/scalar.hpp>
 
 #include <algorithm>
@@ -14,19 +16,9 @@ namespace rt_embree {
 namespace {
 
 using arhost::Failure;
-
-const std::byte *bytes(const arhost_scene &arena) {
-    return reinterpret_cast<const std::byte *>(&arena);
-}
-
-template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
-    return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
-}
-
-bool is_identity(const float *m) {
-    constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    return std::equal(m, m + 12, identity);
-}
+using arhost::view::bytes;
+using arhost::view::elements;
+using arhost::view::is_identity;
 
 unsigned mask_of(const Object &object) {
     return object.role == ARHOST_CATCHER            ? catcher_mask
@@ -35,24 +27,9 @@ unsigned mask_of(const Object &object) {
                                                     : opaque_mask;
 }
 
-// Normals get their length later, so that of the inverse, which is the cofactors by the determinant, only the
-// latter's sign counts: it keeps a mirrored object's outside outside.
 void set_transform(Object &object, const float *m) {
     std::copy_n(m, 9, object.transform);
-    double cofactor[9];
-    for (int column = 0; column < 3; ++column) {
-        const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
-        for (int row = 0; row < 3; ++row) {
-            const int i = (row + 1) % 3, j = (row + 2) % 3;
-            cofactor[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
-        }
-    }
-    double largest = 0;
-    for (double value : cofactor)
-        largest = std::max(largest, std::abs(value));
-    const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
-    for (int i = 0; i < 9; ++i)
-        object.normal_transform[i] = static_cast<float>(cofactor[i] / (determinant < 0 ? -largest : largest));
+    arhost::view::Cofactors(m).put_normal_transform(object.normal_transform);
 }
 
 Object make_object(const arhost_scene &arena, const arhost_object &from) {

@@ -4,6 +4,7 @@
 // instruction sets (kernel/packet.hpp).
 #pragma once
 
+#include "common_view/samples.hpp"
 #include "embree.hpp"
 
 #include <arhost/scene.h>
@@ -85,11 +86,6 @@ struct Rays {
     std::int32_t block_size() const { return 16 * dimensions * (has_slopes ? 3 : 1); }
 };
 
-// Where in its pixel a sample lies, from the centre: −½ to ½.
-struct Sample {
-    float x, y;
-};
-
 struct Camera {
     float eye[3];
     float world_from_camera[9]; // column-major
@@ -99,7 +95,7 @@ struct Frame {
     Scene scene;
     Rays rays;
     Camera camera;
-    const Sample *samples;
+    const arhost::view::Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // of all that are averaged: where in their random sequences these begin
     float *history[4];          // NULL, or the sums of the samples before, of all tiles' pixels (Scratch::sum)

@@ -13,7 +13,7 @@ namespace {
 class Plugin {
 public:
     Plugin(const arhost::Host &host, const arhost::Options &options) : host_(host) {
-        settings_.samples = static_cast<std::int32_t>(options.integer("samples"));
+        settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.threads = static_cast<unsigned>(options.integer("threads"));
         settings_.robust = options.boolean("robust");
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace rt_embree {
 namespace {
@@ -16,13 +15,6 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 constexpr std::int32_t blocks_in(std::int32_t side) {
     return (side + block - 1) / block;
-}
-
-double radical_inverse_2(unsigned i) {
-    double inverse = 0;
-    for (double digit = 0.5; i; i /= 2, digit /= 2)
-        inverse += digit * (i % 2);
-    return inverse;
 }
 
 } // namespace
@@ -100,30 +92,6 @@ arhost::shading::Vec3T<float> RayTable::direction(std::int32_t x, std::int32_t y
         tile.first_block + dy / block * blocks_in(tile.pixels.x1 - tile.pixels.x0) + dx / block;
     const float *at = blocks_.data() + number * rays().block_size() + dy % block * block + dx % block;
     return {at[0], at[lanes], dimensions_ == 3 ? at[2 * lanes] : 1};
-}
-
-std::vector<Sample> sample_positions(std::int32_t count) {
-    std::vector<unsigned> columns(count);
-    std::iota(columns.begin(), columns.end(), 0u);
-    std::sort(columns.begin(), columns.end(),
-              [](unsigned a, unsigned b) { return radical_inverse_2(a) < radical_inverse_2(b); });
-    std::vector<Sample> samples;
-    samples.reserve(count);
-    for (std::int32_t row = 0; row < count; ++row)
-        samples.push_back({(columns[row] + 0.5f) / count - 0.5f, (row + 0.5f) / count - 0.5f});
-    return samples;
-}
-
-std::vector<Sample> sample_positions(std::uint32_t first, std::int32_t count) {
-    std::vector<Sample> samples;
-    for (std::int32_t i = 0; i < count; ++i) {
-        const auto place = [&](std::uint32_t step) { // of turns of 2³², about 0
-            return static_cast<float>(static_cast<std::int32_t>((first + static_cast<std::uint32_t>(i)) * step)) *
-                   0x1p-32f;
-        };
-        samples.push_back({place(3242174889u), place(2447445414u)});
-    }
-    return samples;
 }
 
 } // namespace rt_embree

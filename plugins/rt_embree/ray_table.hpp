@@ -46,13 +46,4 @@ private:
     std::vector<Window> windows_;
 };
 
-// One in each of `count` rows and columns of the pixel (N-rooks), the columns in the order of the base-2
-// radical inverse, so that samples spread evenly; a single one lies at the centre. The same in every pixel
-// and frame.
-std::vector<Sample> sample_positions(std::int32_t count);
-
-// `count` of a sequence without end that is even over the pixel however far it goes, from its number `first`;
-// number 0 lies at the centre (R2, as in kernel/random.inl).
-std::vector<Sample> sample_positions(std::uint32_t first, std::int32_t count);
-
 } // namespace rt_embree

@@ -113,7 +113,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     : host_(host), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
-      samples_a_frame_(settings.samples), samples_(sample_positions(settings.samples)),
+      samples_a_frame_(settings.samples), samples_(arhost::view::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       one_path_(settings.one_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
@@ -141,7 +141,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         if (motion || !still_camera_ || !same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_ = camera;
-        samples_ = sample_positions(history_samples_, history_samples_ < enough_samples ? samples_a_frame_ : 0);
+        samples_ = arhost::view::sample_positions(history_samples_,
+                                                  history_samples_ < enough_samples ? samples_a_frame_ : 0);
         for (std::size_t i = 0; i < 4; ++i)
             history[i] = history_.data() + i * (history_.size() / 4);
     }

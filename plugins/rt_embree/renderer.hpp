@@ -16,8 +16,8 @@
 namespace rt_embree {
 
 struct Settings {
-    std::int32_t samples = 1; // a pixel
-    unsigned threads = 0;     // 0: one a processor
+    std::uint32_t samples = 1; // a pixel
+    unsigned threads = 0;      // 0: one a processor
     bool robust = false;
     std::int32_t light_samples = 4; // shadow rays to an extended light, from each sample
     bool accumulate = false;        // average over frames while the camera stands still
@@ -55,8 +55,8 @@ private:
     Kernel kernel_;
     ThreadPool threads_;
     RayTable ray_table_;
-    std::int32_t samples_a_frame_;
-    std::vector<Sample> samples_; // of this frame
+    std::uint32_t samples_a_frame_;
+    std::vector<arhost::view::Sample> samples_; // of this frame
     EmbreeScene scene_;
     std::vector<ScratchMemory> scratch_; // one a thread
     std::int32_t light_samples_;

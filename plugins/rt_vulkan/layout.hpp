@@ -76,7 +76,7 @@ struct Primitive {
     float edge_2[3], unused_2;
 };
 
-inline constexpr std::uint32_t most_samples = 64; // a pixel and frame
+inline constexpr std::uint32_t most_samples = 256; // a pixel and frame
 
 struct Frame {
     float eye[3];

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <fstream>
+#include <unistd.h>
 
 namespace rt_vulkan {
 namespace {
@@ -59,14 +61,19 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
     std::vector<char> data(size);
     if (get(device.handle(), cache.get(), &size, data.data()) != VK_SUCCESS || data == contents(file))
         return;
-    std::filesystem::path temporary = file;
-    temporary += ".new";
+    std::string temporary = file.string() + ".XXXXXX"; // each process has its own
+    const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);
+    if (descriptor < 0)
+        return;
+    ::close(descriptor);
     std::ofstream stream(temporary, std::ios::binary);
     stream.write(data.data(), static_cast<std::streamsize>(size));
     stream.close();
-    std::error_code ignored;
+    std::error_code failed;
     if (stream)
-        std::filesystem::rename(temporary, file, ignored);
+        std::filesystem::rename(temporary, file, failed);
+    if (!stream || failed)
+        std::filesystem::remove(temporary, failed);
 }
 
 // A shader's words.

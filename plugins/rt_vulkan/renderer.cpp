@@ -92,7 +92,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                    const Instance &instance, const PhysicalDevice &physical, const Shaders &shaders)
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       stage_(shaders.pipeline_stage()), scene_(*setup.scene, shaders.path == Path::plain, host),
-      device_(instance, checked(physical), shaders.path), submission_(device_) {
+      device_(instance, checked(physical), shaders.path), submission_(device_),
+      samples_(arhost::view::sample_positions(settings.samples)) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building the trees");
@@ -358,18 +359,18 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         write_moving_parts();
     frame_.object_count = scene_.frame().object_count;
 
-    std::vector<Sample> samples = sample_positions(settings_.samples);
     if (settings_.accumulate) {
         if (motion || !still_camera_ || !arhost::view::same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_ = camera;
-        samples = sample_positions(history_samples_, history_samples_ < enough_samples ? settings_.samples : 0);
+        samples_ = arhost::view::sample_positions(history_samples_,
+                                                  history_samples_ < enough_samples ? settings_.samples : 0);
     }
     frame_.first_sample = history_samples_;
-    frame_.sample_count = static_cast<std::uint32_t>(samples.size());
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-        frame_.samples[i][0] = samples[i].x;
-        frame_.samples[i][1] = samples[i].y;
+    frame_.sample_count = static_cast<std::uint32_t>(samples_.size());
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+        frame_.samples[i][0] = samples_[i].x;
+        frame_.samples[i][1] = samples_[i].y;
     }
     std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
 

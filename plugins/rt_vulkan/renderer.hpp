@@ -4,6 +4,7 @@
 #pragma once
 
 #include "acceleration.hpp"
+#include "common_view/samples.hpp"
 #include "pipeline.hpp"
 #include "scene_data.hpp"
 #include "view.hpp"
@@ -69,6 +70,7 @@ private:
     Device device_;
     Submission submission_;
     std::uint32_t ray_dimensions_ = 2;
+    std::vector<arhost::view::Sample> samples_; // of an image
     Frame frame_{};
     std::array<Buffer, binding_count> buffers_;
     Buffer moving_;                            // what the host writes of what moves, part by part

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene_data.hpp"
 
+#include "common_view/arena.hpp"
+
 #include <arhost/shading/srgb8.hpp>
 
 #include <algorithm>
@@ -14,19 +16,13 @@ namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
+using arhost::view::bytes;
+using arhost::view::elements;
+using arhost::view::is_identity;
 
 // From here on a refitted tree costs rays more than building a new one does.
 constexpr double tolerable_decay = 1.3;
 constexpr std::uint32_t most_in_leaf = 4;
-
-const std::byte *bytes(const arhost_scene &arena) {
-    return reinterpret_cast<const std::byte *>(&arena);
-}
-
-bool is_identity(const float *m) {
-    constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    return std::equal(m, m + 12, identity);
-}
 
 template <std::size_t count> void copy(const float (&from)[count], float (&to)[count]) {
     std::copy_n(from, count, to);
@@ -316,31 +312,19 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
 }
 
 void SceneData::place(Object &object, const float *m) const {
-    double cofactor[9];
-    for (int column = 0; column < 3; ++column) {
-        const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
-        for (int row = 0; row < 3; ++row) {
-            const int i = (row + 1) % 3, j = (row + 2) % 3;
-            cofactor[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
+    const arhost::view::Cofactors cofactors(m);
+    float normal_transform[9];
+    cofactors.put_normal_transform(normal_transform);
+    for (int i = 0; i < 3; ++i) {
+        std::copy_n(m + std::ptrdiff_t{3} * i, 3, object.transform[i]);
+        std::copy_n(normal_transform + std::ptrdiff_t{3} * i, 3, object.normal_transform[i]);
+        double back = 0;
+        for (int j = 0; j < 3; ++j) {
+            const double inverse = cofactors.of[3 * i + j] / cofactors.determinant;
+            object.object_from_world[j][i] = static_cast<float>(inverse);
+            back -= inverse * m[9 + j];
         }
-    }
-    double largest = 0;
-    for (const double value : cofactor)
-        largest = std::max(largest, std::abs(value));
-    const double determinant = m[0] * cofactor[0] + m[1] * cofactor[1] + m[2] * cofactor[2];
-    for (int column = 0; column < 3; ++column)
-        for (int row = 0; row < 3; ++row) {
-            object.transform[column][row] = m[3 * column + row];
-            // Normals get their length later: of the inverse transposed only the sign of the determinant counts.
-            object.normal_transform[column][row] =
-                static_cast<float>(cofactor[3 * column + row] / (determinant < 0 ? -largest : largest));
-            object.object_from_world[column][row] = static_cast<float>(cofactor[3 * row + column] / determinant);
-        }
-    for (int row = 0; row < 3; ++row) {
-        double sum = 0;
-        for (int i = 0; i < 3; ++i)
-            sum -= cofactor[3 * row + i] / determinant * m[9 + i];
-        object.object_from_world[3][row] = static_cast<float>(sum);
+        object.object_from_world[3][i] = static_cast<float>(back);
     }
 }
 

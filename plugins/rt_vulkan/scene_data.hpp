@@ -19,10 +19,6 @@ namespace rt_vulkan {
 
 using Bytes = std::span<const std::byte>;
 
-template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
-    return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&arena) + buffer.offset), buffer.count};
-}
-
 struct Points {
     const std::byte *first;
     std::uint32_t stride; // bytes

@@ -3,22 +3,13 @@
 
 #include "common_view/view.hpp"
 
-#include <algorithm>
 #include <atomic>
-#include <numeric>
 #include <thread>
 
 namespace rt_vulkan {
 namespace {
 
 using Vec3d = arhost::shading::Vec3T<double>;
-
-double radical_inverse_2(std::uint32_t i) {
-    double inverse = 0;
-    for (double digit = 0.5; i; i /= 2, digit /= 2)
-        inverse += digit * (i % 2);
-    return inverse;
-}
 
 } // namespace
 
@@ -67,30 +58,6 @@ RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {
     work();
     threads.clear();
     return table;
-}
-
-std::vector<Sample> sample_positions(std::uint32_t count) {
-    std::vector<std::uint32_t> columns(count);
-    std::iota(columns.begin(), columns.end(), 0u);
-    std::sort(columns.begin(), columns.end(),
-              [](std::uint32_t a, std::uint32_t b) { return radical_inverse_2(a) < radical_inverse_2(b); });
-    std::vector<Sample> samples;
-    const auto size = static_cast<float>(count);
-    for (std::uint32_t row = 0; row < count; ++row)
-        samples.push_back({(static_cast<float>(columns[row]) + 0.5f) / size - 0.5f,
-                           (static_cast<float>(row) + 0.5f) / size - 0.5f});
-    return samples;
-}
-
-std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
-    std::vector<Sample> samples;
-    for (std::uint32_t i = 0; i < count; ++i) {
-        const auto place = [&](std::uint32_t step) { // of turns of 2³², about 0
-            return static_cast<float>(static_cast<std::int32_t>((first + i) * step)) * 0x1p-32f;
-        };
-        samples.push_back({place(3242174889u), place(2447445414u)});
-    }
-    return samples;
 }
 
 } // namespace rt_vulkan

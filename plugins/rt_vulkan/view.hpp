@@ -23,14 +23,4 @@ struct RayTable {
 };
 RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes);
 
-// Where in its pixel a sample lies, from the centre: −½ to ½.
-struct Sample {
-    float x, y;
-};
-// One in each of `count` rows and columns of the pixel (N-rooks), the columns in the order of the base-2 radical
-// inverse; a single one lies at the centre. The same in every pixel and frame, and as rt_embree's.
-std::vector<Sample> sample_positions(std::uint32_t count);
-// `count` of a sequence without end that is even over the pixel, from its number `first` (R2, as in random.glsl).
-std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count);
-
 } // namespace rt_vulkan

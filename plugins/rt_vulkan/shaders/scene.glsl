@@ -111,7 +111,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     float environment_intensity;
     mat3 environment_from_world;
     uint environment_rows, environment_columns, unused, unused_2; // among the tables
-    vec4 samples[64];                                             // x, y: where they lie in a pixel, −½ to ½
+    vec4 samples[256];                                            // x, y: where they lie in a pixel, −½ to ½
 }
 frame;
 

@@ -75,7 +75,9 @@ Hit trace(Ray ray, bool any, bool passes_backs) {
             reciprocal = safe_reciprocal(direction);
         }
         if (top == 0)
-            return hit;
+            break;
         node = stack[--top];
     }
+    refine(ray, hit);
+    return hit;
 }

@@ -5,7 +5,6 @@
 #include <opencv2/calib3d.hpp>
 
 #include <cmath>
-#include <set>
 #include <vector>
 
 namespace rt_embree {
@@ -59,7 +58,7 @@ TEST(RayTable, SamplesOffThePixelsCentreArriveWhereTheyShould) {
         for (int number = 0; number < 64; ++number) {
             const float *block = rays.blocks + number * rays.block_size();
             const double x = number % 8 * 4, y = number / 8 * 4;
-            for (const Sample &sample : sample_positions(16)) {
+            for (const arhost::view::Sample &sample : arhost::view::sample_positions(16)) {
                 double d[3] = {0, 0, 1};
                 for (int i = 0; i < rays.dimensions; ++i)
                     d[i] = block[16 * i] + block[step + 16 * i] * sample.x + block[2 * step + 16 * i] * sample.y;
@@ -95,23 +94,6 @@ TEST(RayTable, HasNoRayWhereTheLensSeesNothing) {
     const RayTable table(intrinsics(ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0}), false, threads);
     EXPECT_TRUE(std::isnan(table.direction(0, 0).x));
     EXPECT_FALSE(std::isnan(table.direction(301, 262).x));
-}
-
-TEST(SamplePositions, OneLiesInEachRowAndColumnAndTheirMeanIsTheCentre) {
-    for (int count = 1; count <= 64; ++count) {
-        std::set<int> rows, columns;
-        double x = 0, y = 0;
-        for (const Sample &sample : sample_positions(count)) {
-            columns.insert(static_cast<int>((sample.x + 0.5f) * count));
-            rows.insert(static_cast<int>((sample.y + 0.5f) * count));
-            x += sample.x;
-            y += sample.y;
-        }
-        EXPECT_EQ(rows.size(), static_cast<std::size_t>(count));
-        EXPECT_EQ(columns.size(), static_cast<std::size_t>(count));
-        EXPECT_NEAR(x, 0, 1e-5);
-        EXPECT_NEAR(y, 0, 1e-5);
-    }
 }
 
 } // namespace

@@ -18,7 +18,7 @@ TEST_P(SamePictureByPath, AsThePlainPathGives) {
     scene::MotionEvaluator motion(traced.scene());
     int shown = 0;
     for (const double nearness : nearnesses) {
-        const arhost_camera camera = camera_for(traced.scene(), nearness);
+        const arhost_camera camera = camera_for(traced.scene(), nearness, small);
         const arhost_motion then = motion.at(view.time_s);
         Picture got(small), expected(small);
         ASSERT_EQ(traced.try_render(camera, got, &then), ARHOST_OK) << traced.plugin().log();
@@ -31,7 +31,7 @@ TEST_P(SamePictureByPath, AsThePlainPathGives) {
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
         if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
-            EXPECT_GE(like.psnr, 45) << like;
+            EXPECT_GE(like.psnr(), 45) << like;
         }
         shown += like.inside;
     }

@@ -14,8 +14,6 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
     Tracer vulkan(scene::load_scene(file), options, "rt_vulkan"), embree(scene::load_scene(file), options);
     ASSERT_EQ(vulkan.start(small), ARHOST_OK) << vulkan.plugin().log();
     ASSERT_EQ(embree.start(small), ARHOST_OK);
-    // Behind glass the last bits decide which facet is next: there the measure is how much Embree differs from
-    // itself.
     Tracer robust(scene::load_scene(file), {{"samples", GetParam().samples}, {"robust", "true"}});
     const bool glass = has_glass(vulkan.scene());
     if (glass) {
@@ -24,7 +22,7 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
     scene::MotionEvaluator motion(vulkan.scene());
     int shown = 0;
     for (const double nearness : nearnesses) {
-        const arhost_camera view = camera_for(vulkan.scene(), nearness);
+        const arhost_camera view = camera_for(vulkan.scene(), nearness, small);
         const arhost_motion then = motion.at(GetParam().time_s);
         Picture got(small), expected(small);
         ASSERT_EQ(vulkan.try_render(view, got, &then), ARHOST_OK) << vulkan.plugin().log();
@@ -33,24 +31,61 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
         keep(got, name + "-vulkan");
         keep(expected, name + "-embree");
         const Likeness like = likeness(got, expected);
-        double least_psnr = 45;
-        if (glass) {
-            Picture again(small);
-            ASSERT_EQ(robust.try_render(view, again, &then), ARHOST_OK);
-            least_psnr = std::min(40.0, likeness(again, expected).psnr - 3);
-        }
-        std::cout << name << ": " << like << "; at least " << least_psnr << " dB wanted" << std::endl;
+        std::cout << name << ": " << like << std::endl;
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
-        // A few rays that go another way through glass are no other picture, however bright what they meet.
-        if (!(glass && 50 * like.colours_off <= like.inside)) {
-            EXPECT_GE(like.psnr, least_psnr) << like;
+        EXPECT_GE(like.psnr(), glass ? 40 : 45) << like;
+        if (glass) { // see below
+            Picture by_robust(small);
+            ASSERT_EQ(robust.try_render(view, by_robust, &then), ARHOST_OK);
+            const int most = likeness(by_robust, expected).colours_off;
+            EXPECT_LE(like.colours_off, most + 3 * std::sqrt(most) + 1) << like; // but for the luck of a count
         }
         shown += like.inside;
     }
     EXPECT_GT(shown, 200) << "hardly anything to compare";
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SamePicture, every_scene, [](const auto &info) { return name_of_view(info.param); });
+constexpr auto name_of = [](const auto &info) { return name_of_view(info.param); };
+INSTANTIATE_TEST_SUITE_P(Scenes, SamePicture, every_scene, name_of);
+
+// Behind glass the last bits of a hit decide which facet is next. The measure is how much rt_embree differs from
+// itself where Embree traverses its trees in its robust way. A few bright pixels are most of it: so a walk's pictures
+// are taken for one.
+class BehindGlass : public testing::TestWithParam<View> {};
+
+TEST_P(BehindGlass, RtVulkanIsNoFartherFromRtEmbreeThanThatFromItself) {
+    ARHOST_REQUIRE_VULKAN();
+    const std::filesystem::path file = file_of(GetParam());
+    Tracer vulkan(scene::load_scene(file), {}, "rt_vulkan"), embree(scene::load_scene(file), {}),
+        robust(scene::load_scene(file), {{"robust", "true"}});
+    const arhost_intrinsics size = pinhole(256, 192, 256);
+    for (Tracer *tracer : {&vulkan, &embree, &robust})
+        ASSERT_EQ(tracer->start(size), ARHOST_OK) << tracer->plugin().log();
+    Likeness of_vulkan, of_robust;
+    for (double nearness = 1.3; nearness > 0.4; nearness -= 0.06) {
+        const arhost_camera view = camera_for(vulkan.scene(), nearness, size);
+        Picture by_vulkan(size), by_embree(size), by_robust(size);
+        ASSERT_EQ(vulkan.try_render(view, by_vulkan), ARHOST_OK) << vulkan.plugin().log();
+        ASSERT_EQ(embree.try_render(view, by_embree), ARHOST_OK);
+        ASSERT_EQ(robust.try_render(view, by_robust), ARHOST_OK);
+        of_vulkan += likeness(by_vulkan, by_embree);
+        of_robust += likeness(by_robust, by_embree);
+    }
+    std::cout << GetParam().name << "-glass: " << of_vulkan << '\n'
+              << GetParam().name << "-own: " << of_robust << std::endl;
+    EXPECT_LE(of_vulkan.colours_off, of_robust.colours_off);
+    EXPECT_GE(of_vulkan.psnr(),
+              of_robust.psnr() - 0.5); // of luck: half as many pictures give some tenths more or less
+    EXPECT_EQ(of_vulkan.alphas_off_inside, 0);
+}
+
+// Minutes: tools/likeness runs them.
+INSTANTIATE_TEST_SUITE_P(DISABLED_Scenes, BehindGlass,
+                         testing::Values(View{"optix-gd", "config/scenes/optix-gd.yaml"},
+                                         View{"optix-gl", "config/scenes/optix-gl.yaml"},
+                                         View{"optix-skybox-lucy", "config/scenes/optix-skybox-lucy.yaml"},
+                                         View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"}),
+                         name_of);
 
 } // namespace arhost::test

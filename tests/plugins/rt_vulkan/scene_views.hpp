@@ -27,10 +27,10 @@ inline std::ostream &operator<<(std::ostream &stream, const View &view) {
 inline const arhost_intrinsics small = pinhole(128, 96, 128);
 
 // Where the dissertation's marker lies, as its camera sees it; `nearness` 1 is from afar.
-inline arhost_camera camera_for(const arhost_scene &scene, double nearness) {
+inline arhost_camera camera_for(const arhost_scene &scene, double nearness, const arhost_intrinsics &size) {
     const double away = -330 * nearness, up = 150 * nearness;
-    return scene.axes == ARHOST_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, small)
-                                     : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, small);
+    return scene.axes == ARHOST_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, size)
+                                     : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, size);
 }
 
 inline const double nearnesses[] = {1.0, 0.45};

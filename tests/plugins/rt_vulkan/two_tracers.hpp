@@ -31,18 +31,33 @@ struct Likeness {
     int alphas_off_inside = 0; // where the reference has one alpha class for a pixel round
     int inside = 0;            // pixels of alpha 255 amid others, which PSNR is of
     int colours_off = 0;       // of those inside, by more than 2 codes
-    double psnr = 0;           // dB; infinite where they are the same
+    double squares = 0;        // the sum of the differences' of these, channel by channel, in codes
+
+    // dB; infinite where they are the same.
+    double psnr() const {
+        return squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * inside / squares)
+                           : std::numeric_limits<double>::infinity();
+    }
+    // Of several pictures as of one.
+    Likeness &operator+=(const Likeness &other) {
+        pixels += other.pixels;
+        alphas_off += other.alphas_off;
+        alphas_off_inside += other.alphas_off_inside;
+        inside += other.inside;
+        colours_off += other.colours_off;
+        squares += other.squares;
+        return *this;
+    }
 };
 inline std::ostream &operator<<(std::ostream &stream, const Likeness &like) {
     return stream << like.pixels << " px, " << like.alphas_off << " alphas off (" << like.alphas_off_inside
-                  << " of them inside), " << like.psnr << " dB over " << like.inside << " px inside, "
+                  << " of them inside), " << like.psnr() << " dB over " << like.inside << " px inside, "
                   << like.colours_off << " colours off";
 }
 
 // Nothing is inside at the picture's border.
 inline Likeness likeness(const Picture &got, const Picture &reference) {
     Likeness like;
-    double squares = 0;
     for (std::uint32_t y = 0; y < got.height; ++y)
         for (std::uint32_t x = 0; x < got.width; ++x) {
             const Pixel a = got.at(x, y), b = reference.at(x, y);
@@ -60,13 +75,11 @@ inline Likeness likeness(const Picture &got, const Picture &reference) {
             ++like.inside;
             int most = 0;
             for (std::size_t i = 0; i < 3; ++i) {
-                squares += (a[i] - b[i]) * (a[i] - b[i]);
+                like.squares += (a[i] - b[i]) * (a[i] - b[i]);
                 most = std::max(most, std::abs(a[i] - b[i]));
             }
             like.colours_off += most > 2;
         }
-    like.psnr = squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * like.inside / squares)
-                            : std::numeric_limits<double>::infinity();
     return like;
 }
 
