@@ -9,6 +9,7 @@
 #include "host/frames.hpp"
 #include "ring/protocol.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
