@@ -77,6 +77,23 @@ void region(Context &context) {
         throw Skip("it tells no region");
 }
 
+void device_time(Context &context) {
+    bool told = false;
+    Tracer tracer(context, still_life());
+    for (int image = 1; image <= 3; ++image) { // of one after another: it may be that of all
+        tracer.render(of_still_life());
+        const auto ms = [](auto ns) { return 1e-6 * static_cast<double>(ns); };
+        const double device_ms = ms(tracer.info().device_time_ns), took_ms = ms(tracer.took().count());
+        if (device_ms > took_ms)
+            throw Failure(
+                fmt::format("of image {} it tells {:.3f} ms for the device's time, and render took {:.3f} ms", image,
+                            device_ms, took_ms));
+        told = told || device_ms > 0;
+    }
+    if (!told)
+        throw Skip("it tells no device's time");
+}
+
 // ---- Sameness --------------------------------------------------------------------------------------
 
 void deterministic(Context &context) {
@@ -167,6 +184,8 @@ constexpr Test tests[] = {
     {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes show what they should.", kind, gate,
      20s, sizes},
     {"raytracer.region", "Outside of the region that it tells every alpha is 0.", kind, gate, 20s, region},
+    {"raytracer.device-time", "The device's time that it tells of an image is no longer than render took.", kind,
+     gate, 20s, device_time},
     {"raytracer.deterministic", "The same request gives the same bytes, again and in another instance.", kind, gate,
      20s, deterministic},
     {"raytracer.frames-before", "An image does not depend on the frames before it.", kind, gate, 20s, frames_before},

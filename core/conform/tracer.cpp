@@ -75,8 +75,10 @@ arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, 
     const arhost_image image = slot_->image();
     info = {};
     info.struct_size = sizeof info;
+    const auto begin = std::chrono::steady_clock::now();
     const arhost_status status = in_call(instance_.library().calls(), Call::per_frame,
                                          [&] { return functions_.render(instance_.get(), &request, &image, &info); });
+    took_ = std::chrono::steady_clock::now() - begin;
     picture = *slot_;
     return status;
 }

@@ -9,6 +9,7 @@
 #include "conform/test.hpp"
 #include "scene/arena.hpp"
 
+#include <chrono>
 #include <optional>
 
 namespace arhost::conform {
@@ -47,6 +48,7 @@ public:
 
     Instance &instance() { return instance_; }
     const arhost_render_info &info() const { return info_; } // of the last render
+    std::chrono::nanoseconds took() const { return took_; }  // the last call of render
 
 private:
     Instance instance_;
@@ -55,6 +57,7 @@ private:
     std::optional<arhost_intrinsics> started_;
     std::optional<Picture> slot_; // where all images are written from start to stop
     arhost_render_info info_{};
+    std::chrono::nanoseconds took_{};
 };
 
 } // namespace arhost::conform

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace arhost::host {
 namespace {
@@ -70,6 +71,12 @@ const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous
     record.truth_id = info.truth_id;
     std::copy(std::begin(info.true_mt), std::end(info.true_mt), record.true_mt);
     return nullptr;
+}
+
+std::chrono::nanoseconds device_time(const arhost_render_info &info, std::chrono::nanoseconds busy) {
+    if (std::cmp_greater(info.device_time_ns, busy.count()))
+        return {};
+    return std::chrono::nanoseconds(static_cast<std::int64_t>(info.device_time_ns));
 }
 
 } // namespace arhost::host

@@ -61,4 +61,8 @@ const char *take_tracker_result(std::span<const std::byte> slot, const std::set<
 const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
                             arhost_record &record);
 
+// The device's time of an image that took the ray tracer `busy`. 0 where it tells none, or a longer one than that,
+// which can't be true.
+std::chrono::nanoseconds device_time(const arhost_render_info &info, std::chrono::nanoseconds busy);
+
 } // namespace arhost::host

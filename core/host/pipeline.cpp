@@ -575,12 +575,16 @@ bool Pipeline::render() {
 }
 
 void Pipeline::on_rendered(const Command &command, const Result &result) {
+    const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
+    if (device.count())
+        statistics_.stages["device"].add(device);
     Frame *answered = take_answer(command, result, "raytracer");
     if (!answered)
         return;
     Frame &frame = *answered;
     frame.render = result.render;
-    frame.times.raytracer = std::chrono::nanoseconds(result.busy_ns);
+    frame.times.raytracer = busy;
+    frame.times.device = device;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
     if (overlay_promises_) {

@@ -46,14 +46,15 @@ double Statistics::fps() const {
 }
 
 std::string timeline_csv(const Statistics &statistics) {
-    std::string text = "frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms\n";
+    std::string text = "frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms\n";
     for (const FrameTimes &times : statistics.timeline) {
         const double shown = std::chrono::duration<double>(times.shown - statistics.first_frame).count();
-        char line[160];
-        std::snprintf(line, sizeof line, "%llu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n",
+        char line[192];
+        std::snprintf(line, sizeof line, "%llu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n",
                       static_cast<unsigned long long>(times.frame), shown, 1e-6 * double(times.source.count()),
                       1e-6 * double(times.tracker.count()), 1e-6 * double(times.raytracer.count()),
-                      1e-6 * double(times.composite.count()), 1e-6 * double(times.latency.count()));
+                      1e-6 * double(times.device.count()), 1e-6 * double(times.composite.count()),
+                      1e-6 * double(times.latency.count()));
         text += line;
     }
     return text;

@@ -31,11 +31,12 @@ private:
     std::int64_t max_ns_ = 0;
 };
 
-// One frame that was sent to the outputs. Times of stages that it did not pass are 0.
+// One frame that was sent to the outputs. Times of stages that it did not pass are 0, and so is what the ray tracer's
+// device took where that is not told.
 struct FrameTimes {
     std::uint64_t frame = 0;
     std::chrono::steady_clock::time_point shown{};
-    std::chrono::nanoseconds source{}, tracker{}, raytracer{}, composite{}, latency{};
+    std::chrono::nanoseconds source{}, tracker{}, raytracer{}, device{}, composite{}, latency{};
 };
 
 struct Statistics {
@@ -45,7 +46,7 @@ struct Statistics {
     std::uint64_t composited = 0;                 // sent to the outputs, augmented or not
     std::map<std::string, std::uint64_t> dropped; // by the stage where it happened
     std::map<std::string, std::uint64_t> passed;  // went on unaugmented since this stage failed
-    std::map<std::string, Timing> stages;         // by name: source, tracker, raytracer, composite, latency, …
+    std::map<std::string, Timing> stages; // by name: source, tracker, raytracer, device, composite, latency, …
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     Promises promises;                // of the components with `conform: true`
     std::vector<FrameTimes> timeline; // kept only where the configuration asks for it
@@ -53,7 +54,7 @@ struct Statistics {
     double fps() const;
 };
 
-// A header and a line a frame: frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms.
+// A header and a line a frame: frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms.
 // shown_s counts from the first frame's arrival.
 std::string timeline_csv(const Statistics &statistics);
 

@@ -76,6 +76,8 @@ public:
         info.region_y = drawn.y;
         info.region_width = drawn.width;
         info.region_height = drawn.height;
+        if (info.struct_size >= sizeof info) // that of an older host ends before it
+            info.device_time_ns = renderer_->last_gpu_ns();
     }
 
     void stop() {

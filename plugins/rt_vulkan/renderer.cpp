@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstring>
 #include <limits>
@@ -111,6 +112,12 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         info.queryCount = moment_count;
         clock_ = make<QueryPool, VkQueryPool>(device_, device_.functions().vkCreateQueryPool, info,
                                               "making the GPU's clock");
+        // Before all else: trees that are built anew for an image are a part of its time.
+        start_clock_ = submission_.new_commands();
+        submission_.begin(start_clock_);
+        device_.functions().vkCmdResetQueryPool(start_clock_, clock_.get(), 0, moment_count);
+        device_.functions().vkCmdWriteTimestamp(start_clock_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), begun);
+        submission_.end(start_clock_);
     }
     frame_ = scene_.frame();
     frame_.width = intrinsics_.width;
@@ -287,10 +294,6 @@ void Renderer::record(const Target &target) const {
     const DeviceFunctions &vk = device_.functions();
     const VkCommandBuffer commands = target.commands;
     submission_.begin(commands);
-    if (clock_.get()) {
-        vk.vkCmdResetQueryPool(commands, clock_.get(), 0, moment_count);
-        vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), begun);
-    }
     VkDeviceSize offset = 0;
     for (const Binding binding : moving_bindings)
         if (const VkDeviceSize size = scene_.moving_size(binding)) {
@@ -350,6 +353,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
     look(camera, frame_);
     std::vector<VkCommandBuffer> commands;
+    if (start_clock_)
+        commands.push_back(start_clock_);
     if (motion) {
         scene_.move(*motion);
         if (acceleration_)
@@ -394,6 +399,7 @@ Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
                         target.buffer.mapped().data() + std::size_t{target.stride} * y, target.stride);
     read_back_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     ++image_count_;
+    last_gpu_ns_ = 0;
     std::uint64_t ticks[moment_count];
     if (clock_.get() &&
         device_.functions().vkGetQueryPoolResults(device_.handle(), clock_.get(), 0, moment_count, sizeof ticks,
@@ -404,7 +410,9 @@ Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
                 (ticks[copied] - ticks[moment]) & (bits < 64 ? (std::uint64_t{1} << bits) - 1 : ~std::uint64_t{0});
             return static_cast<double>(passed) * double{device_.physical().properties.limits.timestampPeriod} * 1e-6;
         };
-        gpu_ms_ += ms_since(begun);
+        const double gpu_ms = ms_since(begun);
+        last_gpu_ns_ = static_cast<std::uint64_t>(std::llround(1e6 * gpu_ms));
+        gpu_ms_ += gpu_ms;
         read_back_ms_ += ms_since(traced);
     }
     std::int32_t drawn[4];

@@ -37,7 +37,8 @@ public:
     // Whether the last image was written to its place by the device itself.
     bool wrote_in_place() const { return wrote_in_place_; }
     std::uint64_t image_count() const { return image_count_; }
-    double gpu_ms() const { return gpu_ms_; } // of all images; 0 where the device has no clock
+    double gpu_ms() const { return gpu_ms_; }                  // of all images; 0 where the device has no clock
+    std::uint64_t last_gpu_ns() const { return last_gpu_ns_; } // of the last image; likewise
     // For benchmarks. Of all images: the way from the device's memory to the place that they go to.
     double read_back_ms() const { return read_back_ms_; }
     // The shader alone, as of the last image: nothing is copied.
@@ -77,6 +78,7 @@ private:
     Buffer read_;                              // the part that is drawn
     std::optional<Acceleration> acceleration_; // none on the plain path
     QueryPool clock_;                          // none where the device has none
+    VkCommandBuffer start_clock_ = VK_NULL_HANDLE;
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
@@ -86,6 +88,7 @@ private:
     bool wrote_in_place_ = false;
     std::uint64_t image_count_ = 0;
     double gpu_ms_ = 0, read_back_ms_ = 0;
+    std::uint64_t last_gpu_ns_ = 0;
 
     // Of accumulation: how much has been summed up so far, and for which camera.
     std::uint32_t history_samples_ = 0;

@@ -208,6 +208,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
       "raytracer.moving-object", "raytracer.frames-before"}},
     {"small_region", "tells a region 4 px too narrow", "fail", {"raytracer.region"}},
     {"region_beyond_image", "tells a region beyond the image", "fail", {"raytracer.region"}},
+    {"device_time_since_boot", "tells what the clock shows for the device's time", "fail", {"raytracer.device-time"}},
 };
 
 } // namespace arhost::test

@@ -9,6 +9,7 @@
 #include "host/frames.hpp"
 #include "ring/protocol.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -98,6 +99,8 @@ void run_ring(Bytes bytes) {
                 require(popped < ring_capacity, "more entries than the ring holds");
                 host::take_frame_info(result.frame, record.capture_ns, 0, record);
                 lay_over(result.render);
+                const std::chrono::nanoseconds busy(result.busy_ns), device = host::device_time(result.render, busy);
+                require(device.count() == 0 || device <= busy, "a device's time is longer than the image's");
             }
             break;
         case 5:

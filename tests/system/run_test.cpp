@@ -51,30 +51,44 @@ TEST(Run, TakesEveryFrameThroughAllStagesInOrder) {
 }
 
 TEST(Run, WritesTheTimesOfEachFrame) {
-    ArhostRun run(counting("lockstep", "frames: 20", "lost_from: 5, lost_to: 8", "", "timeline: times.csv\n"));
+    ArhostRun run(
+        counting("lockstep", "frames: 20", "lost_from: 5, lost_to: 8", "device_time_ns: 2", "timeline: times.csv\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     std::istringstream lines(run.read("times.csv"));
     std::string line;
     std::getline(lines, line);
-    EXPECT_EQ(line, "frame,shown_s,source_ms,tracker_ms,raytracer_ms,composite_ms,latency_ms");
+    EXPECT_EQ(line, "frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms");
     double before = 0;
     unsigned long long count = 0;
     for (; std::getline(lines, line); ++count) {
         unsigned long long frame = 0;
-        double shown, source, tracker, raytracer, composite, latency;
-        ASSERT_EQ(std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf,%lf,%lf", &frame, &shown, &source, &tracker,
-                              &raytracer, &composite, &latency),
-                  7)
+        double shown, source, tracker, raytracer, device, composite, latency;
+        ASSERT_EQ(std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &frame, &shown, &source, &tracker,
+                              &raytracer, &device, &composite, &latency),
+                  8)
             << line;
         EXPECT_EQ(frame, count);
         EXPECT_GT(shown, before);
         before = shown;
         EXPECT_GT(tracker, 0) << line;
         EXPECT_EQ(raytracer > 0, frame < 5 || frame >= 8) << line;
+        EXPECT_EQ(device, raytracer > 0 ? 2e-6 : 0) << line;
         EXPECT_GE(latency, composite) << line;
     }
     EXPECT_EQ(count, 20u);
+    EXPECT_EQ(run.stats()["stages"]["device"]["count"], 17);
+    EXPECT_NEAR(run.stats()["stages"]["device"]["max_ms"], 2e-6, 1e-12);
+}
+
+TEST(Run, LeavesOutTimesOfADeviceThatCantBeTrue) {
+    for (const char *ns : {"0", "-1", "9223372036854775807"}) {
+        ArhostRun run(counting("lockstep", "frames: 5", "", std::string("device_time_ns: ") + ns));
+        run.write("scene.yaml", small_scene);
+        ASSERT_EQ(run.run(), 0) << run.output();
+        EXPECT_EQ(run.stats()["stages"]["raytracer"]["count"], 5);
+        EXPECT_FALSE(run.stats()["stages"].contains("device")) << ns;
+    }
 }
 
 TEST(Run, StopsAfterTheFramesThatAreAskedFor) {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -469,6 +470,9 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         info->region_width -= 4;
     if (has("region_beyond_image"))
         info->region_width = image->width + 1;
+    if (has("device_time_since_boot"))
+        info->device_time_ns =
+            static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
     return has("status_0") ? 0 : status;
 }
 

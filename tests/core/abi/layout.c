@@ -491,13 +491,14 @@ FIELD(arhost_image, width, 8, 4);
 FIELD(arhost_image, height, 12, 4);
 FIELD(arhost_image, rgba, 16, 8);
 
-STRUCT(arhost_render_info, 24);
+STRUCT(arhost_render_info, 32);
 FIELD(arhost_render_info, struct_size, 0, 4);
 FIELD(arhost_render_info, has_region, 4, 4);
 FIELD(arhost_render_info, region_x, 8, 4);
 FIELD(arhost_render_info, region_y, 12, 4);
 FIELD(arhost_render_info, region_width, 16, 4);
 FIELD(arhost_render_info, region_height, 20, 4);
+FIELD(arhost_render_info, device_time_ns, 24, 8);
 
 STRUCT(arhost_raytracer, 32);
 FIELD(arhost_raytracer, struct_size, 0, 4);

@@ -194,7 +194,7 @@ TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerTellsOne) {
     const Region whole = region_of(info, 640, 480);
     EXPECT_EQ(whole.width, 640u);
     EXPECT_EQ(whole.height, 480u);
-    info = {sizeof info, 1, 5, 6, 7, 8};
+    info = {sizeof info, 1, 5, 6, 7, 8, 0};
     const Region told = region_of(info, 640, 480);
     EXPECT_EQ(told.x, 5u);
     EXPECT_EQ(told.y, 6u);

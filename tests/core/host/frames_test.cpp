@@ -24,6 +24,22 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
 
 } // namespace
 
+TEST(DeviceTime, IsLeftOutWhereItIsLongerThanRenderTook) {
+    using namespace std::chrono_literals;
+    const auto told = [](std::uint64_t ns, std::chrono::nanoseconds busy) {
+        arhost_render_info info{};
+        info.device_time_ns = ns;
+        return device_time(info, busy);
+    };
+    EXPECT_EQ(told(3'000'000, 5ms), 3ms);
+    EXPECT_EQ(told(5'000'000, 5ms), 5ms);
+    EXPECT_EQ(told(5'000'001, 5ms), 0ns);
+    EXPECT_EQ(told(0, 5ms), 0ns);
+    EXPECT_EQ(told(UINT64_MAX, 5ms), 0ns) << "-1 as a signed number";
+    EXPECT_EQ(told(1, -5ms), 0ns) << "what render took is a worker's word, too";
+    EXPECT_EQ(told(UINT64_MAX, -1ns), 0ns);
+}
+
 TEST(FrameInfo, IsRefusedWithoutAClock) {
     EXPECT_STREQ(problem_with(0, now_ns), "a frame's clock is not set");
     EXPECT_STREQ(problem_with(3, now_ns), "a frame's clock is not set");

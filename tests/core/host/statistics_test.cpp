@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 using namespace arhost::host;
 
 TEST(Timing, GivesNearestRanksWithinHalfAPercent) {
@@ -35,6 +37,36 @@ TEST(Timing, OfNothingOrNoTimeIsHarmless) {
     timing.add(std::chrono::nanoseconds(-5)); // a clock that was set back
     EXPECT_EQ(timing.count(), 2u);
     EXPECT_LE(timing.percentile_ms(0.99), 1e-5);
+}
+
+TEST(Timeline, HasALineForEachFrame) {
+    using namespace std::chrono_literals;
+    Statistics statistics;
+    statistics.first_frame = std::chrono::steady_clock::time_point(10s);
+    FrameTimes times;
+    times.frame = 7;
+    times.shown = statistics.first_frame + 1500ms;
+    times.source = 1ms;
+    times.tracker = 2ms;
+    times.raytracer = 3500us;
+    times.device = 3ms;
+    times.composite = 4ms;
+    times.latency = 12ms;
+    statistics.timeline = {times, FrameTimes{.frame = 8, .shown = times.shown}};
+    EXPECT_EQ(timeline_csv(statistics),
+              "frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms\n"
+              "7,1.500000,1.000000,2.000000,3.500000,3.000000,4.000000,12.000000\n"
+              "8,1.500000,0.000000,0.000000,0.000000,0.000000,0.000000,0.000000\n");
+}
+
+TEST(Timeline, HoldsTheLongestTimesThatAWorkerCanTell) {
+    Statistics statistics;
+    const auto longest = std::chrono::nanoseconds::min(); // with its sign
+    statistics.timeline = {{UINT64_MAX, std::chrono::steady_clock::time_point(longest), longest, longest, longest,
+                            longest, longest, longest}};
+    const std::string text = timeline_csv(statistics);
+    EXPECT_EQ(std::count(text.begin(), text.end(), ','), 2 * 7);
+    EXPECT_TRUE(text.ends_with(",-9223372036854.775391\n")) << text;
 }
 
 TEST(Statistics, CountFramesASecondBetweenTheFirstAndTheLast) {

@@ -85,6 +85,11 @@ TEST_F(DriverThatGoes, HandsOverToTheFallbackInMidRun) {
     EXPECT_EQ(stats["frames"]["composited"], frames);
     EXPECT_GE(stats["frames"]["augmented"], frames - 5) << "those of the moment alone are without";
     EXPECT_GE(overlaid(), frames - 5);
+    const nlohmann::json &device = stats["stages"]["device"], &all = stats["stages"]["raytracer"];
+    EXPECT_GE(device["count"], 20) << stats["stages"];
+    EXPECT_LT(device["count"], all["count"]) << "the fallback has no device";
+    EXPECT_GT(device["p50_ms"], 0.0);
+    EXPECT_LE(device["max_ms"], all["max_ms"]);
 }
 
 TEST_F(DriverThatGoes, LeavesTheVideoAsItIsWhereThereIsNoFallback) {

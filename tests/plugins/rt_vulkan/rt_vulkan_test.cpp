@@ -12,6 +12,8 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -182,6 +184,34 @@ TEST_P(EachPath, IsToldOf) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
+}
+
+// Of an image for which trees are built anew, too.
+TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
+    LoggingHost logging;
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, false);
+    const auto devices = instance.devices();
+    const bool has_clock = rt_vulkan::choose_device(devices, "auto").timestamp_bits > 0;
+    Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    scene::MotionEvaluator evaluator(tracer.scene());
+    Picture picture(small);
+    for (const double time_s : {0.0, 0.5, 1.0}) {
+        const arhost_motion motion = evaluator.at(time_s);
+        picture.info = {sizeof picture.info, 0, 0, 0, 0, 0, 0};
+        const auto begin = std::chrono::steady_clock::now();
+        ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK) << tracer.plugin().log();
+        const std::chrono::nanoseconds took = std::chrono::steady_clock::now() - begin;
+        EXPECT_EQ(picture.info.device_time_ns > 0, has_clock);
+        EXPECT_LE(picture.info.device_time_ns, static_cast<std::uint64_t>(took.count()));
+    }
+    constexpr std::uint64_t untouched = 7;
+    picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched};
+    const arhost_motion motion = evaluator.at(1.5);
+    ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK);
+    EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct ends before it";
+    EXPECT_TRUE(picture.info.has_region);
 }
 
 // Things are where they should be however long they have moved, on trees that have been refitted, and then built.

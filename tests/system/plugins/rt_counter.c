@@ -18,7 +18,7 @@ struct arhost_instance {
     const arhost_host *host;
     int64_t crash_at, hang_at, hang_until, error_at, answer;
     double delay_ms;
-    int64_t writes_later;
+    int64_t writes_later, device_time_ns;
     uint8_t *last; /* image */
 };
 
@@ -36,6 +36,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
+    self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
     if (arhost_find_option(options, option_count, "refuse")->integer) {
         host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
         free(self);
@@ -92,6 +93,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     self->last = image->rgba;
     info->has_region = 1;
     info->region_width = info->region_height = 16;
+    info->device_time_ns = (uint64_t)self->device_time_ns;
     return (arhost_status)self->answer;
 }
 
@@ -112,6 +114,8 @@ static const arhost_option_descriptor options[] = {
      "Sleeps so long in each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
      "Writes into the image before, too"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
+     "Tells this of each image; a negative one is beyond all times"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL, "Dies in create"},
 };

@@ -50,6 +50,8 @@ typedef struct arhost_render_info {
     int32_t has_region; /* non-zero: the region below is set */
     /* A rectangle outside of which every alpha is 0: the host need not look there. Empty: width 0. */
     uint32_t region_x, region_y, region_width, region_height;
+    uint64_t device_time_ns; /* by the device's own clock, of a GPU say, from the image's first command to its last;
+                                0: not told */
 } arhost_render_info;
 
 typedef struct arhost_raytracer {

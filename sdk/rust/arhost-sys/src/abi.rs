@@ -570,6 +570,7 @@ abi_structs! {
         region_y: u32,
         region_width: u32,
         region_height: u32,
+        device_time_ns: u64,
     }
     struct arhost_raytracer {
         struct_size: u32,
