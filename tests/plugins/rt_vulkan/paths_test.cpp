@@ -42,11 +42,7 @@ constexpr auto name_of = [](const auto &info) {
     return std::get<0>(info.param) + "_" + name_of_view(std::get<1>(info.param));
 };
 // Between them they have whatever a path does in its own way: spheres, holes, lights, what moves and deforms, glass.
-const auto some_scenes = testing::Values(View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},
-                                         View{"room", "tests/plugins/rt_embree/golden/room.yaml", "4"},
-                                         View{"moving", "config/scenes/moving.yaml", "4", 1.3},
-                                         View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"},
-                                         View{"vkray-hbf", "config/scenes/vkray-hbf.yaml"});
+const auto some_scenes = scenes_named({"classes", "room", "moving", "optix-skybox-teapot", "vkray-hbf"});
 INSTANTIATE_TEST_SUITE_P(SomeScenes, SamePictureByPath,
                          testing::Combine(testing::Values("query", "pipeline"), some_scenes), name_of);
 // Minutes of compiling: tools/likeness runs them.

@@ -82,10 +82,6 @@ TEST_P(BehindGlass, RtVulkanIsNoFartherFromRtEmbreeThanThatFromItself) {
 
 // Minutes: tools/likeness runs them.
 INSTANTIATE_TEST_SUITE_P(DISABLED_Scenes, BehindGlass,
-                         testing::Values(View{"optix-gd", "config/scenes/optix-gd.yaml"},
-                                         View{"optix-gl", "config/scenes/optix-gl.yaml"},
-                                         View{"optix-skybox-lucy", "config/scenes/optix-skybox-lucy.yaml"},
-                                         View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"}),
-                         name_of);
+                         scenes_named({"optix-gd", "optix-gl", "optix-skybox-lucy", "optix-skybox-teapot"}), name_of);
 
 } // namespace arhost::test

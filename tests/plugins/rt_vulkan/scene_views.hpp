@@ -12,6 +12,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace arhost::test {
 
@@ -62,21 +66,37 @@ inline bool has_glass(const arhost_scene &scene) {
                        [](const arhost_material &material) { return material.model == ARHOST_GLASS; });
 }
 
-inline const auto every_scene = testing::Values(
-    View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},
-    View{"room", "tests/plugins/rt_embree/golden/room.yaml", "4"}, View{"demo", "config/scenes/demo.yaml"},
-    View{"moving", "config/scenes/moving.yaml", "4", 1.3}, View{"optix-b", "config/scenes/optix-b.yaml"},
-    View{"optix-cgd", "config/scenes/optix-cgd.yaml"}, View{"optix-cgl", "config/scenes/optix-cgl.yaml"},
-    View{"optix-cs", "config/scenes/optix-cs.yaml"}, View{"optix-gd", "config/scenes/optix-gd.yaml"},
-    View{"optix-gl", "config/scenes/optix-gl.yaml"}, View{"optix-hb", "config/scenes/optix-hb.yaml"},
-    View{"optix-skybox-buddha", "config/scenes/optix-skybox-buddha.yaml"},
-    View{"optix-skybox-bunny", "config/scenes/optix-skybox-bunny.yaml"},
-    View{"optix-skybox-dragon", "config/scenes/optix-skybox-dragon.yaml"},
-    View{"optix-skybox-lucy", "config/scenes/optix-skybox-lucy.yaml"},
-    View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"},
-    View{"vkray-b", "config/scenes/vkray-b.yaml"}, View{"vkray-cmd", "config/scenes/vkray-cmd.yaml"},
-    View{"vkray-cs", "config/scenes/vkray-cs.yaml"}, View{"vkray-hb", "config/scenes/vkray-hb.yaml"},
-    View{"vkray-hbf", "config/scenes/vkray-hbf.yaml"}, View{"vkray-md", "config/scenes/vkray-md.yaml"});
+inline const std::vector<View> every_view = {View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},
+                                             View{"room", "tests/plugins/rt_embree/golden/room.yaml", "4"},
+                                             View{"demo", "config/scenes/demo.yaml"},
+                                             View{"moving", "config/scenes/moving.yaml", "4", 1.3},
+                                             View{"optix-b", "config/scenes/optix-b.yaml"},
+                                             View{"optix-cgd", "config/scenes/optix-cgd.yaml"},
+                                             View{"optix-cgl", "config/scenes/optix-cgl.yaml"},
+                                             View{"optix-cs", "config/scenes/optix-cs.yaml"},
+                                             View{"optix-gd", "config/scenes/optix-gd.yaml"},
+                                             View{"optix-gl", "config/scenes/optix-gl.yaml"},
+                                             View{"optix-hb", "config/scenes/optix-hb.yaml"},
+                                             View{"optix-skybox-buddha", "config/scenes/optix-skybox-buddha.yaml"},
+                                             View{"optix-skybox-bunny", "config/scenes/optix-skybox-bunny.yaml"},
+                                             View{"optix-skybox-dragon", "config/scenes/optix-skybox-dragon.yaml"},
+                                             View{"optix-skybox-lucy", "config/scenes/optix-skybox-lucy.yaml"},
+                                             View{"optix-skybox-teapot", "config/scenes/optix-skybox-teapot.yaml"},
+                                             View{"vkray-b", "config/scenes/vkray-b.yaml"},
+                                             View{"vkray-cmd", "config/scenes/vkray-cmd.yaml"},
+                                             View{"vkray-cs", "config/scenes/vkray-cs.yaml"},
+                                             View{"vkray-hb", "config/scenes/vkray-hb.yaml"},
+                                             View{"vkray-hbf", "config/scenes/vkray-hbf.yaml"},
+                                             View{"vkray-md", "config/scenes/vkray-md.yaml"}};
+inline const auto every_scene = testing::ValuesIn(every_view);
+
+// Some of them, by their names.
+inline auto scenes_named(const std::set<std::string> &names) {
+    std::vector<View> views;
+    std::copy_if(every_view.begin(), every_view.end(), std::back_inserter(views),
+                 [&](const View &view) { return names.contains(view.name); });
+    return testing::ValuesIn(views);
+}
 
 inline std::string name_of_view(const View &view) {
     std::string name = view.name;
