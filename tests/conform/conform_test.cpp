@@ -542,9 +542,10 @@ TEST(Conform, NamesTheNeedThatIsUnknown) {
 TEST(Conform, LeavesNothingOfASinksFilesBehind) {
     ConformRun run;
     std::filesystem::create_directory(run.path("tmp"));
-    ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
     run.link_wrong("crash_in_stop", "sink");
-    EXPECT_EQ(run.run({"sink_crash_in_stop.so", "--only", "sink.w*", "--set", "path=out/frame"}), 1);
+    run.start({"sink_crash_in_stop.so", "--only", "sink.w*", "--set", "path=out/frame"},
+              [&] { ::setenv("TMPDIR", run.path("tmp").c_str(), 1); });
+    EXPECT_EQ(run.wait(), 1);
     EXPECT_THAT(run.output(), HasSubstr("SIGSEGV in stop"));
     EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
     EXPECT_FALSE(std::filesystem::exists(run.path("out")));
