@@ -3,9 +3,13 @@
 // How long rt_vulkan takes for an image, beside a bare trace of the same primary rays by the same trace() in a shader
 // that writes the distance and nothing else; and what it leaves behind in a long run:
 //
-//   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]   a JSON line for each
-//   path rt-vulkan-bench run IMAGES EVERY SCENE.yaml…   another scene every so many images; exits 1 where a target is
-//   missed
+//   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]
+//
+// prints a JSON line for each path, and
+//
+//   rt-vulkan-bench run IMAGES EVERY SCENE.yaml…
+//
+// takes another scene every so many images; it exits 1 where a target is missed.
 #include "bunny.hpp"
 #include "long_run.hpp"
 #include "renderer.hpp"
@@ -156,7 +160,7 @@ int trace(const std::vector<std::string> &words) {
     const auto devices = instance.devices();
     const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
     const std::vector<rt_vulkan::Path> paths =
-        words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_path(device, words[5])};
+        words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_paths(device, words[5])[0]};
     for (const rt_vulkan::Path path : paths) {
         nlohmann::json line = measured(
             instance, device, host, path, arena,

@@ -73,7 +73,7 @@ Acceleration::Acceleration(const Device &device, const Submission &submission, c
                            std::span<const Object> objects, const Buffer &indices, VkPipelineStageFlags readers,
                            const arhost::Host &host)
     : device_(device), submission_(submission), arena_(arena), host_(host), readers_(readers),
-      instances_(objects.size()) {
+      instances_(objects.size()), refits_(most_refits) { // what the arena has need be no pose: built anew at once
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     const auto from = elements<arhost_object>(arena, arena.objects);
     const auto refuse_over = [&](std::uint64_t count, std::uint64_t most, const char *what) {

@@ -71,7 +71,7 @@ private:
     std::vector<VkAccelerationStructureInstanceKHR> instances_;
     Buffer scratch_;
     VkCommandBuffer refit_ = VK_NULL_HANDLE, rebuild_ = VK_NULL_HANDLE;
-    std::uint32_t refits_ = 0; // since the last building
+    std::uint32_t refits_; // since the last building
 };
 
 } // namespace rt_vulkan

@@ -11,13 +11,20 @@ using arhost::Failure;
 
 constexpr VkMemoryPropertyFlags mappable = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
-Memory allocated(const Device &device, VkDeviceSize size, std::uint32_t type, const void *next) {
+// Of the first of `types` that has so much left: what is both the device's own and mapped can be little.
+Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::uint32_t> types, const void *next) {
     VkMemoryAllocateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
     info.pNext = next;
     info.allocationSize = size;
-    info.memoryTypeIndex = type;
-    return make<Memory, VkDeviceMemory>(device, device.functions().vkAllocateMemory, info, "allocating GPU memory");
+    VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    VkDeviceMemory memory = VK_NULL_HANDLE;
+    for (std::size_t i = 0; i < types.size() && result == VK_ERROR_OUT_OF_DEVICE_MEMORY; ++i) {
+        info.memoryTypeIndex = types[i];
+        result = device.functions().vkAllocateMemory(device.handle(), &info, nullptr, &memory);
+    }
+    check(result, "allocating GPU memory");
+    return {device, memory};
 }
 
 } // namespace
@@ -79,12 +86,16 @@ Device::~Device() {
     functions_.vkDestroyDevice(device_, nullptr);
 }
 
-int Device::memory_type(std::uint32_t allowed, VkMemoryPropertyFlags needed, VkMemoryPropertyFlags wished) const {
-    for (const VkMemoryPropertyFlags flags : {needed | wished, needed})
-        for (std::uint32_t type = 0; type < memory_.memoryTypeCount; ++type)
-            if (allowed >> type & 1 && (memory_.memoryTypes[type].propertyFlags & flags) == flags)
-                return static_cast<int>(type);
-    return -1;
+std::vector<std::uint32_t> Device::memory_types(std::uint32_t allowed, VkMemoryPropertyFlags needed,
+                                                VkMemoryPropertyFlags wished) const {
+    std::vector<std::uint32_t> types;
+    for (const bool is_wished : {true, false})
+        for (std::uint32_t type = 0; type < memory_.memoryTypeCount; ++type) {
+            const VkMemoryPropertyFlags flags = memory_.memoryTypes[type].propertyFlags;
+            if (allowed >> type & 1 && (flags & needed) == needed && ((flags & wished) == wished) == is_wished)
+                types.push_back(type);
+        }
+    return types;
 }
 
 Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place) : size_(size) {
@@ -96,19 +107,22 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
     buffer_ = make<decltype(buffer_), VkBuffer>(device, vk.vkCreateBuffer, info, "making a GPU buffer");
     VkMemoryRequirements needs;
     vk.vkGetBufferMemoryRequirements(device.handle(), get(), &needs);
-    const int type = place == Place::device
-                         ? device.memory_type(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT)
-                     : place == Place::host_written
-                         ? device.memory_type(needs.memoryTypeBits, mappable, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT)
-                         : device.memory_type(needs.memoryTypeBits, mappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
-    if (type < 0)
+    const VkMemoryPropertyFlags wished = place == Place::staging     ? 0
+                                         : place == Place::host_read ? VK_MEMORY_PROPERTY_HOST_CACHED_BIT
+                                                                     : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+    // Of several the first has the fewest properties besides: to stage, none of the device's own.
+    std::vector<std::uint32_t> types =
+        device.memory_types(needs.memoryTypeBits, place == Place::device ? 0 : mappable, wished);
+    if (place == Place::device)
+        types.resize(1); // elsewhere it would be slow, and no one knew
+    if (types.empty())
         throw Failure(ARHOST_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
                                                     "' has no memory that the host can write; choose another");
     const bool has_address = usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     VkMemoryAllocateFlagsInfo flags{};
     flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
     flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    memory_ = allocated(device, needs.size, static_cast<std::uint32_t>(type), has_address ? &flags : nullptr);
+    memory_ = allocated(device, needs.size, types, has_address ? &flags : nullptr);
     check(vk.vkBindBufferMemory(device.handle(), get(), memory_.get(), 0), "binding GPU memory");
     if (has_address) {
         VkBufferDeviceAddressInfo which{};
@@ -148,9 +162,9 @@ Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
     buffer.buffer_ = make<decltype(buffer_), VkBuffer>(device, vk.vkCreateBuffer, info, "making a GPU buffer");
     VkMemoryRequirements needs;
     vk.vkGetBufferMemoryRequirements(device.handle(), buffer.get(), &needs);
-    const int type = device.memory_type(needs.memoryTypeBits & properties.memoryTypeBits, mappable,
-                                        VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
-    if (type < 0 || needs.size > info.size)
+    const std::vector<std::uint32_t> types = device.memory_types(needs.memoryTypeBits & properties.memoryTypeBits,
+                                                                 mappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+    if (types.empty() || needs.size > info.size)
         return {};
     VkImportMemoryHostPointerInfoEXT import{};
     import.sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT;
@@ -160,7 +174,7 @@ Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
     allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
     allocation.pNext = &import;
     allocation.allocationSize = info.size;
-    allocation.memoryTypeIndex = static_cast<std::uint32_t>(type);
+    allocation.memoryTypeIndex = types[0];
     VkDeviceMemory handle = VK_NULL_HANDLE;
     // A driver may refuse memory of some kinds.
     if (vk.vkAllocateMemory(device.handle(), &allocation, nullptr, &handle) != VK_SUCCESS)
@@ -217,7 +231,10 @@ void Submission::run(std::span<const VkCommandBuffer> commands) const {
     info.commandBufferCount = static_cast<std::uint32_t>(commands.size());
     info.pCommandBuffers = commands.data();
     check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "starting the GPU's work");
-    check(vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX), "waiting for the GPU");
+    const VkResult waited = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX);
+    if (waited != VK_SUCCESS)
+        vk.vkDeviceWaitIdle(device_.handle()); // what is under way makes use of what ends now
+    check(waited, "waiting for the GPU");
 }
 
 void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
@@ -237,8 +254,7 @@ void upload(const Device &device, const Submission &submission, const Buffer &to
         total += part.size();
     if (total == 0)
         return;
-    const Buffer staging(device, std::min(total, most), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                         Buffer::Place::host_written);
+    const Buffer staging(device, std::min(total, most), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
     const VkCommandBuffer commands = submission.new_commands();
     std::size_t filled = 0, written = 0;
     const auto flush = [&] {

@@ -56,8 +56,9 @@ public:
     VkQueue queue() const { return queue_; }
     const DeviceFunctions &functions() const { return functions_; }
     const PhysicalDevice &physical() const { return physical_; }
-    // Of those in `allowed` one that has all of `needed`, and of `wished` if there is such a one; −1: none has.
-    int memory_type(std::uint32_t allowed, VkMemoryPropertyFlags needed, VkMemoryPropertyFlags wished) const;
+    // Those in `allowed` that have all of `needed`, first those that have `wished`, too.
+    std::vector<std::uint32_t> memory_types(std::uint32_t allowed, VkMemoryPropertyFlags needed,
+                                            VkMemoryPropertyFlags wished) const;
 
 private:
     PhysicalDevice physical_;
@@ -120,7 +121,8 @@ class Buffer {
 public:
     enum class Place {
         device,       // fastest for the device
-        host_written, // mapped, for what the host writes and the device reads
+        host_written, // mapped, for what the host writes and the device reads again and again
+        staging,      // mapped, for what the host writes and is copied from there
         host_read     // mapped, for what the device writes and the host reads
     };
     Buffer() = default;

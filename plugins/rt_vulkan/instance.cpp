@@ -115,6 +115,20 @@ void add_tracing(const InstanceFunctions &from, PhysicalDevice &device, bool may
                       pipeline_limits.shaderGroupBaseAlignment};
 }
 
+// Whether what images are copied to can be memory of the host's.
+bool imports_host_memory(const InstanceFunctions &from, VkPhysicalDevice device) {
+    VkPhysicalDeviceExternalBufferInfo buffer{};
+    buffer.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO;
+    buffer.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    buffer.handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
+    VkExternalBufferProperties properties{};
+    properties.sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES;
+    from.vkGetPhysicalDeviceExternalBufferProperties(device, &buffer, &properties);
+    const VkExternalMemoryFeatureFlags can = properties.externalMemoryProperties.externalMemoryFeatures;
+    return (can & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT) &&
+           !(can & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
+}
+
 } // namespace
 
 const char *name_of(Path path) {
@@ -137,6 +151,15 @@ void check(VkResult result, const char *what) {
         throw Failure(ARHOST_ERROR_DEVICE_LOST, text + "that the device is lost (VK_ERROR_DEVICE_LOST)");
     case VK_ERROR_OUT_OF_HOST_MEMORY:
         throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory");
+    case VK_ERROR_INITIALIZATION_FAILED:
+    case VK_ERROR_EXTENSION_NOT_PRESENT:
+    case VK_ERROR_FEATURE_NOT_PRESENT:
+    case VK_ERROR_INCOMPATIBLE_DRIVER:
+        throw Failure(
+            ARHOST_ERROR_UNSUPPORTED,
+            text + "error " + std::to_string(result) +
+                ": the driver can't do it here; look whether its devices (/dev/dri, /dev/nvidia*) are there "
+                "and may be opened, or use rt_embree");
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
         throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory: use smaller meshes and "
                                                          "textures, or rt_embree");
@@ -161,8 +184,10 @@ Instance::Instance(const arhost::Host &host, bool validate, const std::string &l
 #define RT_VULKAN_LOAD(name) functions_.name = reinterpret_cast<PFN_##name>(get_(instance_, #name));
     RT_VULKAN_INSTANCE_FUNCTIONS(RT_VULKAN_LOAD)
 #undef RT_VULKAN_LOAD
-    if (validate)
-        add_messenger();
+    if (validate && !add_messenger()) {
+        functions_.vkDestroyInstance(instance_, nullptr);
+        throw Failure(ARHOST_ERROR_INTERNAL, "Vulkan's validation layers can't be asked for their messages");
+    }
 }
 
 Instance::~Instance() {
@@ -222,11 +247,11 @@ void Instance::create(bool validate) {
     check(result, "making a Vulkan instance");
 }
 
-void Instance::add_messenger() {
+bool Instance::add_messenger() {
     const VkDebugUtilsMessengerCreateInfoEXT info = messenger_info(host_);
-    check(reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(get_(instance_, "vkCreateDebugUtilsMessengerEXT"))(
-              instance_, &info, nullptr, &messenger_),
-          "asking for the validation layers' messages");
+    const auto create =
+        reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(get_(instance_, "vkCreateDebugUtilsMessengerEXT"));
+    return create && create(instance_, &info, nullptr, &messenger_) == VK_SUCCESS;
 }
 
 std::vector<PhysicalDevice> Instance::devices() const {
@@ -259,7 +284,8 @@ std::vector<PhysicalDevice> Instance::devices() const {
             });
         };
         PhysicalDevice device{};
-        device.imports_host_memory = has(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+        device.imports_host_memory =
+            has(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME) && imports_host_memory(functions_, handle);
         if (device.imports_host_memory)
             id.pNext = &import;
         functions_.vkGetPhysicalDeviceProperties2(handle, &properties);
@@ -278,10 +304,15 @@ std::vector<PhysicalDevice> Instance::devices() const {
         functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, nullptr);
         std::vector<VkQueueFamilyProperties> families(family_count);
         functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, families.data());
-        const auto computes =
-            std::find_if(families.begin(), families.end(), [](const VkQueueFamilyProperties &family) {
-                return family.queueFlags & VK_QUEUE_COMPUTE_BIT;
+        // Better one that draws no windows, which a long image would hold up.
+        const auto that_computes = [&](VkQueueFlags but) {
+            return std::find_if(families.begin(), families.end(), [but](const VkQueueFamilyProperties &family) {
+                return family.queueFlags & VK_QUEUE_COMPUTE_BIT && !(family.queueFlags & but);
             });
+        };
+        auto computes = that_computes(VK_QUEUE_GRAPHICS_BIT);
+        if (computes == families.end())
+            computes = that_computes(0);
         device.queue_family = VK_QUEUE_FAMILY_IGNORED;
         if (computes != families.end()) {
             device.queue_family = static_cast<std::uint32_t>(computes - families.begin());
@@ -323,13 +354,15 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     return *chosen;
 }
 
-Path choose_path(const PhysicalDevice &device, const std::string &wanted) {
-    // On a processor the device's trees are as much code as ours, and twice as slow (README.md).
+std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted) {
+    // On a processor the device's trees are as much code as ours, and slower (README.md).
+    if (wanted == "auto" && device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
+        return {Path::plain};
     if (wanted == "auto")
-        return device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? Path::plain : device.paths.back();
+        return {device.paths.rbegin(), device.paths.rend()};
     for (const Path path : device.paths)
         if (wanted == name_of(path))
-            return path;
+            return {path};
     throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'path': the Vulkan device '" + device.name + "' has no '" +
                                                   wanted + "'; it has " + list_of(device.paths) +
                                                   ": give one of these, auto, or another device");

@@ -17,8 +17,8 @@ namespace rt_vulkan {
 #define RT_VULKAN_INSTANCE_FUNCTIONS(use)                                                                            \
     use(vkDestroyInstance) use(vkEnumeratePhysicalDevices) use(vkGetPhysicalDeviceProperties2)                       \
         use(vkGetPhysicalDeviceFeatures2) use(vkGetPhysicalDeviceMemoryProperties)                                   \
-            use(vkGetPhysicalDeviceQueueFamilyProperties) use(vkEnumerateDeviceExtensionProperties)                  \
-                use(vkCreateDevice) use(vkGetDeviceProcAddr)
+            use(vkGetPhysicalDeviceQueueFamilyProperties) use(vkGetPhysicalDeviceExternalBufferProperties)           \
+                use(vkEnumerateDeviceExtensionProperties) use(vkCreateDevice) use(vkGetDeviceProcAddr)
 
 struct InstanceFunctions {
 #define RT_VULKAN_DECLARE(name) PFN_##name name;
@@ -49,7 +49,7 @@ struct PhysicalDevice {
     std::uint32_t timestamp_bits;
     bool imports_host_memory;
     VkDeviceSize import_alignment;        // bytes
-    std::vector<Path> paths{Path::plain}; // the fastest of a GPU last
+    std::vector<Path> paths{Path::plain}; // the one that a GPU is to take last
     TracingLimits tracing;
 };
 
@@ -71,7 +71,7 @@ private:
         void operator()(void *library) const;
     };
     void create(bool validate);
-    void add_messenger();
+    bool add_messenger();
 
     arhost::Host host_;
     std::unique_ptr<void, CloseLibrary> library_;
@@ -84,8 +84,9 @@ private:
 // The one that `wanted` names: its number in the list, its UUID, or a part of its name; "auto": the fastest kind.
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted);
 
-// The one that `wanted` names; "auto": the fastest that the device has.
-Path choose_path(const PhysicalDevice &device, const std::string &wanted);
+// The one that `wanted` names; "auto": those that the device says it has, the best first. Drivers have said so of
+// what they can't do.
+std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted);
 
 // "plain, query"
 std::string list_of(const std::vector<Path> &paths);

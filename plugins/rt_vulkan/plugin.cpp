@@ -55,7 +55,10 @@ public:
     Plugin(const arhost::Host &host, const arhost::Options &options)
         : host_(host), instance_(host, options.boolean("validate")),
           physical_(choose_device(instance_.devices(), options.text("device"))),
-          shaders_(read_shaders(own_folder(), choose_path(physical_, options.text("path")))) {
+          paths_(choose_paths(physical_, options.text("path"))), shaders_(read_shaders(own_folder(), paths_[0])) {
+        if (options.text("device") == "auto" && physical_.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
+            host_.warn("no GPU is among the Vulkan devices: '" + physical_.name +
+                       "' traces on the processor, where rt_embree is faster");
         settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
@@ -63,7 +66,10 @@ public:
     }
 
     void start(const arhost_raytracer_setup &setup) {
-        renderer_.emplace(setup, settings_, host_, instance_, physical_, shaders_);
+        while (!try_start(setup)) {
+            paths_.erase(paths_.begin());
+            shaders_ = read_shaders(own_folder(), paths_[0]);
+        }
         host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path " + name_of(shaders_.path) +
                    ", " + std::to_string(setup.scene->objects.count) + " objects" +
                    (instance_.validates() ? ", with the validation layers" : ""));
@@ -92,9 +98,25 @@ public:
     }
 
 private:
+    // False where the path failed, and there is another.
+    bool try_start(const arhost_raytracer_setup &setup) {
+        try {
+            renderer_.emplace(setup, settings_, host_, instance_, physical_, shaders_);
+            return true;
+        } catch (const arhost::Failure &failure) {
+            const arhost_status status = failure.status();
+            if (paths_.size() == 1 || status == ARHOST_ERROR_CANCELLED || status == ARHOST_ERROR_INVALID_ARGUMENT)
+                throw;
+            host_.warn("Vulkan device '" + physical_.name + "': path '" + name_of(paths_[0]) + "' is left for '" +
+                       name_of(paths_[1]) + "', since it failed: " + failure.what());
+            return false;
+        }
+    }
+
     arhost::Host host_;
     Instance instance_;
     PhysicalDevice physical_;
+    std::vector<Path> paths_; // that are left to take, the one that is taken first
     Shaders shaders_;
     Settings settings_;
     std::optional<Renderer> renderer_;
@@ -110,7 +132,7 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(
         ARHOST_OPTION_TEXT, "path", "auto",
         "How rays find what they hit: 'plain' walks trees in a compute shader, 'query' and 'pipeline' have "
-        "the device's units for ray tracing do it; auto: the fastest that the device has.",
+        "the device's units for ray tracing do it; auto: on a GPU the last of these that works, else 'plain'.",
         0, 0, paths),
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, most_samples),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
@@ -132,7 +154,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "Ray tracer on any Vulkan 1.1 device, with rt_embree's picture.",
+                                          "Ray tracer on any GPU of Vulkan 1.1, with rt_embree's picture.",
                                           ARHOST_TRACES_LENS,
                                           std::size(options),
                                           options,

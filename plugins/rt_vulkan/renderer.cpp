@@ -61,9 +61,6 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     if (limits.maxPerStageDescriptorStorageBuffers < binding_count - 1)
         refuse("reads " + std::to_string(limits.maxPerStageDescriptorStorageBuffers) + " buffers at once, and " +
                std::to_string(binding_count - 1) + " are needed");
-    if (limits.maxUniformBufferRange < sizeof(Frame) ||
-        limits.maxComputeWorkGroupInvocations < group_side * group_side)
-        refuse("has too small uniform buffers or work groups");
     return device;
 }
 
@@ -92,8 +89,8 @@ private:
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
                    const Instance &instance, const PhysicalDevice &physical, const Shaders &shaders)
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
-      stage_(shaders.pipeline_stage()), scene_(*setup.scene, shaders.path == Path::plain, host),
-      device_(instance, checked(physical), shaders.path), submission_(device_),
+      stage_(shaders.pipeline_stage()), device_(instance, checked(physical), shaders.path), submission_(device_),
+      scene_(*setup.scene, shaders.path == Path::plain, host),
       samples_(arhost::view::sample_positions(settings.samples)) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
@@ -171,7 +168,7 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
     buffers_[frame_binding] =
         Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
     if (moving_size)
-        moving_ = Buffer(device_, moving_size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::host_written);
+        moving_ = Buffer(device_, moving_size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
     read_ = Buffer(device_, sizeof(std::int32_t) * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
 }
 
@@ -263,14 +260,17 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     submission_.free(commands);
 }
 
-// The commands for the place that an image goes to. Where memory can't be imported, all share one of ours.
+// The commands for the place that an image goes to. Where memory can't be imported, all share one of ours: then the
+// device is not asked again, as one place is like the other.
 Renderer::Target &Renderer::target_of(const arhost_image &image) {
     for (Target &target : targets_)
         if (target.rgba == image.rgba && target.stride == image.stride)
             return target;
     Target target;
-    target.buffer = Buffer::imported(device_, image.rgba, std::size_t{image.stride} * image.height);
-    if (target.buffer) {
+    if (imports_)
+        target.buffer = Buffer::imported(device_, image.rgba, std::size_t{image.stride} * image.height);
+    imports_ = static_cast<bool>(target.buffer);
+    if (imports_) {
         target.rgba = image.rgba;
         target.stride = image.stride;
     } else {

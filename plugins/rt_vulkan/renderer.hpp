@@ -67,9 +67,9 @@ private:
     Settings settings_;
     arhost_intrinsics intrinsics_;
     VkPipelineStageFlags stage_; // of the device's work, which the shaders run in
-    SceneData scene_;
     Device device_;
     Submission submission_;
+    SceneData scene_;
     std::uint32_t ray_dimensions_ = 2;
     std::vector<arhost::view::Sample> samples_; // of an image
     Frame frame_{};
@@ -85,6 +85,7 @@ private:
     PipelineLayout layout_;
     std::optional<ImagePipeline> pipeline_;
     std::vector<Target> targets_;
+    bool imports_ = true; // until the device refuses
     bool wrote_in_place_ = false;
     std::uint64_t image_count_ = 0;
     double gpu_ms_ = 0, read_back_ms_ = 0;

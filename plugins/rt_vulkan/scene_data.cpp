@@ -307,6 +307,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     has_catchers_ |= from.role == ARHOST_CATCHER;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
     objects_.push_back(object);
+    solid_objects_ += !mesh.is_empty;
     auto &at = places_.emplace_back();
     std::copy_n(from.world_from_object, 12, at.begin());
 }
@@ -329,6 +330,8 @@ void SceneData::place(Object &object, const float *m) const {
 }
 
 void SceneData::build_top() {
+    if (!has_trees_)
+        return;
     std::vector<Box> boxes;
     std::vector<std::uint32_t> numbers;
     const auto from = elements<arhost_object>(arena_, arena_.objects);
@@ -339,9 +342,11 @@ void SceneData::build_top() {
         boxes.push_back(objects_[i].flags & has_transform ? in_world(mesh.local, places_[i].data()) : mesh.local);
         numbers.push_back(i);
     }
-    objects_in_top_ = static_cast<std::uint32_t>(boxes.size());
-    if (boxes.empty() || !has_trees_)
+    if (boxes.empty())
         return;
+    if (boxes.size() > std::size_t{1} << top_depth)
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, "the scene has more than " + std::to_string(1 << top_depth) +
+                                                    " objects: join some, or use rt_embree");
     const Tree tree = build_tree(boxes, 1, top_depth, [this] { look_up(); });
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
         nodes_[i] = tree.nodes[i];
@@ -480,7 +485,7 @@ void SceneData::forget_still_parts() {
 
 Frame SceneData::frame() const {
     Frame frame{};
-    frame.object_count = objects_in_top_;
+    frame.object_count = solid_objects_;
     frame.light_count = static_cast<std::uint32_t>(lights_.size());
     frame.max_depth = arena_.max_depth;
     copy(arena_.ambient, frame.ambient);

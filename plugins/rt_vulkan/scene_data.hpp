@@ -89,7 +89,7 @@ private:
     std::vector<Bytes> texels_;
     std::vector<std::uint32_t> tables_;
     std::size_t moving_nodes_ = 0, moving_primitives_ = 0, moving_attributes_ = 0;
-    std::uint32_t objects_in_top_ = 0, environment_rows_ = 0, environment_columns_ = 0;
+    std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
     bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false;
     std::uint64_t rebuilds_ = 0;
 };

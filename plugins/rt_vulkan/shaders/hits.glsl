@@ -2,8 +2,8 @@
 //
 // Rays, and where they meet triangles and spheres. Of the paths each has its own
 //     Hit trace(Ray ray, bool any, bool passes_backs)
-// which gives the nearest hit; with `any`, one that may be another. A surface that faces away does not count where
-// `passes_backs`.
+// which gives the nearest hit; with `any`, only whether there is one, by its object. A surface that faces away does not
+// count where `passes_backs`.
 
 struct Ray {
     vec3 origin, direction;
@@ -22,18 +22,41 @@ Hit no_hit(Ray ray) {
     return Hit(ray.end, vec2(0.0), vec3(0.0), NONE, NONE);
 }
 
-// Where numbers have left the range of floats, among facets of 1e-15 mm say, nothing is hit.
+// By their bits: compilers may take it that there is no NaN.
+bool is_finite(float a) {
+    return (floatBitsToUint(a) & 0x7f800000u) != 0x7f800000u;
+}
+bool is_finite(vec3 a) {
+    return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);
+}
+
+// Where numbers have left the range of floats, among facets of 1e-15 mm say, nothing is hit; nor may a device be asked.
 bool can_hit(Ray ray) {
-    return frame.object_count != 0u && largest(ray.origin) < 1e18 && largest(ray.direction) < 1e18 &&
-           dot(ray.direction, ray.direction) >= 0.0;
+    return frame.object_count != 0u && is_finite(ray.origin) && is_finite(ray.direction) &&
+           largest(ray.origin) < 1e18 && largest(ray.direction) < 1e18 &&
+           floatBitsToUint(ray.end) <= floatBitsToUint(INFINITY); // neither below 0 nor NaN
+}
+
+// In one order and without fused operations: `precise` does not reach into GLSL's own dot(), cross() and products of
+// matrices.
+float ordered_dot(vec3 a, vec3 b) {
+    precise float sum = a.x * b.x + a.y * b.y + a.z * b.z;
+    return sum;
+}
+vec3 ordered_cross(vec3 a, vec3 b) {
+    precise vec3 product = a.yzx * b.zxy - a.zxy * b.yzx;
+    return product;
 }
 
 void to_axes_of(uint object, Ray ray, out vec3 origin, out vec3 direction) {
     origin = ray.origin;
     direction = ray.direction;
     if ((objects[object].flags & HAS_TRANSFORM) != 0u) {
-        origin = objects[object].object_from_world * vec4(ray.origin, 1.0);
-        direction = objects[object].object_from_world * vec4(ray.direction, 0.0);
+        mat4x3 m = objects[object].object_from_world;
+        precise vec3 at = m[0] * origin.x + m[1] * origin.y + m[2] * origin.z + m[3];
+        precise vec3 along = m[0] * direction.x + m[1] * direction.y + m[2] * direction.z;
+        origin = at;
+        direction = along;
     }
 }
 
@@ -56,17 +79,16 @@ bool is_hole(uint object, uint primitive, vec2 at) {
     return sample_texture(materials[material].colour_texture, place).a < materials[material].alpha_cutoff;
 }
 
-// As Embree's: the numbers are to agree to the last bits.
+// As Embree's.
 bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
-    precise vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
-    precise vec3 to_corner = primitives[primitive].corner - origin;
-    precise vec3 facet = cross(edge_2, edge_1), moment = cross(to_corner, direction);
-    precise float along = dot(facet, direction);
-    float turned = along < 0.0 ? -1.0 : 1.0, size = abs(along);
-    precise float u = dot(moment, edge_2) * turned, v = dot(moment, edge_1) * turned;
+    vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
+    vec3 to_corner = primitives[primitive].corner - origin;
+    vec3 facet = ordered_cross(edge_2, edge_1), moment = ordered_cross(to_corner, direction);
+    float along = ordered_dot(facet, direction), turned = along < 0.0 ? -1.0 : 1.0, size = abs(along);
+    float u = ordered_dot(moment, edge_2) * turned, v = ordered_dot(moment, edge_1) * turned;
     if (size == 0.0 || !(u >= 0.0) || !(v >= 0.0) || !(u + v <= size))
         return false;
-    precise float way = dot(facet, to_corner) * turned;
+    float way = ordered_dot(facet, to_corner) * turned;
     if (!(way > 0.0) || !(way <= size * hit.way))
         return false;
     float share = 1.0 / size;
@@ -78,26 +100,26 @@ bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
 
 bool hits_sphere(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
     precise vec3 to_centre = primitives[primitive].corner - origin;
-    float radius = primitives[primitive].edge_1.x, share = 1.0 / dot(direction, direction);
-    precise float middle = dot(to_centre, direction) * share;
+    float radius = primitives[primitive].edge_1.x, share = 1.0 / ordered_dot(direction, direction);
+    precise float middle = ordered_dot(to_centre, direction) * share;
     precise vec3 across = to_centre - direction * middle;
-    precise float left = radius * radius - dot(across, across);
+    precise float left = radius * radius - ordered_dot(across, across);
     if (!(left >= 0.0))
         return false;
     precise float half_way = sqrt(left * share);
-    float front = middle - half_way, back = middle + half_way;
+    precise float front = middle - half_way, back = middle + half_way;
     bool from_outside = front >= 0.0 && front <= hit.way;
     if (!from_outside && !(back >= 0.0 && back <= hit.way))
         return false;
     hit.way = from_outside ? front : back;
     hit.at = vec2(0.0);
-    hit.facet = direction * (from_outside ? -half_way : half_way) - across;
+    precise vec3 outwards = direction * (from_outside ? -half_way : half_way) - across;
+    hit.facet = outwards;
     return true;
 }
 
 vec3 facet_of(uint primitive) {
-    precise vec3 facet = cross(primitives[primitive].edge_2, primitives[primitive].edge_1);
-    return facet;
+    return ordered_cross(primitives[primitive].edge_2, primitives[primitive].edge_1);
 }
 
 // a · b + c, rounded once (T. J. Dekker, A Floating-Point Technique for Extending the Available Precision, 1971;
@@ -120,16 +142,16 @@ void refine(Ray ray, inout Hit hit) {
         return;
     vec3 origin, direction;
     to_axes_of(hit.object, ray, origin, direction);
-    precise vec3 edge_1 = primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
-    precise vec3 to_corner = fused(-hit.way, direction, primitives[hit.primitive].corner - origin);
-    precise vec3 facet = hit.facet, moment = cross(to_corner, direction);
-    precise float along = dot(facet, direction);
-    if (along == 0.0)
-        return;
-    precise float share = 1.0 / along, u = dot(moment, edge_2) * share, v = dot(moment, edge_1) * share;
-    precise float way = hit.way + dot(facet, to_corner) * share;
-    hit.at = vec2(u, v);
-    hit.way = way;
+    vec3 edge_1 = primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
+    vec3 to_corner = fused(-hit.way, direction, primitives[hit.primitive].corner - origin);
+    vec3 moment = ordered_cross(to_corner, direction);
+    precise float share = 1.0 / ordered_dot(hit.facet, direction);
+    precise float way = hit.way + ordered_dot(hit.facet, to_corner) * share;
+    vec2 at = vec2(ordered_dot(moment, edge_2), ordered_dot(moment, edge_1)) * share;
+    if (is_finite(vec3(at, way)) && way > 0.0) { // not along the facet
+        hit.at = at;
+        hit.way = way;
+    }
 }
 
 // What the device has found in trees of its own, by our formulas, so that the paths agree to the last bits. At an

@@ -69,14 +69,17 @@ bool direction_of(uint pixel, vec2 within, out vec3 direction) {
     if (has_slopes)
         direction += stored_ray(first + ray_dimensions, 0.0) * within.x +
                      stored_ray(first + 2u * ray_dimensions, 0.0) * within.y;
-    direction = frame.world_from_camera * direction;
+    mat3 m = frame.world_from_camera;
+    precise vec3 in_world = m[0] * direction.x + m[1] * direction.y + m[2] * direction.z; // see ordered_dot()
+    direction = in_world;
     return sees;
 }
 
 uint srgb8(float linear) {
     // As arhost/shading/srgb8.hpp: the code that the exact formula rounds to.
     int bits = floatBitsToInt(clamp(linear, 1.0 / 8192.0, 1.0));
-    int cell = int(tables[FIRST_SRGB_CELL + uint((bits - (114 << 23)) >> 16)]);
+    uint number = min(uint((bits - (114 << 23)) >> 16), FIRST_LIGHT_OF_CODE - 1u); // of NaN, too
+    int cell = int(tables[FIRST_SRGB_CELL + number]);
     return uint((cell >> 17) + ((bits & 0xffff) >= (cell & 0x1ffff) ? 1 : 0));
 }
 
@@ -123,7 +126,8 @@ void write_pixel(uvec2 at) {
     image_pixels[at.y * frame.width + at.x] = pixel;
     if (pixel >> 24 == 0u)
         return;
-    ivec2 place = ivec2(at); // few pixels widen what is drawn already
+    // Few pixels widen what is drawn already; an old value that is read here costs a step that changes nothing.
+    ivec2 place = ivec2(at);
     if (place.x < drawn_x0)
         atomicMin(drawn_x0, place.x);
     if (place.y < drawn_y0)

@@ -63,8 +63,8 @@ Surface surface_at(Ray ray, Hit hit, bool bends) {
         geometric = objects[object].normal_transform * geometric;
         normal = objects[object].normal_transform * normal;
     }
-    if (has_textures && bends && materials[material].model == METALLIC_ROUGHNESS && materials[material].normal_texture != NONE &&
-        objects[object].first_texcoord != NONE)
+    if (has_textures && bends && materials[material].model == METALLIC_ROUGHNESS &&
+        materials[material].normal_texture != NONE && objects[object].first_texcoord != NONE)
         normal = bent(hit, geometric, normal);
 
     Surface s;

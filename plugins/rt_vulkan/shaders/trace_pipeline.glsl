@@ -10,11 +10,14 @@ layout(location = 0) rayPayloadEXT Found met;
 Hit trace(Ray ray, bool any, bool passes_backs) {
     if (!can_hit(ray))
         return no_hit(ray);
+    met.object = 0u; // of a hit by `any`, whose object is of no matter
     traceRayEXT(trees,
-                (any ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT) |
+                (any ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
                     (passes_backs ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),
                 ray.mask, 0, 0, 0, ray.origin, 0.0, ray.direction, ray.end, 0);
     if (met.object == FOUND_NOTHING)
         return no_hit(ray);
+    if (any)
+        return Hit(ray.end, vec2(0.0), vec3(0.0), met.object, 0u);
     return hit_of(ray, met.object, objects[met.object].root + met.number, met.way, met.at);
 }

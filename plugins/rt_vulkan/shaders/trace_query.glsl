@@ -34,6 +34,8 @@ Hit trace(Ray ray, bool any, bool passes_backs) {
     if (type == gl_RayQueryCommittedIntersectionNoneEXT)
         return no_hit(ray);
     uint object = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+    if (any)
+        return Hit(ray.end, vec2(0.0), vec3(0.0), object, 0u);
     vec2 at = vec2(0.0);
     if (type == gl_RayQueryCommittedIntersectionTriangleEXT)
         at = rayQueryGetIntersectionBarycentricsEXT(query, true);

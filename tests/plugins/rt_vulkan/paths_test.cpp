@@ -30,7 +30,9 @@ TEST_P(SamePictureByPath, AsThePlainPathGives) {
         // Which of two facets is hit where they meet, or lie in one plane, each device decides in its own way.
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
-        if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
+        if (traced.plugin().log().find("llvmpipe") != std::string::npos) {
+            EXPECT_EQ(like.squares, 0) << like; // it rounds as we write
+        } else if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
             EXPECT_GE(like.psnr(), 45) << like;
         }
         shown += like.inside;
