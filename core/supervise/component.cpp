@@ -18,6 +18,13 @@ bool may_answer(arhost_kind kind, arhost_status status) {
     return status == ARHOST_OK || (status < 0 && status >= ARHOST_ERROR_INTERNAL);
 }
 
+// A new process may mend these: it opens its device anew, and has taken no memory yet. The host starts a source anew
+// after any error, and gives a sink up.
+bool calls_for_new_process(arhost_kind kind, arhost_status status) {
+    return (kind == ARHOST_KIND_TRACKER || kind == ARHOST_KIND_RAYTRACER) &&
+           (status == ARHOST_ERROR_DEVICE_LOST || status == ARHOST_ERROR_OUT_OF_MEMORY);
+}
+
 } // namespace
 
 RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
@@ -211,6 +218,8 @@ void Component::on_result(const Result &result) {
         return process_->end("broke the contract: it answered what it was not asked");
     if (!may_answer(description_.kind, result.status))
         return process_->end("broke the contract: its status is " + std::to_string(result.status));
+    if (calls_for_new_process(description_.kind, result.status))
+        return process_->end(status_text(result.status)); // unanswered, as where it had died
     const Command command = in_flight_.front();
     in_flight_.pop_front();
     watch_frame();

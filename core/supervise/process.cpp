@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <cstring>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -39,8 +40,9 @@ const char *to_text(Call call) {
     return "in an unknown call";
 }
 
-void signal_process(const base::UniqueFd &pidfd, int signal) {
-    ::syscall(SYS_pidfd_send_signal, pidfd.get(), signal, nullptr, 0);
+// False where it is no process (arhost-inprocess).
+bool signal_process(const base::UniqueFd &pidfd, int signal) {
+    return ::syscall(SYS_pidfd_send_signal, pidfd.get(), signal, nullptr, 0) == 0 || errno != EBADF;
 }
 
 } // namespace
@@ -99,7 +101,10 @@ void Process::end(const std::string &reason) {
     if (!end_reason_.empty())
         return;
     end_reason_ = reason;
-    signal_process(spawned_.pidfd, SIGABRT);
+    if (!signal_process(spawned_.pidfd, SIGABRT)) { // a thread ends when it finds its host gone
+        ::shutdown(spawned_.channel.fd(), SHUT_RDWR);
+        wake(host_page_.as<HostPage>().wake);
+    }
     kill_deadline_ =
         context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(100), [this] { kill_now(); });
 }

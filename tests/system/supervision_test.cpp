@@ -254,6 +254,37 @@ TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
+// A new process opens the device anew, and has memory: only a frame that brings it about each time goes without.
+class FailureThatCallsForANewWorker : public testing::TestWithParam<std::pair<arhost_status, const char *>> {};
+INSTANTIATE_TEST_SUITE_P(Statuses, FailureThatCallsForANewWorker,
+                         testing::Values(std::pair(ARHOST_ERROR_DEVICE_LOST, "device lost"),
+                                         std::pair(ARHOST_ERROR_OUT_OF_MEMORY, "out of memory")));
+
+TEST_P(FailureThatCallsForANewWorker, GetsOne) {
+    const std::string error = ", error: " + std::to_string(GetParam().first);
+    ArhostRun run(counting("lockstep", "frames: 40", "error_at: 15" + error, "error_at: 25" + error));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    expect_all_frames_in_order(run, 40);
+    EXPECT_THAT(run.output(),
+                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 15; starting it")));
+    EXPECT_THAT(run.output(),
+                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 25; starting it")));
+    for (const CountedLine &line : counted(run))
+        EXPECT_EQ(line.overlay == "none", line.sequence == 15 || line.sequence == 25) << line.sequence;
+    for (const char *component : {"tracker", "raytracer"})
+        EXPECT_EQ(run.stats()["restarts"][component], 2) << component << ": the frame is tried once more";
+}
+
+TEST_P(FailureThatCallsForANewWorker, AtEachFrameIsGivenUp) {
+    ArhostRun run(counting("lockstep", "frames: 40", "", "answer: " + std::to_string(GetParam().first),
+                           "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1) << run.output();
+    expect_all_frames_in_order(run, 40);
+    EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
+}
+
 TEST(Supervision, ATrackerThatReportsNonsenseIsEnded) {
     ArhostRun run(counting("lockstep", "frames: 30", "nan_at: 15", ""));
     run.write("scene.yaml", small_scene);

@@ -49,3 +49,13 @@ TEST(InProcess, ReportsAPluginThatRefusesLikeArhost) {
     EXPECT_THAT(run.read("said.txt"), HasSubstr("run.yaml:5:"));
     EXPECT_THAT(run.read("said.txt"), HasSubstr("refused, as the option 'refuse' asks"));
 }
+
+// Threads can't be killed; one that waits for its next frame ends all the same.
+TEST(InProcess, StartsAPluginAnewWhoseDeviceIsLost) {
+    ArhostRun run(counting("lockstep", "frames: 30", "", "error_at: 20, error: -6"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    EXPECT_EQ(counted(run).size(), 30u);
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 29) << "the frame is tried once more";
+    EXPECT_EQ(run.stats()["restarts"]["raytracer"], 2);
+}

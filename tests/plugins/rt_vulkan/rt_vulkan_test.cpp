@@ -243,7 +243,8 @@ TEST_P(EachPath, TakesOneSceneAfterAnother) {
     const rt_vulkan::Instance instance(host, false);
     const auto devices = instance.devices();
     const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
-    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, GetParam())[0]);
+    const auto shaders =
+        rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, GetParam())[0]);
     const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
         scene::Arena arena = std::move(scene).build();
         const arhost_raytracer_setup setup{sizeof setup,   small.width,     small.height, 0,

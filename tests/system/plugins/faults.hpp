@@ -22,6 +22,7 @@ namespace arhost::test {
         option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                  \
         option(ARHOST_OPTION_BOOL, "ignore_abort", "false", "Ignores SIGABRT"),                                      \
         option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),               \
+        option(ARHOST_OPTION_INTEGER, "error", "-8", "Which: its status"),                                           \
         option(ARHOST_OPTION_INTEGER, "close_control_at", "-1", "Closes descriptor 3 at this frame; -1: never"),     \
         option(ARHOST_OPTION_INTEGER, "fork_at", "-1", "Leaves two children behind, listed in children.txt"),        \
         option(ARHOST_OPTION_REAL, "delay_ms", "0", "Sleeps so long in each frame, in ms", 0, 60000)
@@ -31,6 +32,7 @@ public:
     explicit Faults(const Options &options)
         : crash_at_(options.integer("crash_at")), exit_at_(options.integer("exit_at")),
           hang_at_(options.integer("hang_at")), error_at_(options.integer("error_at")),
+          error_(static_cast<arhost_status>(options.integer("error"))),
           close_control_at_(options.integer("close_control_at")), fork_at_(options.integer("fork_at")),
           delay_ms_(options.real("delay_ms")) {
         if (options.boolean("ignore_abort"))
@@ -53,7 +55,7 @@ public:
         if (frame == fork_at_)
             leave_children();
         if (misbehave_if_asked() || frame == error_at_)
-            throw Failure(ARHOST_ERROR_INTERNAL, "an error, as asked for");
+            throw Failure(error_, "an error, as asked for");
         if (delay_ms_ > 0)
             std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(delay_ms_));
     }
@@ -83,7 +85,9 @@ private:
         std::ofstream("children.txt") << pids << std::flush;
     }
 
-    std::int64_t crash_at_, exit_at_, hang_at_, error_at_, close_control_at_, fork_at_;
+    std::int64_t crash_at_, exit_at_, hang_at_, error_at_;
+    arhost_status error_;
+    std::int64_t close_control_at_, fork_at_;
     double delay_ms_;
 };
 

@@ -16,7 +16,7 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int64_t crash_at, hang_at, hang_until, error_at, answer;
+    int64_t crash_at, hang_at, hang_until, error_at, error, answer;
     double delay_ms;
     int64_t writes_later, device_time_ns;
     uint8_t *last; /* image */
@@ -33,6 +33,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->hang_at = arhost_find_option(options, option_count, "hang_at")->integer;
     self->hang_until = arhost_find_option(options, option_count, "hang_until")->integer;
     self->error_at = arhost_find_option(options, option_count, "error_at")->integer;
+    self->error = arhost_find_option(options, option_count, "error")->integer;
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
@@ -73,7 +74,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     while (number == self->hang_at || (number > self->hang_at && number < self->hang_until))
         pause();
     if (misbehave_if_asked() || number == self->error_at)
-        return ARHOST_ERROR_INTERNAL;
+        return (arhost_status)self->error;
     if (self->delay_ms > 0) {
         struct timespec time = {0, 0};
         time.tv_sec = (time_t)(self->delay_ms / 1000.0);
@@ -109,6 +110,7 @@ static const arhost_option_descriptor options[] = {
      "Never returns from this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
      "Returns an error for this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL, "Which: its status"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "The status of each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL,
      "Sleeps so long in each frame"},

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A Vulkan layer that passes everything on to the driver, until it is to fail. ARHOST_TEST_VULKAN_FAILS, which is
+// read at each such call, says when:
+//   submit:N    at a device's Nth vkQueueSubmit it is lost, and stays so
+//   wait:N      at its Nth vkWaitForFences it is, when the work is done
+//   allocate:N  from its Nth vkAllocateMemory on it has no memory left
+#include <vulkan/vk_layer.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <string>
+
+namespace {
+
+struct NextInstance {
+    VkInstance handle;
+    PFN_vkGetInstanceProcAddr get;
+    PFN_vkDestroyInstance destroy; // later on loaders may answer with the first layer's
+};
+struct NextDevice {
+    VkDevice handle;
+    PFN_vkGetDeviceProcAddr get;
+    std::uint64_t submits = 0, waits = 0, allocations = 0;
+    bool lost = false;
+};
+
+std::mutex mutex;
+std::map<void *, NextInstance> instances; // by what the handles of all that is an instance's begin with
+std::map<void *, NextDevice> devices;
+
+void *key_of(const void *handle) {
+    return *static_cast<void *const *>(handle);
+}
+
+template <class Function> Function next(VkInstance instance, PFN_vkGetInstanceProcAddr get, const char *name) {
+    return reinterpret_cast<Function>(get(instance, name));
+}
+template <class Function> Function next(const NextDevice &device, const char *name) {
+    return reinterpret_cast<Function>(device.get(device.handle, name));
+}
+
+// Whether this call, the `count`th of `what`, is to fail.
+bool fails(const char *what, std::uint64_t count) {
+    const char *told = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    const std::string begin = std::string(what) + ":";
+    return told && !std::strncmp(told, begin.c_str(), begin.size()) &&
+           count >= std::strtoull(told + begin.size(), nullptr, 10);
+}
+
+// The loader's own link in a create info's chain, where the next layer or the driver is named.
+template <class Link> Link *link_of(const void *chain, VkStructureType type) {
+    for (auto *info = static_cast<const Link *>(chain); info; info = static_cast<const Link *>(info->pNext))
+        if (info->sType == type && info->function == VK_LAYER_LINK_INFO)
+            return const_cast<Link *>(info); // the interface asks layers to move it on
+    return nullptr;
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
+                                               const VkAllocationCallbacks *allocator, VkInstance *instance) {
+    auto *link = link_of<VkLayerInstanceCreateInfo>(info->pNext, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO);
+    if (!link)
+        return VK_ERROR_INITIALIZATION_FAILED;
+    const PFN_vkGetInstanceProcAddr get = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
+    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
+    const VkResult result =
+        next<PFN_vkCreateInstance>(VK_NULL_HANDLE, get, "vkCreateInstance")(info, allocator, instance);
+    if (result == VK_SUCCESS) {
+        const std::lock_guard lock(mutex);
+        instances[key_of(*instance)] = {*instance, get,
+                                        next<PFN_vkDestroyInstance>(*instance, get, "vkDestroyInstance")};
+    }
+    return result;
+}
+
+VKAPI_ATTR void VKAPI_CALL destroy_instance(VkInstance instance, const VkAllocationCallbacks *allocator) {
+    if (!instance)
+        return;
+    std::unique_lock lock(mutex);
+    const auto known = instances.extract(key_of(instance));
+    lock.unlock();
+    known.mapped().destroy(instance, allocator);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const VkDeviceCreateInfo *info,
+                                             const VkAllocationCallbacks *allocator, VkDevice *device) {
+    auto *link = link_of<VkLayerDeviceCreateInfo>(info->pNext, VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO);
+    if (!link)
+        return VK_ERROR_INITIALIZATION_FAILED;
+    const VkLayerDeviceLink down = *link->u.pLayerInfo;
+    link->u.pLayerInfo = down.pNext;
+    std::unique_lock lock(mutex);
+    const VkInstance instance = instances.at(key_of(physical)).handle;
+    lock.unlock();
+    const VkResult result = next<PFN_vkCreateDevice>(instance, down.pfnNextGetInstanceProcAddr,
+                                                     "vkCreateDevice")(physical, info, allocator, device);
+    lock.lock();
+    if (result == VK_SUCCESS)
+        devices[key_of(*device)] = {*device, down.pfnNextGetDeviceProcAddr};
+    return result;
+}
+
+VKAPI_ATTR void VKAPI_CALL destroy_device(VkDevice device, const VkAllocationCallbacks *allocator) {
+    if (!device)
+        return;
+    std::unique_lock lock(mutex);
+    const auto known = devices.extract(key_of(device));
+    lock.unlock();
+    next<PFN_vkDestroyDevice>(known.mapped(), "vkDestroyDevice")(device, allocator);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL queue_submit(VkQueue queue, std::uint32_t count, const VkSubmitInfo *submits,
+                                            VkFence fence) {
+    const std::lock_guard lock(mutex);
+    NextDevice &device = devices.at(key_of(queue));
+    device.lost = device.lost || fails("submit", ++device.submits);
+    return device.lost ? VK_ERROR_DEVICE_LOST
+                       : next<PFN_vkQueueSubmit>(device, "vkQueueSubmit")(queue, count, submits, fence);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice handle, std::uint32_t count, const VkFence *fences,
+                                               VkBool32 all, std::uint64_t timeout_ns) {
+    const std::lock_guard lock(mutex);
+    NextDevice &device = devices.at(key_of(handle));
+    if (device.lost)
+        return VK_ERROR_DEVICE_LOST;
+    // The driver knows of no loss: what it works on must not be destroyed before it has done it.
+    const VkResult result =
+        next<PFN_vkWaitForFences>(device, "vkWaitForFences")(handle, count, fences, all, timeout_ns);
+    device.lost = fails("wait", ++device.waits);
+    return device.lost ? VK_ERROR_DEVICE_LOST : result;
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL allocate_memory(VkDevice handle, const VkMemoryAllocateInfo *info,
+                                               const VkAllocationCallbacks *allocator, VkDeviceMemory *memory) {
+    const std::lock_guard lock(mutex);
+    NextDevice &device = devices.at(key_of(handle));
+    return fails("allocate", ++device.allocations)
+               ? VK_ERROR_OUT_OF_DEVICE_MEMORY
+               : next<PFN_vkAllocateMemory>(device, "vkAllocateMemory")(handle, info, allocator, memory);
+}
+
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device_function(VkDevice device, const char *name);
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance_function(VkInstance instance, const char *name);
+
+PFN_vkVoidFunction own(const char *name, bool of_instance) {
+    const struct {
+        const char *name;
+        PFN_vkVoidFunction function;
+        bool of_instance;
+    } all[] = {
+        {"vkGetInstanceProcAddr", reinterpret_cast<PFN_vkVoidFunction>(get_instance_function), true},
+        {"vkCreateInstance", reinterpret_cast<PFN_vkVoidFunction>(create_instance), true},
+        {"vkDestroyInstance", reinterpret_cast<PFN_vkVoidFunction>(destroy_instance), true},
+        {"vkCreateDevice", reinterpret_cast<PFN_vkVoidFunction>(create_device), true},
+        {"vkGetDeviceProcAddr", reinterpret_cast<PFN_vkVoidFunction>(get_device_function), false},
+        {"vkDestroyDevice", reinterpret_cast<PFN_vkVoidFunction>(destroy_device), false},
+        {"vkQueueSubmit", reinterpret_cast<PFN_vkVoidFunction>(queue_submit), false},
+        {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(wait_for_fences), false},
+        {"vkAllocateMemory", reinterpret_cast<PFN_vkVoidFunction>(allocate_memory), false},
+    };
+    for (const auto &one : all)
+        if ((of_instance || !one.of_instance) && !std::strcmp(one.name, name))
+            return one.function;
+    return nullptr;
+}
+
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device_function(VkDevice device, const char *name) {
+    if (const PFN_vkVoidFunction function = own(name, false))
+        return function;
+    const std::lock_guard lock(mutex);
+    return devices.at(key_of(device)).get(device, name);
+}
+
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance_function(VkInstance instance, const char *name) {
+    if (const PFN_vkVoidFunction function = own(name, true))
+        return function;
+    if (!instance)
+        return nullptr;
+    const std::lock_guard lock(mutex);
+    return instances.at(key_of(instance)).get(instance, name);
+}
+
+} // namespace
+
+extern "C" VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
+vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *interface) {
+    if (interface->sType != LAYER_NEGOTIATE_INTERFACE_STRUCT || interface->loaderLayerInterfaceVersion < 2)
+        return VK_ERROR_INITIALIZATION_FAILED;
+    interface->loaderLayerInterfaceVersion = 2;
+    interface->pfnGetInstanceProcAddr = get_instance_function;
+    interface->pfnGetDeviceProcAddr = get_device_function;
+    interface->pfnGetPhysicalDeviceProcAddr = nullptr;
+    return VK_SUCCESS;
+}
