@@ -78,6 +78,9 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     component.policy.mode = shared.sandbox;
     component.policy.memory_bytes =
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
+    if (component.policy.memory_bytes && component.policy.allows("gpu"))
+        node.require("memory_mb")
+            .fail("can't be kept with 'allow: [gpu]', as drivers map what they like; leave one of the two out");
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
     return component;

@@ -89,8 +89,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
     for (const supervise::Component *component : components) {
         json["restarts"][component->name()] = component->restarts();
         for (const supervise::Component::Crash &crash : component->crashes()) {
-            Json entry = {
-                {"component", component->name()}, {"plugin", component->description().id}, {"how", crash.how}};
+            Json entry = {{"component", component->name()}, {"plugin", crash.plugin}, {"how", crash.how}};
             if (crash.frame != supervise::Component::Crash::no_frame)
                 entry["frame"] = crash.frame;
             entry["log_tail"] = crash.log_tail;

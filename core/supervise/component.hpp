@@ -62,6 +62,7 @@ public:
     };
 
     struct Crash {
+        std::string plugin; // its id, or its file's name where it had not said that
         std::string how, log_tail;
         std::uint64_t frame; // that it was working on; no_frame where on none
         static constexpr std::uint64_t no_frame = ~std::uint64_t(0);

@@ -69,11 +69,23 @@ Device::Device(const Instance &instance, const PhysicalDevice &physical, Path pa
     info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
     check(from.vkCreateDevice(physical.handle, &info, nullptr, &device_), "opening the Vulkan device");
+    const auto refuse = [&](const char *name) {
+        if (functions_.vkDestroyDevice)
+            functions_.vkDestroyDevice(device_, nullptr);
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      "the driver of the Vulkan device '" + physical.name + "' lacks " + name + "; install it again");
+    };
     const auto load = [&](const char *name) { return from.vkGetDeviceProcAddr(device_, name); };
-#define RT_VULKAN_LOAD(name) functions_.name = reinterpret_cast<PFN_##name>(load(#name));
+#define RT_VULKAN_LOAD(name)                                                                                         \
+    functions_.name = reinterpret_cast<PFN_##name>(load(#name));                                                     \
+    if (!functions_.name)                                                                                            \
+        refuse(#name);
     RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_LOAD)
     if (path != Path::plain) {
         RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_LOAD)
+    }
+    if (path == Path::pipeline) {
+        RT_VULKAN_PIPELINE_FUNCTIONS(RT_VULKAN_LOAD)
     }
     if (physical.imports_host_memory) {
         RT_VULKAN_LOAD(vkGetMemoryHostPointerPropertiesEXT)

@@ -35,12 +35,16 @@ namespace rt_vulkan {
     use(vkGetBufferDeviceAddress) use(vkCreateAccelerationStructureKHR) use(vkDestroyAccelerationStructureKHR)       \
         use(vkGetAccelerationStructureBuildSizesKHR) use(vkGetAccelerationStructureDeviceAddressKHR)                 \
             use(vkCmdBuildAccelerationStructuresKHR) use(vkCmdCopyAccelerationStructureKHR)                          \
-                use(vkCmdWriteAccelerationStructuresPropertiesKHR) use(vkCreateRayTracingPipelinesKHR)               \
-                    use(vkGetRayTracingShaderGroupHandlesKHR) use(vkCmdTraceRaysKHR)
+                use(vkCmdWriteAccelerationStructuresPropertiesKHR)
+
+// Of the pipeline path; NULL on the others.
+#define RT_VULKAN_PIPELINE_FUNCTIONS(use)                                                                            \
+    use(vkCreateRayTracingPipelinesKHR) use(vkGetRayTracingShaderGroupHandlesKHR) use(vkCmdTraceRaysKHR)
 
 struct DeviceFunctions {
     RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_DECLARE)
     RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_DECLARE)
+    RT_VULKAN_PIPELINE_FUNCTIONS(RT_VULKAN_DECLARE)
     PFN_vkGetMemoryHostPointerPropertiesEXT vkGetMemoryHostPointerPropertiesEXT; // NULL: it can't import
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
 
@@ -50,6 +51,41 @@ std::string list_of(const std::vector<PhysicalDevice> &devices) {
     for (std::size_t i = 0; i < devices.size(); ++i)
         text += (i ? ", " : "") + std::to_string(i) + " '" + devices[i].name + "' (" + devices[i].uuid + ")";
     return text;
+}
+
+const char *name_of(VkResult result) {
+    switch (result) {
+#define RT_VULKAN_NAME(name)                                                                                         \
+    case name:                                                                                                       \
+        return #name;
+        RT_VULKAN_NAME(VK_ERROR_DEVICE_LOST)
+        RT_VULKAN_NAME(VK_ERROR_OUT_OF_HOST_MEMORY)
+        RT_VULKAN_NAME(VK_ERROR_OUT_OF_DEVICE_MEMORY)
+        RT_VULKAN_NAME(VK_ERROR_INITIALIZATION_FAILED)
+        RT_VULKAN_NAME(VK_ERROR_MEMORY_MAP_FAILED)
+        RT_VULKAN_NAME(VK_ERROR_LAYER_NOT_PRESENT)
+        RT_VULKAN_NAME(VK_ERROR_EXTENSION_NOT_PRESENT)
+        RT_VULKAN_NAME(VK_ERROR_FEATURE_NOT_PRESENT)
+        RT_VULKAN_NAME(VK_ERROR_INCOMPATIBLE_DRIVER)
+        RT_VULKAN_NAME(VK_ERROR_TOO_MANY_OBJECTS)
+        RT_VULKAN_NAME(VK_ERROR_FRAGMENTED_POOL)
+        RT_VULKAN_NAME(VK_ERROR_UNKNOWN)
+        RT_VULKAN_NAME(VK_ERROR_OUT_OF_POOL_MEMORY)
+        RT_VULKAN_NAME(VK_ERROR_FRAGMENTATION)
+#undef RT_VULKAN_NAME
+    default:
+        return "an error without a name";
+    }
+}
+
+// "; VK_DRIVER_FILES is …" where a variable tells the loader which drivers there are.
+std::string told_by_environment() {
+    for (const char *variable : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
+        if (const char *files = std::getenv(variable))
+            return std::string("; ") + variable + " is '" + files +
+                   "': only drivers that these files name are looked for, and in the sandbox where 'reads' lists "
+                   "them";
+    return "";
 }
 
 // The better, the higher.
@@ -146,25 +182,26 @@ void check(VkResult result, const char *what) {
     if (result >= 0)
         return;
     const std::string text = std::string(what) + ": Vulkan reports ";
+    const std::string name = std::string(" (") + name_of(result) + ", " + std::to_string(result) + ")";
     switch (result) {
     case VK_ERROR_DEVICE_LOST:
-        throw Failure(ARHOST_ERROR_DEVICE_LOST, text + "that the device is lost (VK_ERROR_DEVICE_LOST)");
+        throw Failure(ARHOST_ERROR_DEVICE_LOST, text + "that the device is lost" + name);
     case VK_ERROR_OUT_OF_HOST_MEMORY:
-        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory");
+        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory" + name);
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory" + name +
+                                                      "; use smaller meshes and textures, or rt_embree");
     case VK_ERROR_INITIALIZATION_FAILED:
     case VK_ERROR_EXTENSION_NOT_PRESENT:
     case VK_ERROR_FEATURE_NOT_PRESENT:
     case VK_ERROR_INCOMPATIBLE_DRIVER:
-        throw Failure(
-            ARHOST_ERROR_UNSUPPORTED,
-            text + "error " + std::to_string(result) +
-                ": the driver can't do it here; look whether its devices (/dev/dri, /dev/nvidia*) are there "
-                "and may be opened, or use rt_embree");
-    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
-        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory: use smaller meshes and "
-                                                         "textures, or rt_embree");
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      text + "that it can't" + name +
+                          "; look whether the driver's devices (/dev/dri, /dev/nvidia*) are "
+                          "there and may be opened, or use another device or rt_embree");
     default:
-        throw Failure(ARHOST_ERROR_INTERNAL, text + "error " + std::to_string(result));
+        throw Failure(ARHOST_ERROR_INTERNAL,
+                      text + "an error" + name + "; update the driver, or use another device or rt_embree");
     }
 }
 
@@ -181,7 +218,10 @@ Instance::Instance(const arhost::Host &host, bool validate, const std::string &l
     if (!get_)
         throw Failure(ARHOST_ERROR_UNSUPPORTED, loader + " is no Vulkan loader: it lacks vkGetInstanceProcAddr");
     create(validate);
-#define RT_VULKAN_LOAD(name) functions_.name = reinterpret_cast<PFN_##name>(get_(instance_, #name));
+#define RT_VULKAN_LOAD(name)                                                                                         \
+    functions_.name = reinterpret_cast<PFN_##name>(get_(instance_, #name));                                          \
+    if (!functions_.name)                                                                                            \
+        throw Failure(ARHOST_ERROR_UNSUPPORTED, loader + " lacks " #name "; install the Vulkan loader again");
     RT_VULKAN_INSTANCE_FUNCTIONS(RT_VULKAN_LOAD)
 #undef RT_VULKAN_LOAD
     if (validate && !add_messenger()) {
@@ -243,7 +283,19 @@ void Instance::create(bool validate) {
     const auto create_instance = reinterpret_cast<PFN_vkCreateInstance>(get_(nullptr, "vkCreateInstance"));
     const VkResult result = create_instance(&info, nullptr, &instance_);
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER || result == VK_ERROR_INITIALIZATION_FAILED)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan driver: ") + get_driver);
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      std::string("no Vulkan driver: ") + get_driver + told_by_environment());
+    if (result == VK_ERROR_LAYER_NOT_PRESENT || (validate && result == VK_ERROR_EXTENSION_NOT_PRESENT))
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      "option 'validate': Vulkan's validation layers can't be loaded; install "
+                      "them again (Debian: vulkan-validationlayers) or leave the option out");
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders say so of garbage, too
+        throw Failure(
+            ARHOST_ERROR_UNSUPPORTED,
+            "Vulkan can't be started (VK_ERROR_OUT_OF_HOST_MEMORY): no memory is left, or a file that names a "
+            "driver or layer is damaged; look through vulkan/ in /usr/share and /etc and what VK_LAYER_PATH "
+            "names, or use rt_embree" +
+                told_by_environment());
     check(result, "making a Vulkan instance");
 }
 
@@ -260,8 +312,9 @@ std::vector<PhysicalDevice> Instance::devices() const {
     std::vector<VkPhysicalDevice> handles(count);
     if (result == VK_SUCCESS && count > 0)
         result = functions_.vkEnumeratePhysicalDevices(instance_, &count, handles.data());
-    if (result == VK_ERROR_INITIALIZATION_FAILED || count == 0)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan device: ") + get_driver);
+    if (result == VK_ERROR_INITIALIZATION_FAILED || (result == VK_SUCCESS && count == 0))
+        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+                      std::string("no Vulkan device: ") + get_driver + told_by_environment());
     check(result, "listing the Vulkan devices");
     handles.resize(count);
     std::vector<PhysicalDevice> devices;
@@ -336,22 +389,20 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     };
     std::string uuid = lower(wanted);
     std::erase(uuid, '-');
-    const bool is_number = !wanted.empty() && wanted.size() < 10 &&
-                           std::all_of(wanted.begin(), wanted.end(), [](unsigned char c) { return std::isdigit(c); });
-    const PhysicalDevice *chosen = nullptr;
+    std::vector<const PhysicalDevice *> whole, part; // whose number, UUID or name it is; whose name holds it
     for (std::size_t i = 0; i < devices.size(); ++i) {
-        const bool is_meant =
-            is_number ? std::stoul(wanted) == i
-                      : devices[i].uuid == uuid ||
-                            (!wanted.empty() && lower(devices[i].name).find(lower(wanted)) != std::string::npos);
-        if (is_meant && chosen)
-            refuse("more than one device is called");
-        if (is_meant)
-            chosen = &devices[i];
+        const std::string name = lower(devices[i].name);
+        if (wanted == std::to_string(i) || devices[i].uuid == uuid || name == lower(wanted))
+            whole.push_back(&devices[i]);
+        else if (!wanted.empty() && name.find(lower(wanted)) != std::string::npos)
+            part.push_back(&devices[i]);
     }
-    if (!chosen)
+    const auto &meant = whole.empty() ? part : whole;
+    if (meant.size() > 1)
+        refuse("more than one device is called");
+    if (meant.empty())
         refuse("no device is");
-    return *chosen;
+    return *meant[0];
 }
 
 std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted) {

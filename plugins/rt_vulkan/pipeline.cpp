@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>
@@ -26,15 +27,24 @@ constexpr const char *pipeline_files[] = {"pipeline.rgen", "pipeline.rmiss", "pi
 // Where the driver's compiled shaders are kept; empty: nowhere.
 std::filesystem::path pipeline_cache_file() {
     const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
-    return caches && *caches ? std::filesystem::path(caches) / "rt_vulkan.pipelines" : std::filesystem::path();
+    // A relative one is to be ignored (XDG Base Directory Specification).
+    return caches && *caches == '/' ? std::filesystem::path(caches) / "rt_vulkan.pipelines" : std::filesystem::path();
 }
 
+// Empty where there is no such file, or it is too large to be what it should.
 std::vector<char> contents(const std::filesystem::path &file) {
-    std::error_code ignored;
-    if (!std::filesystem::is_regular_file(file, ignored)) // reading a folder would throw
+    constexpr std::uintmax_t most = std::uintmax_t{256} << 20;
+    std::error_code failed;
+    if (!std::filesystem::is_regular_file(file, failed)) // reading a folder would throw
         return {};
+    const std::uintmax_t size = std::filesystem::file_size(file, failed);
+    if (failed || size > most)
+        return {};
+    std::vector<char> bytes(size);
     std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
+    if (!stream.read(bytes.data(), static_cast<std::streamsize>(size)))
+        return {};
+    return bytes;
 }
 
 PipelineCache read_pipeline_cache(const Device &device) {
@@ -76,29 +86,67 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
         std::filesystem::remove(temporary, failed);
 }
 
-// A shader's words.
-std::vector<std::uint32_t> read_shader(const std::filesystem::path &file) {
-    constexpr std::uint32_t magic = 0x07230203, header_words = 5, end_of_function = 56;
+// What a shader's beginning says of it (SPIR-V 1.5, sections 2.3, 3.3 and 3.42).
+struct ShaderKind {
+    std::uint32_t model = ~0u; // SPIR-V's execution model, of the function `main`
+    bool asks_rays = false;    // its capability RayQueryKHR
+};
+
+// Throws where it is no whole SPIR-V: drivers crash on that.
+ShaderKind kind_of(const std::filesystem::path &file, std::span<const std::uint32_t> words, bool is_whole) {
+    constexpr std::uint32_t magic = 0x07230203, header_words = 5;
+    constexpr std::uint32_t entry_point = 15, capability = 17, end_of_function = 56, ray_query = 4472;
+    constexpr std::uint32_t main_words[] = {0x6e69616d, 0}; // "main", ended
+    ShaderKind kind;
+    // Its instructions must follow one another up to the last function's end.
+    std::size_t at = header_words;
+    std::uint32_t last = 0;
+    bool sound = is_whole && words.size() > header_words && words[0] == magic;
+    while (sound && at < words.size()) {
+        const std::uint32_t length = words[at] >> 16;
+        last = words[at] & 0xffff;
+        sound = length > 0 && length <= words.size() - at;
+        if (sound && last == entry_point && length >= 5 &&
+            std::equal(std::begin(main_words), std::end(main_words), &words[at + 3]))
+            kind.model = words[at + 1];
+        kind.asks_rays |= sound && last == capability && length == 2 && words[at + 1] == ray_query;
+        at += length;
+    }
+    if (!sound || last != end_of_function)
+        throw Failure(ARHOST_ERROR_CONFIGURATION,
+                      "the shader '" + file.string() + "' is damaged: no whole SPIR-V; install arhost again");
+    return kind;
+}
+
+std::uint32_t model_of(VkShaderStageFlagBits stage) {
+    switch (stage) {
+    case VK_SHADER_STAGE_RAYGEN_BIT_KHR:
+        return 5313;
+    case VK_SHADER_STAGE_INTERSECTION_BIT_KHR:
+        return 5314;
+    case VK_SHADER_STAGE_ANY_HIT_BIT_KHR:
+        return 5315;
+    case VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR:
+        return 5316;
+    case VK_SHADER_STAGE_MISS_BIT_KHR:
+        return 5317;
+    default:
+        return 5; // GLCompute
+    }
+}
+
+Shader read_shader(const std::filesystem::path &file, VkShaderStageFlagBits stage, Path path) {
     const std::vector<char> bytes = contents(file);
     if (bytes.empty())
         throw Failure(ARHOST_ERROR_CONFIGURATION,
                       "the shader '" + file.string() + "' is missing or can't be read; install arhost again");
     std::vector<std::uint32_t> words(bytes.size() / 4);
     std::memcpy(words.data(), bytes.data(), words.size() * 4);
-    // Drivers crash on what is no SPIR-V: its instructions must follow one another up to the last function's end.
-    std::size_t at = header_words;
-    std::uint32_t last = 0;
-    bool sound = bytes.size() % 4 == 0 && words.size() > header_words && words[0] == magic;
-    while (sound && at < words.size()) {
-        const std::uint32_t length = words[at] >> 16;
-        last = words[at] & 0xffff;
-        sound = length > 0 && length <= words.size() - at;
-        at += length;
-    }
-    if (!sound || last != end_of_function)
+    const ShaderKind kind = kind_of(file, words, bytes.size() % 4 == 0);
+    if (kind.model != model_of(stage) || kind.asks_rays != (path == Path::query))
         throw Failure(ARHOST_ERROR_CONFIGURATION,
-                      "the shader '" + file.string() + "' is damaged: no whole SPIR-V; install arhost again");
-    return words;
+                      "the shader '" + file.string() + "' is another one than its name says; install arhost again");
+    return {stage, std::move(words)};
 }
 
 } // namespace
@@ -118,7 +166,7 @@ VkPipelineStageFlags Shaders::pipeline_stage() const {
 Shaders read_shaders(const std::filesystem::path &folder, Path path) {
     Shaders shaders{path, {}};
     const auto read = [&](VkShaderStageFlagBits stage, const std::string &name) {
-        shaders.stages.push_back({stage, read_shader(folder / ("rt_vulkan_" + name + ".spv"))});
+        shaders.stages.push_back(read_shader(folder / ("rt_vulkan_" + name + ".spv"), stage, path));
     };
     if (path == Path::pipeline)
         for (std::size_t i = 0; i < std::size(pipeline_files); ++i)
@@ -143,8 +191,9 @@ ImagePipeline::ImagePipeline(const Device &device, const Shaders &shaders, VkPip
         module.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
         module.codeSize = shader.words.size() * sizeof shader.words[0];
         module.pCode = shader.words.data();
-        modules.push_back(make<ShaderModule, VkShaderModule>(device, device.functions().vkCreateShaderModule, module,
-                                                             "reading the shader"));
+        modules.push_back(
+            make<ShaderModule, VkShaderModule>(device, device.functions().vkCreateShaderModule, module,
+                                               "reading a shader (damaged rt_vulkan_*.spv beside the plugin?)"));
         VkPipelineShaderStageCreateInfo stage{};
         stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
         stage.stage = shader.stage;
@@ -170,7 +219,7 @@ void ImagePipeline::compile(const Shaders &shaders, std::span<const VkPipelineSh
         info.stage = stages[0];
         info.layout = layout_;
         check(vk.vkCreateComputePipelines(device_.handle(), cache.get(), 1, &info, nullptr, &pipeline),
-              "compiling the shader");
+              "compiling the shader (damaged rt_vulkan_*.spv beside the plugin?)");
     } else {
         const auto group = [](VkRayTracingShaderGroupTypeKHR type, std::uint32_t general, std::uint32_t nearest,
                               std::uint32_t any, std::uint32_t intersection) {
@@ -200,7 +249,7 @@ void ImagePipeline::compile(const Shaders &shaders, std::span<const VkPipelineSh
         info.layout = layout_;
         check(vk.vkCreateRayTracingPipelinesKHR(device_.handle(), VK_NULL_HANDLE, cache.get(), 1, &info, nullptr,
                                                 &pipeline),
-              "compiling the shaders");
+              "compiling the shaders (damaged rt_vulkan_*.spv beside the plugin?)");
     }
     pipeline_ = Pipeline(device_, pipeline);
 }

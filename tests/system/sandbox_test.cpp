@@ -361,6 +361,15 @@ TEST(Sandbox, APluginForWhichItsMemoryIsTooSmallIsToldSo) {
     EXPECT_THAT(run.output(), HasSubstr("'memory_mb' may be too small"));
 }
 
+TEST(Sandbox, RefusesALimitOfMemoryThatADriverWouldNotKeep) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
+                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 100, allow: [gpu]}\n"
+                  "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
+    EXPECT_THAT(run.output(), HasSubstr("memory_mb: can't be kept with 'allow: [gpu]'"));
+}
+
 // Whatever changes between a check and a use. A wrong pose may be among it, which nothing can tell from a right one.
 TEST(Sandbox, ThreadsThatChangeRingsAndSlotsDoNotHarmTheHost) {
     for (int i = 0; i < 3; ++i) {

@@ -312,6 +312,8 @@ TEST(Supervision, TheFallbackTakesOverFromAPluginThatIsGivenUp) {
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("falling back to rt_counter"));
     expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_embree"}), 0) << run.output();
+    EXPECT_EQ(run.stats()["crashes"][0]["plugin"], "rt_counter") << "the one that crashed";
 }
 
 TEST(Supervision, AnyWorkerMayBeKilledAndTheResultIsTheSame) {

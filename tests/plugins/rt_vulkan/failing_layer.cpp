@@ -5,6 +5,10 @@
 //   submit:N    at a device's Nth vkQueueSubmit it is lost, and stays so
 //   wait:N      at its Nth vkWaitForFences it is, when the work is done
 //   allocate:N  from its Nth vkAllocateMemory on it has no memory left
+//   pipelines:N it makes no Nth pipeline for ray tracing, nor later ones
+//   device-with:EXTENSION  it can't be opened with that
+// Where ARHOST_TEST_VULKAN_IS_A_GPU is "query" or "pipeline", all devices say that they are discrete GPUs, and lack
+// the extensions of later paths.
 #include <vulkan/vk_layer.h>
 
 #include <cstdint>
@@ -19,12 +23,15 @@ namespace {
 struct NextInstance {
     VkInstance handle;
     PFN_vkGetInstanceProcAddr get;
-    PFN_vkDestroyInstance destroy; // later on loaders may answer with the first layer's
+    // Later on loaders may answer with the first layer's.
+    PFN_vkDestroyInstance destroy;
+    PFN_vkGetPhysicalDeviceProperties2 get_properties;
+    PFN_vkEnumerateDeviceExtensionProperties list_extensions;
 };
 struct NextDevice {
     VkDevice handle;
     PFN_vkGetDeviceProcAddr get;
-    std::uint64_t submits = 0, waits = 0, allocations = 0;
+    std::uint64_t submits = 0, waits = 0, allocations = 0, pipelines = 0;
     bool lost = false;
 };
 
@@ -51,6 +58,11 @@ bool fails(const char *what, std::uint64_t count) {
            count >= std::strtoull(told + begin.size(), nullptr, 10);
 }
 
+bool fails_with(const char *extension) {
+    const char *told = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    return told && told == std::string("device-with:") + extension;
+}
+
 // The loader's own link in a create info's chain, where the next layer or the driver is named.
 template <class Link> Link *link_of(const void *chain, VkStructureType type) {
     for (auto *info = static_cast<const Link *>(chain); info; info = static_cast<const Link *>(info->pNext))
@@ -70,8 +82,11 @@ VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
         next<PFN_vkCreateInstance>(VK_NULL_HANDLE, get, "vkCreateInstance")(info, allocator, instance);
     if (result == VK_SUCCESS) {
         const std::lock_guard lock(mutex);
-        instances[key_of(*instance)] = {*instance, get,
-                                        next<PFN_vkDestroyInstance>(*instance, get, "vkDestroyInstance")};
+        const auto ask = [&](const char *name) { return get(*instance, name); };
+        instances[key_of(*instance)] = {
+            *instance, get, reinterpret_cast<PFN_vkDestroyInstance>(ask("vkDestroyInstance")),
+            reinterpret_cast<PFN_vkGetPhysicalDeviceProperties2>(ask("vkGetPhysicalDeviceProperties2")),
+            reinterpret_cast<PFN_vkEnumerateDeviceExtensionProperties>(ask("vkEnumerateDeviceExtensionProperties"))};
     }
     return result;
 }
@@ -95,6 +110,9 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     std::unique_lock lock(mutex);
     const VkInstance instance = instances.at(key_of(physical)).handle;
     lock.unlock();
+    for (std::uint32_t i = 0; i < info->enabledExtensionCount; ++i)
+        if (fails_with(info->ppEnabledExtensionNames[i]))
+            return VK_ERROR_INITIALIZATION_FAILED;
     const VkResult result = next<PFN_vkCreateDevice>(instance, down.pfnNextGetInstanceProcAddr,
                                                      "vkCreateDevice")(physical, info, allocator, device);
     lock.lock();
@@ -146,6 +164,40 @@ VKAPI_ATTR VkResult VKAPI_CALL allocate_memory(VkDevice handle, const VkMemoryAl
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device_function(VkDevice device, const char *name);
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance_function(VkInstance instance, const char *name);
 
+VKAPI_ATTR VkResult VKAPI_CALL create_pipelines(VkDevice handle, VkDeferredOperationKHR operation,
+                                                VkPipelineCache cache, std::uint32_t count,
+                                                const VkRayTracingPipelineCreateInfoKHR *infos,
+                                                const VkAllocationCallbacks *allocator, VkPipeline *pipelines) {
+    const std::lock_guard lock(mutex);
+    NextDevice &device = devices.at(key_of(handle));
+    return fails("pipelines", ++device.pipelines)
+               ? VK_ERROR_INITIALIZATION_FAILED
+               : next<PFN_vkCreateRayTracingPipelinesKHR>(device, "vkCreateRayTracingPipelinesKHR")(
+                     handle, operation, cache, count, infos, allocator, pipelines);
+}
+
+VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical, VkPhysicalDeviceProperties2 *properties) {
+    std::unique_lock lock(mutex);
+    const NextInstance instance = instances.at(key_of(physical));
+    lock.unlock();
+    instance.get_properties(physical, properties);
+    if (std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU"))
+        properties->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL list_extensions(VkPhysicalDevice physical, const char *layer, std::uint32_t *count,
+                                               VkExtensionProperties *extensions) {
+    std::unique_lock lock(mutex);
+    const NextInstance instance = instances.at(key_of(physical));
+    lock.unlock();
+    const VkResult result = instance.list_extensions(physical, layer, count, extensions);
+    const char *last_path = std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU");
+    for (std::uint32_t i = 0; extensions && i < *count && last_path && !std::strcmp(last_path, "query"); ++i)
+        if (!std::strcmp(extensions[i].extensionName, VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME))
+            std::strcpy(extensions[i].extensionName, "VK_ARHOST_left_out");
+    return result;
+}
+
 PFN_vkVoidFunction own(const char *name, bool of_instance) {
     const struct {
         const char *name;
@@ -156,6 +208,9 @@ PFN_vkVoidFunction own(const char *name, bool of_instance) {
         {"vkCreateInstance", reinterpret_cast<PFN_vkVoidFunction>(create_instance), true},
         {"vkDestroyInstance", reinterpret_cast<PFN_vkVoidFunction>(destroy_instance), true},
         {"vkCreateDevice", reinterpret_cast<PFN_vkVoidFunction>(create_device), true},
+        {"vkGetPhysicalDeviceProperties2", reinterpret_cast<PFN_vkVoidFunction>(get_properties), true},
+        {"vkEnumerateDeviceExtensionProperties", reinterpret_cast<PFN_vkVoidFunction>(list_extensions), true},
+        {"vkCreateRayTracingPipelinesKHR", reinterpret_cast<PFN_vkVoidFunction>(create_pipelines), false},
         {"vkGetDeviceProcAddr", reinterpret_cast<PFN_vkVoidFunction>(get_device_function), false},
         {"vkDestroyDevice", reinterpret_cast<PFN_vkVoidFunction>(destroy_device), false},
         {"vkQueueSubmit", reinterpret_cast<PFN_vkVoidFunction>(queue_submit), false},

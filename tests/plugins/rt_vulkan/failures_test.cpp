@@ -23,8 +23,9 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-constexpr auto lost = "Vulkan reports that the device is lost (VK_ERROR_DEVICE_LOST)";
-constexpr auto out_of_memory = "Vulkan reports that the device is out of memory: use smaller meshes and textures";
+constexpr auto lost = "Vulkan reports that the device is lost (VK_ERROR_DEVICE_LOST, -4)";
+constexpr auto out_of_memory =
+    "Vulkan reports that the device is out of memory (VK_ERROR_OUT_OF_DEVICE_MEMORY, -2); use smaller meshes";
 
 // Which call fails first (failing_layer.cpp); "" none.
 void let_fail(const std::string &when) {
@@ -34,7 +35,8 @@ void let_fail(const std::string &when) {
 class LayeredTest {
 protected:
     ~LayeredTest() {
-        for (const char *name : {"ARHOST_TEST_VULKAN_FAILS", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
+        for (const char *name :
+             {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
             ::unsetenv(name);
     }
     // Of all instances from now on. (VK_LAYER_PATH, as older loaders know no VK_ADD_LAYER_PATH.)
@@ -90,11 +92,28 @@ protected:
     std::optional<Tracer> tracer_; // whose end, after all, neither hangs nor crashes
     std::optional<Picture> picture_;
 
-private:
     ScratchFolder folder_;
 };
 INSTANTIATE_TEST_SUITE_P(Paths, FailingDevice, testing::Values("plain", "query", "pipeline"),
                          [](const auto &info) { return info.param; });
+
+// As drivers have been seen to do, of GPUs without units for ray tracing.
+TEST_P(FailingDevice, ThatCannotWhatItAnnouncesIsTakenByThePathBefore) {
+    if (GetParam() == "plain")
+        GTEST_SKIP() << "there is none before it";
+    let_fail(GetParam() == "query" ? "device-with:VK_KHR_ray_query" : "pipelines:1");
+    ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", GetParam().c_str(), 1);
+    Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
+    ::unsetenv("ARHOST_TEST_VULKAN_IS_A_GPU");
+    ASSERT_EQ(tracer.start(small_), ARHOST_OK) << tracer.plugin().log();
+    const std::string next = GetParam() == "query" ? "plain" : "query";
+    EXPECT_THAT(tracer.plugin().log(), AllOf(HasSubstr("path '" + GetParam() + "' is left for '" + next + "'"),
+                                             HasSubstr("path " + next + ", ")));
+    EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
+    // The one that was asked for by name is not left.
+    tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
+    EXPECT_THAT(told(ARHOST_ERROR_UNSUPPORTED, [&] { return start(); }), HasSubstr("that it can't"));
+}
 
 TEST_P(FailingDevice, LostAtStartIsToldOf) {
     for (const char *when : {"submit:1", "submit:4", "wait:1", "wait:4"}) {

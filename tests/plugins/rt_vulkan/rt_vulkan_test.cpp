@@ -342,6 +342,9 @@ TEST(Device, ThatIsMissingIsToldOf) {
         old_name("VK_ICD_FILENAMES", "/nonexistent/none.json");
     PluginUnderTest plugin("rt_vulkan");
     EXPECT_EQ(plugin.create(), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_TRUE(plugin.log().find("no Vulkan loader") != std::string::npos ||
+                plugin.log().find("VK_DRIVER_FILES is '/nonexistent/none.json'") != std::string::npos)
+        << plugin.log();
     EXPECT_THAT(plugin.log(), testing::AnyOf(HasSubstr("no Vulkan driver: install"),
                                              HasSubstr("no Vulkan device: install"), HasSubstr("no Vulkan loader")));
 }
@@ -364,6 +367,10 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     EXPECT_EQ(chosen("2"), "Little GPU");
     EXPECT_EQ(chosen("LLVMPIPE"), "llvmpipe (LLVM 15)");
     EXPECT_EQ(chosen("little"), "Little GPU");
+    EXPECT_EQ(chosen("15"), "llvmpipe (LLVM 15)") << "a part of a name, as no device has that number";
+    devices[2].name = "Big GPU Ti";
+    EXPECT_EQ(chosen("big gpu"), "Big GPU") << "the whole name comes before a part of one";
+    devices[2].name = "Little GPU";
     EXPECT_EQ(chosen("0F112233-4455-6677-8899-aabbccddeeff"), "Little GPU");
     for (const char *none : {"3", "radeon", "", "0011"})
         EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen(none); }),
@@ -467,6 +474,13 @@ TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
         std::filesystem::resize_file(shader_file, size);
         EXPECT_THAT(complaint(), HasSubstr("is damaged")) << size;
     }
+    std::filesystem::resize_file(shader_file, std::uintmax_t{3} << 30); // read at once, it would take long
+    EXPECT_THAT(complaint(), HasSubstr("can't be read"));
+    for (const char *other : {"query.comp", "pipeline.rgen", "pipeline.rmiss"}) {
+        std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_" + std::string(other) + ".spv", shader_file,
+                                   std::filesystem::copy_options::overwrite_existing);
+        EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is another one"))) << other;
+    }
 }
 
 TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
@@ -484,6 +498,11 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // can't be replaced
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    for (const auto &entry : std::filesystem::directory_iterator(folder.path())) // Mesa has its own there
+        EXPECT_FALSE(entry.path().filename().string().starts_with("rt_vulkan.pipelines.")) << entry << " is left";
+    const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
+    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
 }
 
 // ---- Validation ------------------------------------------------------------------------------------
