@@ -123,10 +123,8 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
                                          : place == Place::host_read ? VK_MEMORY_PROPERTY_HOST_CACHED_BIT
                                                                      : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
     // Of several the first has the fewest properties besides: to stage, none of the device's own.
-    std::vector<std::uint32_t> types =
+    const std::vector<std::uint32_t> types =
         device.memory_types(needs.memoryTypeBits, place == Place::device ? 0 : mappable, wished);
-    if (place == Place::device)
-        types.resize(1); // elsewhere it would be slow, and no one knew
     if (types.empty())
         throw Failure(ARHOST_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
                                                     "' has no memory that the host can write; choose another");
@@ -134,7 +132,9 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
     VkMemoryAllocateFlagsInfo flags{};
     flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
     flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    memory_ = allocated(device, needs.size, types, has_address ? &flags : nullptr);
+    // What is to be the device's own would be slow elsewhere, and no one knew.
+    const std::size_t tried = place == Place::device ? 1 : types.size();
+    memory_ = allocated(device, needs.size, std::span(types).first(tried), has_address ? &flags : nullptr);
     check(vk.vkBindBufferMemory(device.handle(), get(), memory_.get(), 0), "binding GPU memory");
     if (has_address) {
         VkBufferDeviceAddressInfo which{};

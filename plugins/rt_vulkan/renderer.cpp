@@ -362,7 +362,6 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     }
     if (motion || image_count_ == 0)
         write_moving_parts();
-    frame_.object_count = scene_.frame().object_count;
 
     if (settings_.accumulate) {
         if (motion || !still_camera_ || !arhost::view::same_view(*still_camera_, camera))

@@ -43,6 +43,11 @@ void *key_of(const void *handle) {
     return *static_cast<void *const *>(handle);
 }
 
+NextInstance instance_of(VkPhysicalDevice physical) {
+    const std::lock_guard lock(mutex);
+    return instances.at(key_of(physical));
+}
+
 template <class Function> Function next(VkInstance instance, PFN_vkGetInstanceProcAddr get, const char *name) {
     return reinterpret_cast<Function>(get(instance, name));
 }
@@ -107,15 +112,12 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
         return VK_ERROR_INITIALIZATION_FAILED;
     const VkLayerDeviceLink down = *link->u.pLayerInfo;
     link->u.pLayerInfo = down.pNext;
-    std::unique_lock lock(mutex);
-    const VkInstance instance = instances.at(key_of(physical)).handle;
-    lock.unlock();
     for (std::uint32_t i = 0; i < info->enabledExtensionCount; ++i)
         if (fails_with(info->ppEnabledExtensionNames[i]))
             return VK_ERROR_INITIALIZATION_FAILED;
-    const VkResult result = next<PFN_vkCreateDevice>(instance, down.pfnNextGetInstanceProcAddr,
+    const VkResult result = next<PFN_vkCreateDevice>(instance_of(physical).handle, down.pfnNextGetInstanceProcAddr,
                                                      "vkCreateDevice")(physical, info, allocator, device);
-    lock.lock();
+    const std::lock_guard lock(mutex);
     if (result == VK_SUCCESS)
         devices[key_of(*device)] = {*device, down.pfnNextGetDeviceProcAddr};
     return result;
@@ -177,20 +179,14 @@ VKAPI_ATTR VkResult VKAPI_CALL create_pipelines(VkDevice handle, VkDeferredOpera
 }
 
 VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical, VkPhysicalDeviceProperties2 *properties) {
-    std::unique_lock lock(mutex);
-    const NextInstance instance = instances.at(key_of(physical));
-    lock.unlock();
-    instance.get_properties(physical, properties);
+    instance_of(physical).get_properties(physical, properties);
     if (std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU"))
         properties->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL list_extensions(VkPhysicalDevice physical, const char *layer, std::uint32_t *count,
                                                VkExtensionProperties *extensions) {
-    std::unique_lock lock(mutex);
-    const NextInstance instance = instances.at(key_of(physical));
-    lock.unlock();
-    const VkResult result = instance.list_extensions(physical, layer, count, extensions);
+    const VkResult result = instance_of(physical).list_extensions(physical, layer, count, extensions);
     const char *last_path = std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU");
     for (std::uint32_t i = 0; extensions && i < *count && last_path && !std::strcmp(last_path, "query"); ++i)
         if (!std::strcmp(extensions[i].extensionName, VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME))

@@ -2,19 +2,13 @@
 //
 // A Vulkan device that is lost or has no memory left, when it starts and in mid-run, as failing_layer.cpp has it.
 #include "arhost_run.hpp"
+#include "drivers_leak.hpp"
 #include "scene/loader.hpp"
 #include "two_tracers.hpp"
 
 #include <gmock/gmock.h>
 
 #include <optional>
-
-#if defined(__SANITIZE_ADDRESS__)
-// Mesa's drivers leak, and have been unloaded when that is told: no suppression can name them.
-extern "C" __attribute__((visibility("default"))) const char *__asan_default_options() {
-    return "detect_leaks=0";
-}
-#endif
 
 namespace arhost::test {
 namespace {

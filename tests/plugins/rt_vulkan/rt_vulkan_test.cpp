@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The plugin on the device that is here, and what it says where there is none.
+#include "drivers_leak.hpp"
 #include "renderer.hpp"
 #include "rich_scene.hpp"
 #include "scene/loader.hpp"
@@ -19,13 +20,6 @@
 #include <fstream>
 #include <memory>
 #include <optional>
-
-#if defined(__SANITIZE_ADDRESS__)
-// Mesa's drivers leak, and have been unloaded when that is told: no suppression can name them.
-extern "C" __attribute__((visibility("default"))) const char *__asan_default_options() {
-    return "detect_leaks=0";
-}
-#endif
 
 namespace arhost::test {
 namespace {
