@@ -23,7 +23,7 @@ namespace rt_vulkan {
                                     use(vkDestroyCommandPool) use(vkAllocateCommandBuffers)                          \
                                         use(vkFreeCommandBuffers) use(vkBeginCommandBuffer) use(vkEndCommandBuffer)  \
                                             use(vkCmdBindPipeline) use(vkCmdBindDescriptorSets) use(vkCmdDispatch)   \
-                                                use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer)                          \
+                                                use(vkCmdPushConstants) use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer)  \
                                                     use(vkCmdPipelineBarrier) use(vkCmdResetQueryPool)               \
                                                         use(vkCmdWriteTimestamp) use(vkCreateQueryPool)              \
                                                             use(vkDestroyQueryPool) use(vkGetQueryPoolResults)       \

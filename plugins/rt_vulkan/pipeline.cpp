@@ -178,7 +178,7 @@ Shaders read_shaders(const std::filesystem::path &folder, Path path) {
 
 ImagePipeline::ImagePipeline(const Device &device, const Shaders &shaders, VkPipelineLayout layout,
                              const Specialization &constants)
-    : device_(device), layout_(layout) {
+    : device_(device), layout_(layout), stage_flags_(shaders.stage_flags()) {
     std::array<VkSpecializationMapEntry, sizeof constants / 4> entries;
     for (std::uint32_t i = 0; i < entries.size(); ++i)
         entries[i] = {i, 4 * i, 4};
@@ -276,18 +276,19 @@ void ImagePipeline::make_table() {
         std::memcpy(table_.mapped().data() + (places[i] - table_.address()), handles.data() + i * size, size);
 }
 
-void ImagePipeline::record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width,
-                           std::uint32_t height) const {
+void ImagePipeline::record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width, Rows rows) const {
     const DeviceFunctions &vk = device_.functions();
     const VkPipelineBindPoint point =
         table_ ? VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR : VK_PIPELINE_BIND_POINT_COMPUTE;
     vk.vkCmdBindPipeline(commands, point, pipeline_.get());
     vk.vkCmdBindDescriptorSets(commands, point, layout_, 0, 1, &set, 0, nullptr);
+    vk.vkCmdPushConstants(commands, layout_, stage_flags_, 0, pushed_size, &rows.first);
     if (table_) {
         const VkStridedDeviceAddressRegionKHR none{};
-        vk.vkCmdTraceRaysKHR(commands, &generate_, &miss_, &hit_, &none, width, height, 1);
+        vk.vkCmdTraceRaysKHR(commands, &generate_, &miss_, &hit_, &none, width, rows.count, 1);
     } else {
-        vk.vkCmdDispatch(commands, (width + group_side - 1) / group_side, (height + group_side - 1) / group_side, 1);
+        vk.vkCmdDispatch(commands, (width + group_side - 1) / group_side, (rows.count + group_side - 1) / group_side,
+                         1);
     }
 }
 

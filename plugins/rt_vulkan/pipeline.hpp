@@ -30,13 +30,20 @@ Shaders read_shaders(const std::filesystem::path &folder, Path path);
 
 inline constexpr std::uint32_t group_side = 8; // of a compute shader's invocations
 
+// Some of an image's rows, which a first one and their number tell.
+struct Rows {
+    std::uint32_t first, count;
+};
+// The constants that are pushed with them (shaders/scene.glsl).
+inline constexpr std::uint32_t pushed_size = sizeof Rows::first;
+
 class ImagePipeline {
 public:
     // Compiles, which takes a while, unless the driver's result has been kept from an earlier time.
     ImagePipeline(const Device &device, const Shaders &shaders, VkPipelineLayout layout,
                   const Specialization &constants);
 
-    void record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width, std::uint32_t height) const;
+    void record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width, Rows rows) const;
 
 private:
     void compile(const Shaders &shaders, std::span<const VkPipelineShaderStageCreateInfo> stages,
@@ -45,6 +52,7 @@ private:
 
     const Device &device_;
     VkPipelineLayout layout_;
+    VkShaderStageFlags stage_flags_;
     Pipeline pipeline_;
     // Of the pipeline for ray tracing: its shader binding table.
     Buffer table_;

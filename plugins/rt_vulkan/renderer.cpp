@@ -18,10 +18,13 @@ namespace {
 
 using arhost::Failure;
 
+static_assert(Bands::unit % group_side == 0); // no band is traced into the next
+
 constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
 // Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
-constexpr std::size_t most_targets = 8; // places that images come to again (arhost/raytracer.h)
+constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // shaders/scene.glsl
+constexpr std::size_t most_targets = 8;                      // places that images come to again (arhost/raytracer.h)
 enum Moment : std::uint32_t { begun, traced, copied, moment_count }; // of the GPU's clock, in an image
 
 std::string mebibytes(std::uint64_t size) {
@@ -91,7 +94,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       stage_(shaders.pipeline_stage()), device_(instance, checked(physical), shaders.path), submission_(device_),
       scene_(*setup.scene, shaders.path == Path::plain, host),
-      samples_(arhost::view::sample_positions(settings.samples)) {
+      samples_(arhost::view::sample_positions(settings.samples)), bands_(intrinsics_.height) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building the trees");
@@ -116,6 +119,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         device_.functions().vkCmdWriteTimestamp(start_clock_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), begun);
         submission_.end(start_clock_);
     }
+    record_begin();
+    band_ = submission_.new_commands();
     frame_ = scene_.frame();
     frame_.width = intrinsics_.width;
     frame_.height = intrinsics_.height;
@@ -164,12 +169,12 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
     }
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? 16 * pixels : 0);
     buffers_[image_binding] = make_buffer(image_binding, {}, 4 * pixels);
-    buffers_[drawn_binding] = make_buffer(drawn_binding, {}, sizeof(std::int32_t) * 4);
+    buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
     buffers_[frame_binding] =
         Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
     if (moving_size)
         moving_ = Buffer(device_, moving_size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
-    read_ = Buffer(device_, sizeof(std::int32_t) * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
+    read_ = Buffer(device_, drawn_size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
 }
 
 void Renderer::make_set(const Shaders &shaders) {
@@ -234,6 +239,9 @@ void Renderer::make_set(const Shaders &shaders) {
     layout_info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
     layout_info.setLayoutCount = 1;
     layout_info.pSetLayouts = &layout;
+    const VkPushConstantRange pushed{shaders.stage_flags(), 0, pushed_size};
+    layout_info.pushConstantRangeCount = 1;
+    layout_info.pPushConstantRanges = &pushed;
     layout_ = make<PipelineLayout, VkPipelineLayout>(device_, vk.vkCreatePipelineLayout, layout_info, what);
 }
 
@@ -254,7 +262,7 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     const VkCommandBuffer commands = submission_.new_commands();
     std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
-    pipeline_->record(commands, set_, 1, 1);
+    pipeline_->record(commands, set_, 1, {0, 1});
     submission_.end(commands);
     submission_.run(commands);
     submission_.free(commands);
@@ -281,18 +289,18 @@ Renderer::Target &Renderer::target_of(const arhost_image &image) {
         target.buffer = Buffer(device_, std::size_t{target.stride} * image.height, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                Buffer::Place::host_read);
     }
-    target.commands = submission_.new_commands();
-    record(target);
+    target.copy = submission_.new_commands();
+    record_copy(target);
     if (targets_.size() > most_targets) { // the oldest goes: nothing is under way here
-        submission_.free(targets_.front().commands);
+        submission_.free(targets_.front().copy);
         targets_.erase(targets_.begin());
     }
     return targets_.emplace_back(std::move(target));
 }
 
-void Renderer::record(const Target &target) const {
+void Renderer::record_begin() {
     const DeviceFunctions &vk = device_.functions();
-    const VkCommandBuffer commands = target.commands;
+    const VkCommandBuffer commands = begin_ = submission_.new_commands();
     submission_.begin(commands);
     VkDeviceSize offset = 0;
     for (const Binding binding : moving_bindings)
@@ -303,10 +311,29 @@ void Renderer::record(const Target &target) const {
         }
     const std::int32_t nothing[4] = {std::numeric_limits<std::int32_t>::max(),
                                      std::numeric_limits<std::int32_t>::max(), 0, 0};
-    vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, sizeof nothing, nothing);
+    vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, drawn_size, nothing);
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, stage_,
             VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
-    record_shader(commands);
+    submission_.end(commands);
+}
+
+void Renderer::record_band(Rows rows) {
+    if (rows.first == recorded_.first && rows.count == recorded_.count)
+        return;
+    submission_.begin(band_);
+    // The part that is drawn is read and widened by all of them.
+    if (rows.first > 0)
+        barrier(device_.functions(), band_, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
+                VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    pipeline_->record(band_, set_, intrinsics_.width, rows);
+    submission_.end(band_);
+    recorded_ = rows;
+}
+
+void Renderer::record_copy(const Target &target) const {
+    const DeviceFunctions &vk = device_.functions();
+    const VkCommandBuffer commands = target.copy;
+    submission_.begin(commands);
     barrier(vk, commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
             VK_ACCESS_TRANSFER_READ_BIT);
     if (clock_.get())
@@ -321,7 +348,7 @@ void Renderer::record(const Target &target) const {
             rows.push_back({row * y, VkDeviceSize{target.stride} * y, row});
     vk.vkCmdCopyBuffer(commands, buffers_[image_binding].get(), target.buffer.get(),
                        static_cast<std::uint32_t>(rows.size()), rows.data());
-    const VkBufferCopy drawn{0, 0, sizeof nothing};
+    const VkBufferCopy drawn{0, 0, drawn_size};
     vk.vkCmdCopyBuffer(commands, buffers_[drawn_binding].get(), read_.get(), 1, &drawn);
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
             VK_ACCESS_HOST_READ_BIT);
@@ -331,7 +358,7 @@ void Renderer::record(const Target &target) const {
 }
 
 void Renderer::record_shader(VkCommandBuffer commands) const {
-    pipeline_->record(commands, set_, intrinsics_.width, intrinsics_.height);
+    pipeline_->record(commands, set_, intrinsics_.width, {0, intrinsics_.height});
 }
 
 void Renderer::write_moving_parts() {
@@ -351,6 +378,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width || image.stride % 4)
         throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
+    if (host_.cancelled()) // before anything is told of this image
+        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
     look(camera, frame_);
     std::vector<VkCommandBuffer> commands;
     if (start_clock_)
@@ -379,14 +408,29 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
 
     const Target &target = target_of(image);
-    if (host_.cancelled()) {
-        still_camera_.reset();
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
-    }
-    commands.push_back(target.commands);
-    submission_.run(commands);
+    commands.push_back(begin_);
+    trace(std::move(commands), target);
     history_samples_ += settings_.accumulate ? frame_.sample_count : 0;
     return read_back(target, image);
+}
+
+// `commands` come before the image's first band.
+void Renderer::trace(std::vector<VkCommandBuffer> commands, const Target &target) {
+    for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
+        if (rows.first > 0 && host_.cancelled()) {
+            still_camera_.reset();
+            throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
+        }
+        rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);
+        record_band(rows);
+        commands.push_back(band_);
+        if (rows.first + rows.count == intrinsics_.height)
+            commands.push_back(target.copy);
+        const auto begin = std::chrono::steady_clock::now();
+        submission_.run(commands);
+        bands_.took(rows.count, std::chrono::steady_clock::now() - begin);
+        commands.clear();
+    }
 }
 
 Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From a camera to an image: one dispatch, whose commands are recorded once for each place that images go to.
+// From a camera to an image: its rows at once, or one band after another where that takes long.
 #pragma once
 
 #include "acceleration.hpp"
+#include "bands.hpp"
 #include "common_view/samples.hpp"
 #include "pipeline.hpp"
 #include "scene_data.hpp"
@@ -51,7 +52,7 @@ private:
         std::uint8_t *rgba = nullptr;
         std::uint32_t stride = 0;
         Buffer buffer;
-        VkCommandBuffer commands = VK_NULL_HANDLE;
+        VkCommandBuffer copy = VK_NULL_HANDLE; // the image to it
     };
     void make_buffers(const arhost_intrinsics &intrinsics, Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size,
@@ -59,7 +60,10 @@ private:
     void make_set(const Shaders &shaders);
     void make_pipeline(const Shaders &shaders, std::uint32_t max_depth);
     Target &target_of(const arhost_image &image);
-    void record(const Target &target) const;
+    void record_begin();
+    void record_band(Rows rows);
+    void record_copy(const Target &target) const;
+    void trace(std::vector<VkCommandBuffer> commands, const Target &target);
     void write_moving_parts();
     Rectangle read_back(const Target &target, const arhost_image &image);
 
@@ -79,6 +83,10 @@ private:
     std::optional<Acceleration> acceleration_; // none on the plain path
     QueryPool clock_;                          // none where the device has none
     VkCommandBuffer start_clock_ = VK_NULL_HANDLE;
+    VkCommandBuffer begin_ = VK_NULL_HANDLE; // what moves is copied, nothing is drawn yet
+    VkCommandBuffer band_ = VK_NULL_HANDLE;  // recorded for these:
+    Rows recorded_{};
+    Bands bands_;
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;
     VkDescriptorSet set_ = VK_NULL_HANDLE;

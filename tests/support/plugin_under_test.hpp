@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -138,7 +139,10 @@ public:
     }
     const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
     arhost_instance *instance() const { return instance_; }
-    void cancel() { cancelled_ = true; }
+    // The host cancels once the plugin has asked so often whether it does.
+    void cancel(int after = 0) { cancelled_after_ = asked_ + after; }
+    void go_on() { cancelled_after_ = std::numeric_limits<int>::max(); }
+    int asked() const { return asked_; }
 
     // All messages so far, a line each, "severity text".
     std::string log() const {
@@ -153,7 +157,9 @@ private:
         self(host).log_ += std::to_string(severity) + " " + text + "\n";
     }
     static void on_progress(const arhost_host *, double, const char *) {}
-    static int32_t on_cancelled(const arhost_host *host) { return self(host).cancelled_; }
+    static int32_t on_cancelled(const arhost_host *host) {
+        return self(host).asked_++ >= self(host).cancelled_after_;
+    }
     static const void *on_extension(const arhost_host *, const char *) { return nullptr; }
 
     void *library_ = nullptr;
@@ -162,7 +168,7 @@ private:
     arhost_instance *instance_ = nullptr;
     mutable std::mutex mutex_;
     std::string log_;
-    std::atomic<bool> cancelled_{false};
+    std::atomic<int> asked_{0}, cancelled_after_{std::numeric_limits<int>::max()};
 };
 
 } // namespace arhost::test

@@ -120,6 +120,7 @@ uint pixel_of(uvec2 at) {
 }
 
 void write_pixel(uvec2 at) {
+    at.y += band.first_row;
     if (at.x >= frame.width || at.y >= frame.height)
         return;
     uint pixel = pixel_of(at);

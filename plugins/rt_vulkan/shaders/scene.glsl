@@ -115,6 +115,11 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
 }
 frame;
 
+layout(push_constant) uniform Band {
+    uint first_row; // of those that are traced now
+}
+band;
+
 layout(std430, set = 0, binding = 1) readonly buffer Objects {
     Object objects[];
 };

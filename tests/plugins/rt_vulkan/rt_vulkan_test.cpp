@@ -139,6 +139,13 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
     EXPECT_EQ(got.pixels(), first);
+    // So does the one after an image that was cancelled half-way.
+    ASSERT_EQ(vulkan.start(small), ARHOST_OK);
+    vulkan.plugin().cancel(1);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_ERROR_CANCELLED);
+    vulkan.plugin().go_on();
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+    EXPECT_EQ(got.pixels(), first);
 }
 TEST_F(RichScene, AgainAndAgainIsTheSameBytes) {
     Tracer tracer(rich_scene(), {}, "rt_vulkan");
@@ -174,6 +181,39 @@ TEST_P(EachPath, GivesRtEmbreesPicture) {
     expect_same_picture(from_the_side(small), {}, GetParam());
 }
 
+// The first image is, as no one knows how long it takes; then fewer and fewer.
+TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
+    Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+    Picture first(small), later(small);
+    const int before = tracer.plugin().asked();
+    ASSERT_EQ(tracer.try_render(from_the_side(small), first), ARHOST_OK);
+    EXPECT_GT(tracer.plugin().asked() - before, 1) << "it looks before each band whether it is cancelled";
+    for (int image = 0; image < 4; ++image) {
+        ASSERT_EQ(tracer.try_render(from_the_side(small), later), ARHOST_OK);
+        EXPECT_EQ(later.pixels(), first.pixels()) << image;
+        EXPECT_EQ(later.info.region_x, first.info.region_x);
+        EXPECT_EQ(later.info.region_y, first.info.region_y);
+        EXPECT_EQ(later.info.region_width, first.info.region_width);
+        EXPECT_EQ(later.info.region_height, first.info.region_height);
+    }
+}
+TEST_P(EachPath, LeavesAnImageThatIsCancelledAndBeginsAnew) {
+    Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+    Picture picture(small);
+    const std::vector<Pixel> untouched = picture.pixels();
+    tracer.plugin().cancel(1);
+    EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_ERROR_CANCELLED);
+    EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while an image was traced"));
+    EXPECT_EQ(picture.pixels(), untouched);
+    tracer.plugin().go_on();
+    ASSERT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
+    const std::vector<Pixel> once = picture.pixels();
+    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+    ASSERT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
+    EXPECT_EQ(picture.pixels(), once);
+}
 TEST_P(EachPath, IsToldOf) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK);

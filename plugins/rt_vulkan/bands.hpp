@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How many of an image's rows the device is asked for at once. A driver's watchdog takes work of some seconds for a
+// hang, and nothing calls work back: what takes long is asked for in parts, by the time that the last part took.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace rt_vulkan {
+
+class Bands {
+public:
+    static constexpr std::uint32_t unit = 8; // px; each band but an image's last has a multiple of this
+    // Short beside any watchdog (the strictest known have 2 s), long beside what a submission costs (some 0.1 ms).
+    static constexpr std::chrono::milliseconds most{100};
+
+    explicit Bands(std::uint32_t image_rows) : image_rows_(image_rows) {}
+    // Of the next band; where fewer are left, those.
+    std::uint32_t rows() const { return rows_; }
+    // So long did so many rows take.
+    void took(std::uint32_t rows, std::chrono::duration<double, std::milli> time);
+
+private:
+    std::uint32_t image_rows_;
+    std::uint32_t rows_ = unit; // of what has not been seen yet, the least
+};
+
+} // namespace rt_vulkan
