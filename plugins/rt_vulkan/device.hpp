@@ -11,35 +11,34 @@
 
 namespace rt_vulkan {
 
-#define RT_VULKAN_DEVICE_FUNCTIONS(use)                                                                              \
-    use(vkDestroyDevice) use(vkGetDeviceQueue) use(vkDeviceWaitIdle) use(vkQueueSubmit) use(vkCreateBuffer)          \
-        use(vkDestroyBuffer) use(vkGetBufferMemoryRequirements) use(vkAllocateMemory) use(vkFreeMemory)              \
-            use(vkBindBufferMemory) use(vkMapMemory) use(vkCreateDescriptorSetLayout)                                \
-                use(vkDestroyDescriptorSetLayout) use(vkCreateDescriptorPool) use(vkDestroyDescriptorPool)           \
-                    use(vkAllocateDescriptorSets) use(vkUpdateDescriptorSets) use(vkCreatePipelineLayout)            \
-                        use(vkDestroyPipelineLayout) use(vkCreateShaderModule) use(vkDestroyShaderModule)            \
-                            use(vkCreatePipelineCache) use(vkDestroyPipelineCache) use(vkGetPipelineCacheData)       \
-                                use(vkCreateComputePipelines) use(vkDestroyPipeline) use(vkCreateCommandPool)        \
-                                    use(vkDestroyCommandPool) use(vkAllocateCommandBuffers)                          \
-                                        use(vkFreeCommandBuffers) use(vkBeginCommandBuffer) use(vkEndCommandBuffer)  \
-                                            use(vkCmdBindPipeline) use(vkCmdBindDescriptorSets) use(vkCmdDispatch)   \
-                                                use(vkCmdPushConstants) use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer)  \
-                                                    use(vkCmdPipelineBarrier) use(vkCmdResetQueryPool)               \
-                                                        use(vkCmdWriteTimestamp) use(vkCreateQueryPool)              \
-                                                            use(vkDestroyQueryPool) use(vkGetQueryPoolResults)       \
-                                                                use(vkCreateFence) use(vkDestroyFence)               \
-                                                                    use(vkWaitForFences) use(vkResetFences)
+// clang-format off
+#define RT_VULKAN_DEVICE_FUNCTIONS(use) \
+    use(vkDestroyDevice) use(vkGetDeviceQueue) use(vkDeviceWaitIdle) use(vkQueueSubmit) use(vkCreateBuffer) \
+    use(vkDestroyBuffer) use(vkGetBufferMemoryRequirements) use(vkAllocateMemory) use(vkFreeMemory) \
+    use(vkBindBufferMemory) use(vkMapMemory) use(vkCreateDescriptorSetLayout) \
+    use(vkDestroyDescriptorSetLayout) use(vkCreateDescriptorPool) use(vkDestroyDescriptorPool) \
+    use(vkAllocateDescriptorSets) use(vkUpdateDescriptorSets) use(vkCreatePipelineLayout) \
+    use(vkDestroyPipelineLayout) use(vkCreateShaderModule) use(vkDestroyShaderModule) \
+    use(vkCreatePipelineCache) use(vkDestroyPipelineCache) use(vkGetPipelineCacheData) \
+    use(vkCreateComputePipelines) use(vkDestroyPipeline) use(vkCreateCommandPool) use(vkDestroyCommandPool) \
+    use(vkAllocateCommandBuffers) use(vkFreeCommandBuffers) use(vkBeginCommandBuffer) \
+    use(vkEndCommandBuffer) use(vkCmdBindPipeline) use(vkCmdBindDescriptorSets) use(vkCmdDispatch) \
+    use(vkCmdPushConstants) use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer) use(vkCmdPipelineBarrier) \
+    use(vkCmdResetQueryPool) use(vkCmdWriteTimestamp) use(vkCreateQueryPool) use(vkDestroyQueryPool) \
+    use(vkGetQueryPoolResults) use(vkCreateFence) use(vkDestroyFence) use(vkWaitForFences) \
+    use(vkResetFences)
 
 // Of the paths by the device's own trees; NULL on the plain one.
-#define RT_VULKAN_TRACING_FUNCTIONS(use)                                                                             \
-    use(vkGetBufferDeviceAddress) use(vkCreateAccelerationStructureKHR) use(vkDestroyAccelerationStructureKHR)       \
-        use(vkGetAccelerationStructureBuildSizesKHR) use(vkGetAccelerationStructureDeviceAddressKHR)                 \
-            use(vkCmdBuildAccelerationStructuresKHR) use(vkCmdCopyAccelerationStructureKHR)                          \
-                use(vkCmdWriteAccelerationStructuresPropertiesKHR)
+#define RT_VULKAN_TRACING_FUNCTIONS(use) \
+    use(vkGetBufferDeviceAddress) use(vkCreateAccelerationStructureKHR) \
+    use(vkDestroyAccelerationStructureKHR) use(vkGetAccelerationStructureBuildSizesKHR) \
+    use(vkGetAccelerationStructureDeviceAddressKHR) use(vkCmdBuildAccelerationStructuresKHR) \
+    use(vkCmdCopyAccelerationStructureKHR) use(vkCmdWriteAccelerationStructuresPropertiesKHR)
 
 // Of the pipeline path; NULL on the others.
-#define RT_VULKAN_PIPELINE_FUNCTIONS(use)                                                                            \
+#define RT_VULKAN_PIPELINE_FUNCTIONS(use) \
     use(vkCreateRayTracingPipelinesKHR) use(vkGetRayTracingShaderGroupHandlesKHR) use(vkCmdTraceRaysKHR)
+// clang-format on
 
 struct DeviceFunctions {
     RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_DECLARE)

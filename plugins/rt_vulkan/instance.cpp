@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "instance.hpp"
 
+#include "layout.hpp"
+
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
@@ -35,14 +37,6 @@ VkDebugUtilsMessengerCreateInfoEXT messenger_info(arhost::Host &host) {
 
 std::string lower(std::string text) {
     std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
-std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
-    std::string text;
-    for (const std::uint8_t byte : bytes)
-        for (const int shift : {4, 0})
-            text += "0123456789abcdef"[byte >> shift & 15];
     return text;
 }
 
@@ -89,8 +83,10 @@ std::string told_by_environment() {
 }
 
 // The better, the higher.
-int rank(VkPhysicalDeviceType type) {
-    switch (type) {
+int rank(const PhysicalDevice &device) {
+    if (!what_it_lacks(device).empty())
+        return -1;
+    switch (device.properties.deviceType) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
         return 4;
     case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
@@ -166,6 +162,27 @@ bool imports_host_memory(const InstanceFunctions &from, VkPhysicalDevice device)
 }
 
 } // namespace
+
+std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
+    std::string text;
+    for (const std::uint8_t byte : bytes)
+        for (const int shift : {4, 0})
+            text += "0123456789abcdef"[byte >> shift & 15];
+    return text;
+}
+
+std::string what_it_lacks(const PhysicalDevice &device) {
+    constexpr std::uint32_t buffers_needed = binding_count - 1; // but for the frame
+    const std::uint32_t buffers = device.properties.limits.maxPerStageDescriptorStorageBuffers;
+    if (device.properties.apiVersion < VK_API_VERSION_1_1)
+        return "knows Vulkan 1.0 only, and 1.1 is needed";
+    if (device.queue_family == VK_QUEUE_FAMILY_IGNORED)
+        return "can't compute";
+    if (buffers < buffers_needed)
+        return "reads " + std::to_string(buffers) + " buffers at once, and " + std::to_string(buffers_needed) +
+               " are needed";
+    return "";
+}
 
 const char *name_of(Path path) {
     return path == Path::plain ? "plain" : path == Path::query ? "query" : "pipeline";
@@ -379,9 +396,7 @@ std::vector<PhysicalDevice> Instance::devices() const {
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted) {
     if (wanted == "auto")
         return *std::max_element(devices.begin(), devices.end(),
-                                 [](const PhysicalDevice &a, const PhysicalDevice &b) {
-                                     return rank(a.properties.deviceType) < rank(b.properties.deviceType);
-                                 });
+                                 [](const PhysicalDevice &a, const PhysicalDevice &b) { return rank(a) < rank(b); });
     const auto refuse = [&](const std::string &why) {
         throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'device': " + why + " '" + wanted +
                                                       "'; there are: " + list_of(devices) +

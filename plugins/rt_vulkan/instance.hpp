@@ -14,11 +14,13 @@
 
 namespace rt_vulkan {
 
-#define RT_VULKAN_INSTANCE_FUNCTIONS(use)                                                                            \
-    use(vkDestroyInstance) use(vkEnumeratePhysicalDevices) use(vkGetPhysicalDeviceProperties2)                       \
-        use(vkGetPhysicalDeviceFeatures2) use(vkGetPhysicalDeviceMemoryProperties)                                   \
-            use(vkGetPhysicalDeviceQueueFamilyProperties) use(vkGetPhysicalDeviceExternalBufferProperties)           \
-                use(vkEnumerateDeviceExtensionProperties) use(vkCreateDevice) use(vkGetDeviceProcAddr)
+// clang-format off
+#define RT_VULKAN_INSTANCE_FUNCTIONS(use) \
+    use(vkDestroyInstance) use(vkEnumeratePhysicalDevices) use(vkGetPhysicalDeviceProperties2) \
+    use(vkGetPhysicalDeviceFeatures2) use(vkGetPhysicalDeviceMemoryProperties) \
+    use(vkGetPhysicalDeviceQueueFamilyProperties) use(vkGetPhysicalDeviceExternalBufferProperties) \
+    use(vkEnumerateDeviceExtensionProperties) use(vkCreateDevice) use(vkGetDeviceProcAddr)
+// clang-format on
 
 struct InstanceFunctions {
 #define RT_VULKAN_DECLARE(name) PFN_##name name;
@@ -53,6 +55,9 @@ struct PhysicalDevice {
     TracingLimits tracing;
 };
 
+// Why no path runs on it: "can't compute"; empty: at least one does.
+std::string what_it_lacks(const PhysicalDevice &device);
+
 class Instance {
 public:
     // `validate`: with the validation layers, synchronization validation included; what they say is logged as errors.
@@ -81,13 +86,16 @@ private:
     InstanceFunctions functions_{};
 };
 
-// The one that `wanted` names: its number in the list, its UUID, or a part of its name; "auto": the fastest kind.
+// The one that `wanted` names: its number in the list, its UUID, or a part of its name; "auto": of those that lack
+// nothing, one of the fastest kind.
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted);
 
 // The one that `wanted` names; "auto": those that the device says it has, the best first. Drivers have said so of
 // what they can't do.
 std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted);
 
+// 32 digits
+std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]);
 // "plain, query"
 std::string list_of(const std::vector<Path> &paths);
 

@@ -45,10 +45,12 @@ public:
         const std::vector<PhysicalDevice> found = instance.devices();
         std::vector<arhost::Device> devices;
         devices.reserve(found.size());
-        for (const PhysicalDevice &device : found)
+        for (const PhysicalDevice &device : found) {
+            const std::string why_not = what_it_lacks(device);
             devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
                                &device == &choose_device(found, "auto"), device.name, device.uuid,
-                               "paths: " + list_of(device.paths)});
+                               why_not.empty() ? "paths: " + list_of(device.paths) : why_not});
+        }
         return devices;
     }
 

@@ -52,18 +52,9 @@ const char *what_is_in(Binding binding) {
 }
 
 PhysicalDevice checked(const PhysicalDevice &device) {
-    const auto refuse = [&](const std::string &why) {
+    if (const std::string why = what_it_lacks(device); !why.empty())
         throw Failure(ARHOST_ERROR_UNSUPPORTED,
                       "the Vulkan device '" + device.name + "' " + why + "; choose another with option 'device'");
-    };
-    const VkPhysicalDeviceLimits &limits = device.properties.limits;
-    if (device.properties.apiVersion < VK_API_VERSION_1_1)
-        refuse("knows Vulkan 1.0 only, and 1.1 is needed");
-    if (device.queue_family == VK_QUEUE_FAMILY_IGNORED)
-        refuse("can't compute");
-    if (limits.maxPerStageDescriptorStorageBuffers < binding_count - 1)
-        refuse("reads " + std::to_string(limits.maxPerStageDescriptorStorageBuffers) + " buffers at once, and " +
-               std::to_string(binding_count - 1) + " are needed");
     return device;
 }
 

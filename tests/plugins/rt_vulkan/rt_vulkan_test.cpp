@@ -385,7 +385,10 @@ TEST(Device, ThatIsMissingIsToldOf) {
 
 TEST(Device, IsChosenByNumberNameOrUuid) {
     using rt_vulkan::PhysicalDevice;
-    std::vector<PhysicalDevice> devices(3);
+    PhysicalDevice sound{};
+    sound.properties.apiVersion = VK_API_VERSION_1_1;
+    sound.properties.limits.maxPerStageDescriptorStorageBuffers = 16;
+    std::vector<PhysicalDevice> devices(3, sound);
     devices[0].name = "llvmpipe (LLVM 15)";
     devices[0].uuid = "6d657361000000000000000000000000";
     devices[0].properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_CPU;
@@ -412,6 +415,12 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
                                    HasSubstr("6d657361")))
             << none;
     EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
+    devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 8;
+    EXPECT_EQ(chosen("auto"), "Little GPU") << "as the big one lacks buffers";
+    EXPECT_EQ(chosen("big"), "Big GPU") << "which is refused when it starts";
+    for (PhysicalDevice &device : devices)
+        device.queue_family = VK_QUEUE_FAMILY_IGNORED;
+    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "the first, where none will do";
 }
 
 TEST(Path, IsChosenByWhatTheDeviceHas) {
@@ -521,19 +530,31 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
     ARHOST_REQUIRE_VULKAN();
     const ScratchFolder folder;
     const EnvironmentVariable caches("XDG_CACHE_HOME", folder.path().string());
-    const auto file = folder.path() / "rt_vulkan.pipelines";
     Tracer tracer(scene::ArenaBuilder(), {}, "rt_vulkan"); // of nothing, whose shader is soon compiled
+    const auto files = [&] {                               // Mesa has its own there
+        std::vector<std::filesystem::path> files;
+        for (const auto &entry : std::filesystem::directory_iterator(folder.path()))
+            if (entry.path().filename().string().starts_with("rt_vulkan"))
+                files.push_back(entry);
+        return files;
+    };
     ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
-    ASSERT_TRUE(std::filesystem::exists(file));
+    ASSERT_THAT(files(), testing::SizeIs(1));
+    const auto file = files()[0];
+    EXPECT_THAT(file.filename(), testing::ResultOf([](const auto &name) { return name.string(); },
+                                                   testing::ContainsRegex("^rt_vulkan-[0-9a-f]{32}.pipelines$")))
+        << "a device's own";
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "written anew";
+    std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1);
+    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "begun anew, having become too large";
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // can't be replaced
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
-    for (const auto &entry : std::filesystem::directory_iterator(folder.path())) // Mesa has its own there
-        EXPECT_FALSE(entry.path().filename().string().starts_with("rt_vulkan.pipelines.")) << entry << " is left";
+    EXPECT_EQ(files(), std::vector{file}) << "nothing unfinished is left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
