@@ -12,17 +12,18 @@ namespace rt_vulkan {
 class Bands {
 public:
     static constexpr std::uint32_t unit = 8; // px; each band but an image's last has a multiple of this
-    // Short beside any watchdog (the strictest known have 2 s), long beside what a submission costs (some 0.1 ms).
-    static constexpr std::chrono::milliseconds most{100};
+    using Milliseconds = std::chrono::duration<double, std::milli>;
 
-    explicit Bands(std::uint32_t image_rows) : image_rows_(image_rows) {}
+    // A band is to take `most`, and at least half of that where the image does.
+    Bands(std::uint32_t image_rows, Milliseconds most) : image_rows_(image_rows), most_(most) {}
     // Of the next band; where fewer are left, those.
     std::uint32_t rows() const { return rows_; }
     // So long did so many rows take.
-    void took(std::uint32_t rows, std::chrono::duration<double, std::milli> time);
+    void took(std::uint32_t rows, Milliseconds time);
 
 private:
     std::uint32_t image_rows_;
+    Milliseconds most_;
     std::uint32_t rows_ = unit; // of what has not been seen yet, the least
 };
 

@@ -58,6 +58,12 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     return device;
 }
 
+// Short beside any watchdog (the strictest known have 2 s), long beside what a submission costs (some 0.1 ms). No one
+// watches a processor, and lavapipe deals out rows evenly to its threads: the more bands, the more of them wait.
+std::chrono::milliseconds longest_band(const PhysicalDevice &device) {
+    return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 1000 : 100);
+}
+
 // Tells the host that a driver is at work, which says nothing itself; but not for ever, as it may hang.
 class Heartbeat {
 public:
@@ -85,7 +91,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       stage_(shaders.pipeline_stage()), device_(instance, checked(physical), shaders.path), submission_(device_),
       scene_(*setup.scene, shaders.path == Path::plain, host),
-      samples_(arhost::view::sample_positions(settings.samples)), bands_(intrinsics_.height) {
+      samples_(arhost::view::sample_positions(settings.samples)), bands_(intrinsics_.height, longest_band(physical)) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building the trees");
