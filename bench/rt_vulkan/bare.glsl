@@ -4,6 +4,7 @@
 // image goes how far away the hit is, infinity where there is none.
 
 void write_distance(uvec2 at) {
+    at.y += band.first_row;
     if (at.x >= frame.width || at.y >= frame.height)
         return;
     uint pixel = at.y * frame.width + at.x;

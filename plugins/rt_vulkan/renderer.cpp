@@ -317,6 +317,7 @@ void Renderer::record_begin() {
 void Renderer::record_band(Rows rows) {
     if (rows.first == recorded_.first && rows.count == recorded_.count)
         return;
+    recorded_ = {};
     submission_.begin(band_);
     // The part that is drawn is read and widened by all of them.
     if (rows.first > 0)
