@@ -14,11 +14,11 @@ public:
     static constexpr std::uint32_t unit = 8; // px; each band but an image's last has a multiple of this
     using Milliseconds = std::chrono::duration<double, std::milli>;
 
-    // A band is to take `most`, and at least half of that where the image does.
+    // No band is to take longer than `most`, nor less than half of that where an image does.
     Bands(std::uint32_t image_rows, Milliseconds most) : image_rows_(image_rows), most_(most) {}
     // Of the next band; where fewer are left, those.
     std::uint32_t rows() const { return rows_; }
-    // So long did so many rows take.
+    // So long did so many rows take, with what came before and after them.
     void took(std::uint32_t rows, Milliseconds time);
 
 private:

@@ -55,7 +55,7 @@ struct PhysicalDevice {
     TracingLimits tracing;
 };
 
-// Why no path runs on it: "can't compute"; empty: at least one does.
+// What all paths need and it does not have, as "can't compute"; empty: nothing.
 std::string what_it_lacks(const PhysicalDevice &device);
 
 class Instance {

@@ -47,7 +47,7 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
     std::vector<char> data(size);
     const VkResult result = get(device.handle(), cache.get(), &size, data.data());
     data.resize(size);
-    if (result != VK_SUCCESS || data == file_bytes(file, most_bytes))
+    if (result != VK_SUCCESS || data.size() > most_bytes || data == file_bytes(file, most_bytes))
         return;
     std::string temporary = file.string() + ".XXXXXX"; // each process has its own
     const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);

@@ -37,6 +37,21 @@ arhost_device_kind kind_of(VkPhysicalDeviceType type) {
     }
 }
 
+// `auto` may choose another than the user expects, and says why.
+PhysicalDevice chosen_device(const Instance &instance, const std::string &wanted, const arhost::Host &host) {
+    const std::vector<PhysicalDevice> found = instance.devices();
+    PhysicalDevice chosen = choose_device(found, wanted);
+    if (wanted != "auto")
+        return chosen;
+    for (const PhysicalDevice &device : found)
+        if (const std::string why = what_it_lacks(device); !why.empty() && device.handle != chosen.handle)
+            host.warn("Vulkan device '" + device.name + "' is left out: it " + why);
+    if (chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
+        host.warn("no GPU that can be used is among the Vulkan devices: '" + chosen.name +
+                  "' traces on the processor, where rt_embree is faster");
+    return chosen;
+}
+
 class Plugin {
 public:
     // What option `device` chooses from.
@@ -48,7 +63,7 @@ public:
         for (const PhysicalDevice &device : found) {
             const std::string why_not = what_it_lacks(device);
             devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
-                               &device == &choose_device(found, "auto"), device.name, device.uuid,
+                               why_not.empty() && &device == &choose_device(found, "auto"), device.name, device.uuid,
                                why_not.empty() ? "paths: " + list_of(device.paths) : why_not});
         }
         return devices;
@@ -56,11 +71,8 @@ public:
 
     Plugin(const arhost::Host &host, const arhost::Options &options)
         : host_(host), instance_(host, options.boolean("validate")),
-          physical_(choose_device(instance_.devices(), options.text("device"))),
+          physical_(chosen_device(instance_, options.text("device"), host_)),
           paths_(choose_paths(physical_, options.text("path"))), shaders_(read_shaders(own_folder(), paths_[0])) {
-        if (options.text("device") == "auto" && physical_.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
-            host_.warn("no GPU is among the Vulkan devices: '" + physical_.name +
-                       "' traces on the processor, where rt_embree is faster");
         settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");

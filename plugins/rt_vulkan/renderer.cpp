@@ -58,10 +58,11 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     return device;
 }
 
-// Short beside any watchdog (the strictest known have 2 s), long beside what a submission costs (some 0.1 ms). No one
-// watches a processor, and lavapipe deals out rows evenly to its threads: the more bands, the more of them wait.
+// Short beside any watchdog (0.5 s: Linux's v3d and panfrost), long beside what a submission costs (some 0.1 ms).
+// There is none on a processor, and lavapipe deals out rows evenly to its threads: the more bands, the more of them
+// wait.
 std::chrono::milliseconds longest_band(const PhysicalDevice &device) {
-    return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 1000 : 100);
+    return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 250 : 100);
 }
 
 // Tells the host that a driver is at work, which says nothing itself; but not for ever, as it may hang.
@@ -91,7 +92,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       stage_(shaders.pipeline_stage()), device_(instance, checked(physical), shaders.path), submission_(device_),
       scene_(*setup.scene, shaders.path == Path::plain, host),
-      samples_(arhost::view::sample_positions(settings.samples)), bands_(intrinsics_.height, longest_band(physical)) {
+      samples_(arhost::view::sample_positions(settings.samples)),
+      bands_(intrinsics_.height, settings.longest_band.value_or(longest_band(physical))) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building the trees");
@@ -116,8 +118,6 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         device_.functions().vkCmdWriteTimestamp(start_clock_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, clock_.get(), begun);
         submission_.end(start_clock_);
     }
-    record_begin();
-    band_ = submission_.new_commands();
     frame_ = scene_.frame();
     frame_.width = intrinsics_.width;
     frame_.height = intrinsics_.height;
@@ -286,19 +286,34 @@ Renderer::Target &Renderer::target_of(const arhost_image &image) {
         target.buffer = Buffer(device_, std::size_t{target.stride} * image.height, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                Buffer::Place::host_read);
     }
-    target.copy = submission_.new_commands();
-    record_copy(target);
+    target.commands = submission_.new_commands();
     if (targets_.size() > most_targets) { // the oldest goes: nothing is under way here
-        submission_.free(targets_.front().copy);
+        submission_.free(targets_.front().commands);
         targets_.erase(targets_.begin());
     }
     return targets_.emplace_back(std::move(target));
 }
 
-void Renderer::record_begin() {
+void Renderer::record(Target &target, Rows rows) const {
+    if (rows.first == target.recorded.first && rows.count == target.recorded.count)
+        return;
+    target.recorded = {};
+    submission_.begin(target.commands);
+    if (rows.first == 0)
+        record_preparation(target.commands);
+    else // the part that is drawn is read and widened by all bands
+        barrier(device_.functions(), target.commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
+                VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    pipeline_->record(target.commands, set_, intrinsics_.width, rows);
+    if (rows.first + rows.count == intrinsics_.height)
+        record_copy(target);
+    submission_.end(target.commands);
+    target.recorded = rows;
+}
+
+// What moves comes to the device, and nothing is drawn yet.
+void Renderer::record_preparation(VkCommandBuffer commands) const {
     const DeviceFunctions &vk = device_.functions();
-    const VkCommandBuffer commands = begin_ = submission_.new_commands();
-    submission_.begin(commands);
     VkDeviceSize offset = 0;
     for (const Binding binding : moving_bindings)
         if (const VkDeviceSize size = scene_.moving_size(binding)) {
@@ -311,27 +326,11 @@ void Renderer::record_begin() {
     vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, drawn_size, nothing);
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, stage_,
             VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
-    submission_.end(commands);
-}
-
-void Renderer::record_band(Rows rows) {
-    if (rows.first == recorded_.first && rows.count == recorded_.count)
-        return;
-    recorded_ = {};
-    submission_.begin(band_);
-    // The part that is drawn is read and widened by all of them.
-    if (rows.first > 0)
-        barrier(device_.functions(), band_, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
-                VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
-    pipeline_->record(band_, set_, intrinsics_.width, rows);
-    submission_.end(band_);
-    recorded_ = rows;
 }
 
 void Renderer::record_copy(const Target &target) const {
     const DeviceFunctions &vk = device_.functions();
-    const VkCommandBuffer commands = target.copy;
-    submission_.begin(commands);
+    const VkCommandBuffer commands = target.commands;
     barrier(vk, commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
             VK_ACCESS_TRANSFER_READ_BIT);
     if (clock_.get())
@@ -352,7 +351,6 @@ void Renderer::record_copy(const Target &target) const {
             VK_ACCESS_HOST_READ_BIT);
     if (clock_.get())
         vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_.get(), copied);
-    submission_.end(commands);
 }
 
 void Renderer::record_shader(VkCommandBuffer commands) const {
@@ -378,6 +376,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
     if (host_.cancelled()) // before anything is told of this image
         throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
+    Target &target = target_of(image);
     look(camera, frame_);
     std::vector<VkCommandBuffer> commands;
     if (start_clock_)
@@ -393,7 +392,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (settings_.accumulate) {
         if (motion || !still_camera_ || !arhost::view::same_view(*still_camera_, camera))
             history_samples_ = 0;
-        still_camera_ = camera;
+        still_camera_.reset(); // an image that is not finished has spoilt what was summed up
         samples_ = arhost::view::sample_positions(history_samples_,
                                                   history_samples_ < enough_samples ? settings_.samples : 0);
     }
@@ -405,25 +404,22 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     }
     std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
 
-    const Target &target = target_of(image);
-    commands.push_back(begin_);
     trace(std::move(commands), target);
-    history_samples_ += settings_.accumulate ? frame_.sample_count : 0;
+    if (settings_.accumulate) {
+        history_samples_ += frame_.sample_count;
+        still_camera_ = camera;
+    }
     return read_back(target, image);
 }
 
 // `commands` come before the image's first band.
-void Renderer::trace(std::vector<VkCommandBuffer> commands, const Target &target) {
+void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
     for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
-        if (rows.first > 0 && host_.cancelled()) {
-            still_camera_.reset();
+        if (rows.first > 0 && host_.cancelled())
             throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
-        }
         rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);
-        record_band(rows);
-        commands.push_back(band_);
-        if (rows.first + rows.count == intrinsics_.height)
-            commands.push_back(target.copy);
+        record(target, rows);
+        commands.push_back(target.commands);
         const auto begin = std::chrono::steady_clock::now();
         submission_.run(commands);
         bands_.took(rows.count, std::chrono::steady_clock::now() - begin);

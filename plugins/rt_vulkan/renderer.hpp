@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From a camera to an image: its rows at once, or one band after another where that takes long.
+// From a camera to an image: at once, by commands that are recorded once for each place that images go to, or one
+// band of rows after another where that takes long.
 #pragma once
 
 #include "acceleration.hpp"
@@ -16,10 +17,11 @@
 namespace rt_vulkan {
 
 struct Settings {
-    std::uint32_t samples = 1;       // a pixel
-    std::uint32_t light_samples = 4; // shadow rays to an extended light, from each sample
-    bool accumulate = false;         // average over frames while the camera stands still
-    bool one_path = false;           // glass sends one ray on, chosen at random, in place of two
+    std::uint32_t samples = 1;                       // a pixel
+    std::uint32_t light_samples = 4;                 // shadow rays to an extended light, from each sample
+    bool accumulate = false;                         // average over frames while the camera stands still
+    bool one_path = false;                           // glass sends one ray on, chosen at random, in place of two
+    std::optional<Bands::Milliseconds> longest_band; // for tests; none: as the device asks
 };
 
 struct Rectangle {
@@ -52,7 +54,8 @@ private:
         std::uint8_t *rgba = nullptr;
         std::uint32_t stride = 0;
         Buffer buffer;
-        VkCommandBuffer copy = VK_NULL_HANDLE; // the image to it
+        VkCommandBuffer commands = VK_NULL_HANDLE;
+        Rows recorded{}; // what they trace
     };
     void make_buffers(const arhost_intrinsics &intrinsics, Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t least_size,
@@ -60,10 +63,10 @@ private:
     void make_set(const Shaders &shaders);
     void make_pipeline(const Shaders &shaders, std::uint32_t max_depth);
     Target &target_of(const arhost_image &image);
-    void record_begin();
-    void record_band(Rows rows);
+    void record(Target &target, Rows rows) const;
+    void record_preparation(VkCommandBuffer commands) const;
     void record_copy(const Target &target) const;
-    void trace(std::vector<VkCommandBuffer> commands, const Target &target);
+    void trace(std::vector<VkCommandBuffer> commands, Target &target);
     void write_moving_parts();
     Rectangle read_back(const Target &target, const arhost_image &image);
 
@@ -83,9 +86,6 @@ private:
     std::optional<Acceleration> acceleration_; // none on the plain path
     QueryPool clock_;                          // none where the device has none
     VkCommandBuffer start_clock_ = VK_NULL_HANDLE;
-    VkCommandBuffer begin_ = VK_NULL_HANDLE; // what moves is copied, nothing is drawn yet
-    VkCommandBuffer band_ = VK_NULL_HANDLE;  // recorded for these:
-    Rows recorded_{};
     Bands bands_;
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;

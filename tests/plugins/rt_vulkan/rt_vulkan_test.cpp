@@ -29,6 +29,7 @@ using testing::HasSubstr;
 // Keeps what is logged.
 struct LoggingHost {
     std::string text;
+    int asked = 0; // whether it cancels
     arhost_host host{sizeof host,
                      ARHOST_ABI_VERSION,
                      "arhost-test",
@@ -38,7 +39,10 @@ struct LoggingHost {
                          static_cast<LoggingHost *>(self->context)->text += std::string(message) + "\n";
                      },
                      [](const arhost_host *, double, const char *) {},
-                     [](const arhost_host *) { return 0; },
+                     [](const arhost_host *self) {
+                         ++static_cast<LoggingHost *>(self->context)->asked;
+                         return 0;
+                     },
                      [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 };
 
@@ -139,8 +143,9 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
     EXPECT_EQ(got.pixels(), first);
-    // So does the one after an image that was cancelled half-way.
+    // So does the one after an image that was cancelled half-way: the second still is in bands.
     ASSERT_EQ(vulkan.start(small), ARHOST_OK);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
     vulkan.plugin().cancel(1);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_ERROR_CANCELLED);
     vulkan.plugin().go_on();
@@ -181,38 +186,58 @@ TEST_P(EachPath, GivesRtEmbreesPicture) {
     expect_same_picture(from_the_side(small), {}, GetParam());
 }
 
-// The first image is, as no one knows how long it takes; then fewer and fewer.
-TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
-    Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK);
-    Picture first(small), later(small);
-    const int before = tracer.plugin().asked();
-    ASSERT_EQ(tracer.try_render(from_the_side(small), first), ARHOST_OK);
-    EXPECT_GT(tracer.plugin().asked() - before, 1) << "it looks before each band whether it is cancelled";
-    for (int image = 0; image < 4; ++image) {
-        ASSERT_EQ(tracer.try_render(from_the_side(small), later), ARHOST_OK);
-        EXPECT_EQ(later.pixels(), first.pixels()) << image;
-        EXPECT_EQ(later.info.region_x, first.info.region_x);
-        EXPECT_EQ(later.info.region_y, first.info.region_y);
-        EXPECT_EQ(later.info.region_width, first.info.region_width);
-        EXPECT_EQ(later.info.region_height, first.info.region_height);
-    }
-}
-TEST_P(EachPath, LeavesAnImageThatIsCancelledAndBeginsAnew) {
-    Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
+    const auto scene = [] { return scene::load_scene(moving_scene); };
+    Tracer tracer(scene(), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(small);
     const std::vector<Pixel> untouched = picture.pixels();
-    tracer.plugin().cancel(1);
-    EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_ERROR_CANCELLED);
+    const auto rendered = [&](double time_s) {
+        const arhost_motion motion = evaluator.at(time_s);
+        return tracer.try_render(of_moving(), picture, &motion);
+    };
+    tracer.plugin().cancel(1); // once the first band is done
+    EXPECT_EQ(rendered(0.7), ARHOST_ERROR_CANCELLED);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while an image was traced"));
     EXPECT_EQ(picture.pixels(), untouched);
     tracer.plugin().go_on();
-    ASSERT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
-    const std::vector<Pixel> once = picture.pixels();
+    ASSERT_EQ(rendered(0.3), ARHOST_OK);
+    const std::vector<Pixel> after = picture.pixels();
     ASSERT_EQ(tracer.start(small), ARHOST_OK);
-    ASSERT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
-    EXPECT_EQ(picture.pixels(), once);
+    ASSERT_EQ(rendered(0.3), ARHOST_OK);
+    EXPECT_EQ(after, picture.pixels());
+}
+TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
+    LoggingHost logging;
+    const Host host(&logging.host);
+    const rt_vulkan::Instance instance(host, false);
+    const auto devices = instance.devices();
+    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
+    const auto shaders =
+        rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, GetParam())[0]);
+    scene::Arena arena = rich_scene().build();
+    for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
+        const arhost_intrinsics in = pinhole(96, height, 96);
+        const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &arena.scene(), &in};
+        // The first image is in bands in any case, as no one knows how long it takes; the second may be.
+        const auto third = [&](rt_vulkan::Bands::Milliseconds longest_band) {
+            rt_vulkan::Settings settings;
+            settings.longest_band = longest_band;
+            rt_vulkan::Renderer renderer(setup, settings, host, instance, device, shaders);
+            rt_vulkan::Rectangle drawn{};
+            Picture picture(in);
+            for (int image = 0; image < 3; ++image) {
+                const int asked = logging.asked;
+                drawn = renderer.render(from_the_side(in), picture.image());
+                const int expected = longest_band.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
+                EXPECT_TRUE(image < 2 || logging.asked - asked == expected) << "a look before each band";
+            }
+            EXPECT_TRUE(picture.only_pixels_written());
+            return std::tuple(picture.pixels(), drawn.x, drawn.y, drawn.width, drawn.height);
+        };
+        EXPECT_EQ(third(std::chrono::milliseconds(0)), third(std::chrono::hours(1))) << height;
+    }
 }
 TEST_P(EachPath, IsToldOf) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
@@ -387,7 +412,7 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     using rt_vulkan::PhysicalDevice;
     PhysicalDevice sound{};
     sound.properties.apiVersion = VK_API_VERSION_1_1;
-    sound.properties.limits.maxPerStageDescriptorStorageBuffers = 16;
+    sound.properties.limits.maxPerStageDescriptorStorageBuffers = 14;
     std::vector<PhysicalDevice> devices(3, sound);
     devices[0].name = "llvmpipe (LLVM 15)";
     devices[0].uuid = "6d657361000000000000000000000000";
@@ -415,11 +440,12 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
                                    HasSubstr("6d657361")))
             << none;
     EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
-    devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 8;
+    devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 13;
     EXPECT_EQ(chosen("auto"), "Little GPU") << "as the big one lacks buffers";
     EXPECT_EQ(chosen("big"), "Big GPU") << "which is refused when it starts";
-    for (PhysicalDevice &device : devices)
-        device.queue_family = VK_QUEUE_FAMILY_IGNORED;
+    devices[2].properties.apiVersion = VK_API_VERSION_1_0;
+    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)");
+    devices[0].queue_family = VK_QUEUE_FAMILY_IGNORED;
     EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "the first, where none will do";
 }
 
@@ -468,7 +494,8 @@ TEST(Device, IsListedByTheHost) {
     for (const auto &device : rt_vulkan::Instance(Host(&logging.host), false).devices()) {
         EXPECT_THAT(text, HasSubstr(device.name));
         EXPECT_THAT(text, HasSubstr(device.uuid));
-        EXPECT_THAT(text, HasSubstr("paths: " + rt_vulkan::list_of(device.paths)));
+        const std::string lacks = rt_vulkan::what_it_lacks(device);
+        EXPECT_THAT(text, HasSubstr(lacks.empty() ? "paths: " + rt_vulkan::list_of(device.paths) : lacks));
     }
 }
 
@@ -491,8 +518,8 @@ TEST(Device, WithoutWhatIsNeededIsRefused) {
                 testing::AllOf(HasSubstr(sound.name), HasSubstr("1.1 is needed"), HasSubstr("option 'device'")));
     EXPECT_THAT(complaint([](auto &device) { device.queue_family = VK_QUEUE_FAMILY_IGNORED; }),
                 HasSubstr("can't compute"));
-    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 4; }),
-                HasSubstr("reads 4 buffers at once"));
+    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 13; }),
+                HasSubstr("reads 13 buffers at once, and 14 are needed"));
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxStorageBufferRange = 64; }),
                 HasSubstr("reads 1 MiB at most: use smaller"));
 }
@@ -548,9 +575,6 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
     std::ofstream(file) << "garbage";
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "written anew";
-    std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1);
-    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "begun anew, having become too large";
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // can't be replaced
     EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
@@ -619,7 +643,7 @@ INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
 TEST_P(ValidationOfPath, HasNothingToSay) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
-    for (int frame = 0; frame < 3; ++frame) {
+    for (int frame = 0; frame < 5; ++frame) { // in bands, and from the third on, if not before, at once
         Picture picture(small);
         EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
     }
@@ -633,7 +657,7 @@ TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
     ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     std::vector<std::vector<Pixel>> pictures;
-    for (const double time_s : {0.0, 0.7, 0.0}) {
+    for (const double time_s : {0.0, 0.7, 0.0, 0.3}) {
         const arhost_motion motion = evaluator.at(time_s);
         Picture picture(small);
         EXPECT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK);
