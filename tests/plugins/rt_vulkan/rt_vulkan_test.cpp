@@ -170,6 +170,21 @@ arhost_camera of_moving(const arhost_intrinsics &intrinsics = small) {
 const std::string moving_scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
 const auto all_paths = testing::Values("plain", "query", "pipeline");
 
+// What a renderer is made of, by a path.
+struct RendererParts {
+    explicit RendererParts(const std::string &path)
+        : device(rt_vulkan::choose_device(instance.devices(), "auto")),
+          shaders(rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, path)[0])) {}
+    rt_vulkan::Renderer renderer(const arhost_raytracer_setup &setup, const rt_vulkan::Settings &settings = {}) {
+        return {setup, settings, host, instance, device, shaders};
+    }
+    LoggingHost logging;
+    const Host host{&logging.host};
+    const rt_vulkan::Instance instance{host, false};
+    const rt_vulkan::PhysicalDevice device;
+    const rt_vulkan::Shaders shaders;
+};
+
 std::string name_of_path(const testing::TestParamInfo<std::string> &info) {
     return info.param;
 }
@@ -209,13 +224,7 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     EXPECT_EQ(after, picture.pixels());
 }
 TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
-    LoggingHost logging;
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, false);
-    const auto devices = instance.devices();
-    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
-    const auto shaders =
-        rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, GetParam())[0]);
+    RendererParts parts(GetParam());
     scene::Arena arena = rich_scene().build();
     for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
         const arhost_intrinsics in = pinhole(96, height, 96);
@@ -224,14 +233,14 @@ TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
         const auto third = [&](rt_vulkan::Bands::Milliseconds longest_band) {
             rt_vulkan::Settings settings;
             settings.longest_band = longest_band;
-            rt_vulkan::Renderer renderer(setup, settings, host, instance, device, shaders);
+            rt_vulkan::Renderer renderer = parts.renderer(setup, settings);
             rt_vulkan::Rectangle drawn{};
             Picture picture(in);
             for (int image = 0; image < 3; ++image) {
-                const int asked = logging.asked;
+                const int asked = parts.logging.asked;
                 drawn = renderer.render(from_the_side(in), picture.image());
                 const int expected = longest_band.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
-                EXPECT_TRUE(image < 2 || logging.asked - asked == expected) << "a look before each band";
+                EXPECT_TRUE(image < 2 || parts.logging.asked - asked == expected) << "a look before each band";
             }
             EXPECT_TRUE(picture.only_pixels_written());
             return std::tuple(picture.pixels(), drawn.x, drawn.y, drawn.width, drawn.height);
@@ -297,18 +306,12 @@ TEST_P(EachPath, FollowsWhatMoves) {
 }
 
 TEST_P(EachPath, TakesOneSceneAfterAnother) {
-    LoggingHost logging;
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, false);
-    const auto devices = instance.devices();
-    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
-    const auto shaders =
-        rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, GetParam())[0]);
+    RendererParts parts(GetParam());
     const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
         scene::Arena arena = std::move(scene).build();
         const arhost_raytracer_setup setup{sizeof setup,   small.width,     small.height, 0,
                                            &arena.scene(), &view.intrinsics};
-        rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shaders);
+        rt_vulkan::Renderer renderer = parts.renderer(setup);
         Picture picture(small);
         const rt_vulkan::Rectangle drawn = renderer.render(view, picture.image());
         EXPECT_EQ(drawn.width > 0, picture.alphas().rbegin()->first > 0);
@@ -327,18 +330,13 @@ TEST_P(EachPath, TakesOneSceneAfterAnother) {
 // Page-aligned memory, as that of slots, goes to the device itself; what is beside the rows stays as it is.
 TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
     ARHOST_REQUIRE_VULKAN();
-    LoggingHost logging;
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, false);
-    const auto devices = instance.devices();
-    const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
-    if (!device.imports_host_memory)
-        GTEST_SKIP() << device.name << " lacks VK_EXT_external_memory_host";
-    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::Path::plain);
+    RendererParts parts("plain");
+    if (!parts.device.imports_host_memory)
+        GTEST_SKIP() << parts.device.name << " lacks VK_EXT_external_memory_host";
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
-    rt_vulkan::Renderer renderer(setup, {}, host, instance, device, shaders);
+    rt_vulkan::Renderer renderer = parts.renderer(setup);
 
     const std::uint32_t stride = 4 * small.width + 64;
     const std::size_t size = std::size_t{stride} * small.height, pages = (size + 4095) / 4096 * 4096;
@@ -348,8 +346,9 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
     Picture copied(small);
     const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory};
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
-    if (!renderer.wrote_in_place() && device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
-        GTEST_SKIP() << device.name << " does not take such memory"; // AMD's Linux driver takes none that is shared
+    if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
+        GTEST_SKIP() << parts.device.name
+                     << " does not take such memory"; // AMD's Linux driver takes none that is shared
     EXPECT_TRUE(renderer.wrote_in_place());
     const arhost_image elsewhere = copied.image(); // 64 bytes aligned
     renderer.render(view, elsewhere);
