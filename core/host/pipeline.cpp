@@ -297,8 +297,13 @@ void Pipeline::pump() {
             sink->pump();
             sinks_empty = sinks_empty && (sink->empty() || sink->failed);
         }
-        if (no_more_frames() && reads_.empty() && frames_.empty() && sinks_empty)
-            stop_components();
+        if (no_more_frames() && reads_.empty()) {
+            if (frames_.empty() && sinks_empty)
+                stop_components();
+            else if (std::all_of(frames_.begin(), frames_.end(),
+                                 [](const auto &entry) { return entry.second->overtaken; }))
+                cancel_stages();
+        }
     }
     if (phase_ == Phase::stopping) {
         for (const auto &sink : sinks_)
@@ -758,6 +763,13 @@ void Pipeline::end_run() {
     ended_ = true;
     if (source_)
         source_->cancel_call();
+}
+
+// Of frames that no one is to see any more.
+void Pipeline::cancel_stages() {
+    for (Component *stage : {tracker_.get(), raytracer_.get()})
+        if (stage)
+            stage->cancel_call();
 }
 
 void Pipeline::give_up_sink(SinkQueue &sink) {

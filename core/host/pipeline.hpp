@@ -67,6 +67,7 @@ private:
     void compose(Frame &frame, std::span<std::byte> slot);
     ImageView overlay_of(const Frame &frame) const;
     void look_at_what_was_given(const Frame &frame);
+    void cancel_stages();
     void stop_components();
 
     void on_read(const ring::Command &command, const ring::Result &result);

@@ -283,10 +283,8 @@ void Component::crashed(Crash crash) {
 
 void Component::try_again(const std::string &reason) {
     const auto delay = policy_.died(std::uniform_real_distribution<double>(0, 1)(jitter_));
-    if (!delay) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
+    if (!delay)
         return give_up(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row", false);
-    }
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
     context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; starting it again" + wait);
     ++restarts_;
@@ -325,7 +323,7 @@ void Component::watch_frame() {
     if (in_flight_.empty())
         return;
     deadline_ = context_.reactor.at(Reactor::Clock::now() + limits_.frame, [this] {
-        process_->end("hung: no answer within " + std::to_string(limits_.frame.count()) + " ms");
+        process_->end("hung: no answer within " + std::to_string(limits_.frame.count()) + " ms, its deadline_ms");
     });
 }
 

@@ -54,6 +54,17 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
 
+TEST(Live, AtTheEndAnImageThatNoOneWaitsForIsCancelled) {
+    ArhostRun run(counting("live", "frames: 40", "", "delay_ms: 600000", "live: {max_latency_ms: 100}\n",
+                           std::chrono::minutes(10)));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("cancelled while it waited"));
+    EXPECT_EQ(run.stats()["frames"]["in"], 40);
+    EXPECT_EQ(dropped(run.stats()) + counted(run).size(), 40u) << run.stats().dump(1);
+    EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
+}
+
 // The real plugins at 30 frames a second; at 64 samples a pixel no machine's ray tracer keeps up.
 TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
 #if defined(__SANITIZE_ADDRESS__)

@@ -63,6 +63,18 @@ static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *
     return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_OK : ARHOST_ERROR_INVALID_ARGUMENT;
 }
 
+/* Whether the host cancels meanwhile. */
+static int waits(const arhost_instance *self) {
+    double left_ms = self->delay_ms;
+    while (left_ms > 0 && !self->host->cancelled(self->host)) {
+        const double step_ms = left_ms < 50 ? left_ms : 50;
+        const struct timespec time = {0, (long)(step_ms * 1e6)};
+        nanosleep(&time, NULL);
+        left_ms -= step_ms;
+    }
+    return left_ms > 0;
+}
+
 static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
                             arhost_render_info *info) {
     const int64_t number = (int64_t)(request->camera.eye[2] - 500.0 + 0.5);
@@ -75,11 +87,9 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
         pause();
     if (misbehave_if_asked() || number == self->error_at)
         return (arhost_status)self->error;
-    if (self->delay_ms > 0) {
-        struct timespec time = {0, 0};
-        time.tv_sec = (time_t)(self->delay_ms / 1000.0);
-        time.tv_nsec = (long)((self->delay_ms - 1000.0 * (double)time.tv_sec) * 1e6);
-        nanosleep(&time, NULL);
+    if (waits(self)) {
+        self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while it waited");
+        return ARHOST_ERROR_CANCELLED;
     }
     for (y = 0; y < image->height; ++y)
         for (x = 0; x < image->width; ++x) {
@@ -112,7 +122,7 @@ static const arhost_option_descriptor options[] = {
      "Returns an error for this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL, "Which: its status"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "The status of each frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 60000, NULL,
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 600000, NULL,
      "Sleeps so long in each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
      "Writes into the image before, too"},

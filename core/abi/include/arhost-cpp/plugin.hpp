@@ -126,7 +126,9 @@ template <class Call> arhost_status guarded(const Host &host, Call &&call) noexc
     try {
         return call();
     } catch (const Failure &failure) {
-        host.error(failure.what());
+        // That it was cancelled is no fault.
+        host.log(failure.status() == ARHOST_ERROR_CANCELLED ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_ERROR,
+                 failure.what());
         return failure.status();
     } catch (const std::bad_alloc &) {
         host.log(ARHOST_SEVERITY_ERROR, "out of memory");
