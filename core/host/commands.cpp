@@ -230,9 +230,8 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
             if (!stopped_by_signal) {
                 first_signal = now;
                 console.log(ARHOST_SEVERITY_INFO, "arhost",
-                            "stopping: the frames under way and the files are finished first; a second signal ends "
-                            "the run at "
-                            "once");
+                            "stopping: the frames under way and the files are finished first; a second signal "
+                            "ends the run at once");
             }
             stopped_by_signal = true;
             pipeline.interrupt();

@@ -300,8 +300,7 @@ void Pipeline::pump() {
         if (no_more_frames() && reads_.empty()) {
             if (frames_.empty() && sinks_empty)
                 stop_components();
-            else if (std::all_of(frames_.begin(), frames_.end(),
-                                 [](const auto &entry) { return entry.second->overtaken; }))
+            else if (std::all_of(frames_.begin(), frames_.end(), [](const auto &f) { return f.second->overtaken; }))
                 cancel_stages();
         }
     }
@@ -765,10 +764,10 @@ void Pipeline::end_run() {
         source_->cancel_call();
 }
 
-// Of frames that no one is to see any more.
+// Calls for frames that no one is to see any more; where there is none, what follows is not to be cancelled.
 void Pipeline::cancel_stages() {
     for (Component *stage : {tracker_.get(), raytracer_.get()})
-        if (stage)
+        if (stage && !frames_.empty())
             stage->cancel_call();
 }
 
