@@ -116,18 +116,25 @@ int main(int argc, char **argv) {
     double time_s = 0;
     bool transparent = false;
     app.add_option("scene", scene, "The scene file")->required();
-    app.add_option("--eye", view.eye, "Where the camera is")->delimiter(',')->capture_default_str();
+    app.add_option("--eye", view.eye, "Where the camera is")
+        ->delimiter(',')
+        ->type_name("X,Y,Z")
+        ->capture_default_str();
     app.add_option("--look-at", view.look_at, "What is in the picture's middle")
         ->delimiter(',')
+        ->type_name("X,Y,Z")
         ->capture_default_str();
-    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")->delimiter(',');
+    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
+        ->delimiter(',')
+        ->type_name("X,Y,Z");
     app.add_option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
         ->check(CLI::Range(1.0, 170.0))
         ->capture_default_str();
     app.add_option("--size", view.size, "Of the picture, px")
         ->delimiter('x')
+        ->type_name("WIDTHxHEIGHT")
         ->check(CLI::Range(1, 16384))
-        ->capture_default_str();
+        ->default_str(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
     app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
         ->check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
