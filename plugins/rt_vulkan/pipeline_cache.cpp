@@ -11,7 +11,7 @@ namespace rt_vulkan {
 namespace {
 
 // Each scene adds to it: one that has more is begun anew.
-constexpr std::uintmax_t most_bytes = std::uintmax_t{64} << 20;
+constexpr std::uintmax_t largest_cache = std::uintmax_t{64} << 20;
 
 // Where a device's are kept, of this version of its driver; empty: nowhere.
 std::filesystem::path file_of(const Device &device) {
@@ -27,7 +27,7 @@ std::filesystem::path file_of(const Device &device) {
 PipelineCache read_pipeline_cache(const Device &device) {
     std::vector<char> data;
     if (const auto file = file_of(device); !file.empty())
-        data = file_bytes(file, most_bytes);
+        data = file_bytes(file, largest_cache);
     VkPipelineCacheCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO;
     info.initialDataSize = data.size(); // the driver looks at its header, and ignores another driver's
@@ -47,7 +47,7 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
     std::vector<char> data(size);
     const VkResult result = get(device.handle(), cache.get(), &size, data.data());
     data.resize(size);
-    if (result != VK_SUCCESS || data.size() > most_bytes || data == file_bytes(file, most_bytes))
+    if (result != VK_SUCCESS || data.size() > largest_cache || data == file_bytes(file, largest_cache))
         return;
     std::string temporary = file.string() + ".XXXXXX"; // each process has its own
     const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);

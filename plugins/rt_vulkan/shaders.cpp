@@ -12,7 +12,7 @@ namespace {
 
 using arhost::Failure;
 
-constexpr std::uintmax_t most_bytes = std::uintmax_t{16} << 20; // of a shader: the largest has some 0.2 MiB
+constexpr std::uintmax_t largest_shader = std::uintmax_t{16} << 20; // of a shader: the largest has some 0.2 MiB
 
 // Of the pipeline path, in the order that pipeline.cpp puts into groups.
 constexpr VkShaderStageFlagBits pipeline_stages[] = {
@@ -71,7 +71,7 @@ std::uint32_t model_of(VkShaderStageFlagBits stage) {
 }
 
 Shader read_shader(const std::filesystem::path &file, VkShaderStageFlagBits stage, Path path) {
-    const std::vector<char> bytes = file_bytes(file, most_bytes);
+    const std::vector<char> bytes = file_bytes(file, largest_shader);
     if (bytes.empty())
         throw Failure(ARHOST_ERROR_CONFIGURATION,
                       "the shader '" + file.string() + "' is missing or can't be read; install arhost again");
