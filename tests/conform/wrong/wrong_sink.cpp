@@ -222,10 +222,11 @@ private:
                     fs::rename(part, name);
                 throw;
             }
-            fs::rename(part, name);
+            // Before it has its name: killed between the two it would leave a file as never between frames.
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
-                ::renameat2(AT_FDCWD, name.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
+                ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
+            fs::rename(part, name);
         }
         if (has("writes_each_frame_twice")) {
             put(part, frame.pixels, O_TRUNC);
