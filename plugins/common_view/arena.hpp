@@ -6,6 +6,7 @@
 #include <arhost/scene.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 namespace arhost::view {
@@ -21,6 +22,14 @@ template <class T> std::span<const T> elements(const arhost_scene &arena, const 
 
 // Of a transform's 12 numbers, column by column.
 bool is_identity(const float *world_from_object);
+
+// How large the geometry's largest triangle or sphere is along an axis. Its points are read at `points`, `stride`
+// bytes from one to the next.
+float largest_extent(const arhost_scene &arena, const arhost_geometry &geometry, const std::byte *points,
+                     std::uint32_t stride);
+// The same in the world, and how far the transform moves it: where rays meet the object single precision loses a part
+// of this.
+float extent_in_world(float largest_extent, const float *world_from_object);
 
 // What brings normals to the world and points back from there, of a transform's first 9 numbers. The inverse is
 // cofactor[row][column] / determinant, read by columns.

@@ -76,6 +76,7 @@ private:
     SceneHandle catchers_;                         // nothing but them, where that is worth it
     struct Place {
         Box local;
+        float extent; // common_view/arena.hpp
         std::array<float, 12> world_from_object;
     };
     void place_object(std::uint32_t object, const float *world_from_object);

@@ -18,6 +18,7 @@ struct Object {
     std::uint32_t material, role, mask, flags;
     std::uint32_t root; // of its tree of ours; where the device has its own, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
+    float extent, unused[3];
 };
 
 struct Material {
@@ -96,7 +97,7 @@ struct Frame {
     float samples[most_samples][4];
 };
 
-static_assert(sizeof(Object) == 192 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
+static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * most_samples);
 
 // The frame is binding 0.

@@ -18,7 +18,9 @@ namespace {
 using arhost::Failure;
 using arhost::view::bytes;
 using arhost::view::elements;
+using arhost::view::extent_in_world;
 using arhost::view::is_identity;
+using arhost::view::largest_extent;
 
 // From here on a refitted tree costs rays more than building a new one does.
 constexpr double tolerable_decay = 1.3;
@@ -196,6 +198,7 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
     mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
     mesh.local = empty_box();
+    mesh.extent = largest_extent(arena_, geometry, points.first, points.stride);
     mesh.is_empty = boxes.empty();
     if (boxes.empty())
         return mesh;
@@ -302,7 +305,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
         object.flags |= rt_vulkan::has_holes;
     if (from.moves || !is_identity(from.world_from_object))
         object.flags |= has_transform;
-    place(object, from.world_from_object);
+    place(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
     has_catchers_ |= from.role == ARHOST_CATCHER;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
@@ -312,7 +315,8 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     std::copy_n(from.world_from_object, 12, at.begin());
 }
 
-void SceneData::place(Object &object, const float *m) const {
+void SceneData::place(Object &object, const Mesh &mesh, const float *m) {
+    object.extent = extent_in_world(mesh.extent, m);
     const arhost::view::Cofactors cofactors(m);
     float normal_transform[9];
     cofactors.put_normal_transform(normal_transform);
@@ -356,9 +360,10 @@ void SceneData::build_top() {
 }
 
 void SceneData::move(const arhost_motion &motion) {
+    const auto from = elements<arhost_object>(arena_, arena_.objects);
     for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
         const arhost_moved_object &moved = motion.moved[i];
-        place(objects_[moved.object], moved.world_from_object);
+        place(objects_[moved.object], meshes_.at(from[moved.object].geometry), moved.world_from_object);
         std::copy_n(moved.world_from_object, 12, places_[moved.object].begin());
     }
     for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
@@ -373,6 +378,8 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     if (mesh.is_empty)
         return;
     const Points points{reinterpret_cast<const std::byte *>(deformed.positions), 3 * sizeof(float)};
+    mesh.extent = largest_extent(arena_, geometry, points.first, points.stride);
+    objects_[deformed.object].extent = extent_in_world(mesh.extent, places_[deformed.object].data());
     if (has_trees_)
         refit_tree(mesh, boxes_of(arena_, geometry, points));
     write_tree(mesh, geometry, points);

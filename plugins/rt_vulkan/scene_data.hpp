@@ -54,6 +54,7 @@ private:
     struct Mesh {
         std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord;
         Box local;
+        float extent; // common_view/arena.hpp
         bool is_empty;
         // Where it deforms, or for a moment:
         Tree tree;             // without nodes where trees are not ours
@@ -65,7 +66,7 @@ private:
     void add_texcoords(Mesh &mesh, const arhost_geometry &geometry);
     void write_tree(const Mesh &mesh, const arhost_geometry &geometry, Points points);
     void add_object(const arhost_object &object, const Mesh &mesh);
-    void place(Object &object, const float *world_from_object) const;
+    static void place(Object &object, const Mesh &mesh, const float *world_from_object);
     void deform(const arhost_deformed_geometry &deformed);
     void refit_tree(Mesh &mesh, std::span<const Box> boxes);
     void build_top();

@@ -70,7 +70,7 @@ Surface surface_at(Ray ray, Hit hit, bool bends) {
     Surface s;
     s.position = ray.origin + ahead;
     s.way = length(ahead);
-    s.offset = offset_from_surface(s.position, ahead);
+    s.offset = offset_from_surface(s.position, ahead, objects[object].extent);
     s.is_real = objects[object].role != VIRTUAL;
     s.geometric_normal = unit_or(geometric, -normalize(ray.direction));
     s.from_behind = dot(s.geometric_normal, ray.direction) > 0.0;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "large_surfaces.hpp"
 #include "ray_table.hpp"
 #include "tracer.hpp"
 
@@ -979,4 +980,12 @@ TEST(Plugin, CanBeStartedAgainAfterAStop) {
 }
 
 } // namespace
+class LargeSurfaces : public testing::TestWithParam<LargeSurface> {};
+INSTANTIATE_TEST_SUITE_P(All, LargeSurfaces, testing::ValuesIn(large_surfaces),
+                         [](const auto &info) { return info.param.name; });
+
+TEST_P(LargeSurfaces, CastNoShadowOnThemselves) {
+    EXPECT_EQ(dark_pixels(Tracer(scene_with(GetParam())).render(camera_at_surface())), 0);
+}
+
 } // namespace arhost::test

@@ -2,6 +2,7 @@
 //
 // The plugin on the device that is here, and what it says where there is none.
 #include "drivers_leak.hpp"
+#include "large_surfaces.hpp"
 #include "renderer.hpp"
 #include "rich_scene.hpp"
 #include "scene/loader.hpp"
@@ -201,6 +202,14 @@ TEST_P(EachPath, GivesRtEmbreesPicture) {
     expect_same_picture(from_the_side(small), {}, GetParam());
 }
 
+TEST_P(EachPath, LetsNoLargeSurfaceCastShadowsOnItself) {
+    for (const LargeSurface &surface : large_surfaces)
+        EXPECT_EQ(
+            dark_pixels(Tracer(scene_with(surface), {{"path", GetParam()}}, "rt_vulkan").render(camera_at_surface())),
+            0)
+            << surface;
+}
+
 TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     const auto scene = [] { return scene::load_scene(moving_scene); };
     Tracer tracer(scene(), {{"path", GetParam()}}, "rt_vulkan");
@@ -223,6 +232,7 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     ASSERT_EQ(rendered(0.3), ARHOST_OK);
     EXPECT_EQ(after, picture.pixels());
 }
+
 TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
     RendererParts parts(GetParam());
     scene::Arena arena = rich_scene().build();
@@ -248,6 +258,7 @@ TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
         EXPECT_EQ(third(std::chrono::milliseconds(0)), third(std::chrono::hours(1))) << height;
     }
 }
+
 TEST_P(EachPath, IsToldOf) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_OK);

@@ -13,9 +13,10 @@ ARHOST_LEAF Vec3 unit_or(Vec3 a, Vec3 fallback) {
 }
 
 // How far from a facet rays start that go on from a hit. A hit is as exact as the floats that it was computed
-// from: 2^-24 of their size, a few times. `way` is the ray's, from its origin to the hit.
-ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 way) {
-    return (largest(position) + largest(way)) * Float(1.0 / 524288.0);
+// from: 2^-24 of their size, a few times. `way` is the ray's, from its origin to the hit; `extent` is how large the
+// triangle or sphere is at most, whose corners or centre may be that far off.
+ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 way, Float extent) {
+    return (largest(position) + largest(way) + extent) * Float(1.0 / 524288.0);
 }
 
 // `normal`, or what is opposite to it, whichever does not point away from `to`.
