@@ -300,7 +300,8 @@ void Pipeline::pump() {
         if (no_more_frames() && reads_.empty()) {
             if (frames_.empty() && sinks_empty)
                 stop_components();
-            else if (std::all_of(frames_.begin(), frames_.end(), [](const auto &f) { return f.second->overtaken; }))
+            else if (!frames_.empty() &&
+                     std::all_of(frames_.begin(), frames_.end(), [](const auto &f) { return f.second->overtaken; }))
                 cancel_stages();
         }
     }
@@ -764,10 +765,10 @@ void Pipeline::end_run() {
         source_->cancel_call();
 }
 
-// Calls for frames that no one is to see any more; where there is none, what follows is not to be cancelled.
+// Calls for frames that no one is to see any more.
 void Pipeline::cancel_stages() {
     for (Component *stage : {tracker_.get(), raytracer_.get()})
-        if (stage && !frames_.empty())
+        if (stage)
             stage->cancel_call();
 }
 

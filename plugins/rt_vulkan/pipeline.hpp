@@ -14,6 +14,7 @@ inline constexpr std::uint32_t group_side = 8; // of a compute shader's invocati
 // Some of an image's rows, which a first one and their number tell.
 struct Rows {
     std::uint32_t first, count;
+    bool operator==(const Rows &) const = default;
 };
 // The constants that are pushed with them (shaders/scene.glsl).
 inline constexpr std::uint32_t pushed_size = sizeof Rows::first;

@@ -295,7 +295,7 @@ Renderer::Target &Renderer::target_of(const arhost_image &image) {
 }
 
 void Renderer::record(Target &target, Rows rows) const {
-    if (rows.first == target.recorded.first && rows.count == target.recorded.count)
+    if (rows == target.recorded)
         return;
     target.recorded = {};
     submission_.begin(target.commands);

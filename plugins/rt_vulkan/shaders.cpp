@@ -12,7 +12,7 @@ namespace {
 
 using arhost::Failure;
 
-constexpr std::uintmax_t largest_shader = std::uintmax_t{16} << 20; // of a shader: the largest has some 0.2 MiB
+constexpr std::uintmax_t largest_shader = std::uintmax_t{16} << 20; // ours have 0.2 MiB at most
 
 // Of the pipeline path, in the order that pipeline.cpp puts into groups.
 constexpr VkShaderStageFlagBits pipeline_stages[] = {

@@ -208,6 +208,7 @@ TEST(Run, ASecondCtrlCALittleLaterEndsItAtOnce) {
     ::kill(run.pid(), SIGINT);
     std::this_thread::sleep_for(std::chrono::milliseconds(3000));
     ASSERT_TRUE(run.running()) << "it was to wait for the output";
+    EXPECT_THAT(run.output(), HasSubstr("finished first; a second signal ends the run at once"));
     ::kill(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(std::chrono::seconds(5)), 130) << run.output();
 }

@@ -79,6 +79,11 @@ TEST_F(RenderScene, TellsOfWrongUsageInOneLineThatCantSteerATerminal) {
     EXPECT_FALSE(fs::exists(folder() / "a.png"));
 }
 
+TEST_F(RenderScene, ShowsHowPointsAndSizesAreWritten) {
+    EXPECT_EQ(status_of(" --help"), 0);
+    EXPECT_THAT(said(), AllOf(HasSubstr("--eye X,Y,Z"), HasSubstr("--size WIDTHxHEIGHT")));
+}
+
 TEST_F(RenderScene, PassesOverTheTimeWhereNothingMoves) {
     const std::string still = picture("demo", "");
     ASSERT_FALSE(still.empty()) << said();

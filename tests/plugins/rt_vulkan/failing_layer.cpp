@@ -8,7 +8,8 @@
 //   pipelines:N it makes no Nth pipeline for ray tracing, nor later ones
 //   device-with:EXTENSION  it can't be opened with that
 // Where ARHOST_TEST_VULKAN_IS_A_GPU is "query" or "pipeline", all devices say that they are discrete GPUs, and lack
-// the extensions of later paths.
+// the extensions of later paths. Where ARHOST_TEST_VULKAN_IS_OLD is there, the device that is asked first knows
+// Vulkan 1.0 only.
 #include <vulkan/vk_layer.h>
 
 #include <cstdint>
@@ -27,6 +28,7 @@ struct NextInstance {
     PFN_vkDestroyInstance destroy;
     PFN_vkGetPhysicalDeviceProperties2 get_properties;
     PFN_vkEnumerateDeviceExtensionProperties list_extensions;
+    VkPhysicalDevice asked_first = VK_NULL_HANDLE;
 };
 struct NextDevice {
     VkDevice handle;
@@ -182,6 +184,12 @@ VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical, VkPhysicalD
     instance_of(physical).get_properties(physical, properties);
     if (std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU"))
         properties->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    const std::lock_guard lock(mutex);
+    VkPhysicalDevice &asked_first = instances.at(key_of(physical)).asked_first;
+    if (!asked_first)
+        asked_first = physical;
+    if (asked_first == physical && std::getenv("ARHOST_TEST_VULKAN_IS_OLD"))
+        properties->properties.apiVersion = VK_API_VERSION_1_0;
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL list_extensions(VkPhysicalDevice physical, const char *layer, std::uint32_t *count,

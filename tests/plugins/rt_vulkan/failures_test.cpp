@@ -2,6 +2,7 @@
 //
 // A Vulkan device that is lost or has no memory left, when it starts and in mid-run, as failing_layer.cpp has it.
 #include "arhost_run.hpp"
+#include "copy_drivers.hpp"
 #include "drivers_leak.hpp"
 #include "scene/loader.hpp"
 #include "two_tracers.hpp"
@@ -30,7 +31,8 @@ class LayeredTest {
 protected:
     ~LayeredTest() {
         for (const char *name :
-             {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
+             {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "ARHOST_TEST_VULKAN_IS_OLD",
+              "VK_DRIVER_FILES", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
             ::unsetenv(name);
     }
     // Of all instances from now on. (VK_LAYER_PATH, as older loaders know no VK_ADD_LAYER_PATH.)
@@ -162,6 +164,33 @@ TEST_P(FailingDevice, WithoutMemoryInMidRunIsToldOf) {
     let_fail("allocate:1");
     EXPECT_EQ(tracer_->try_render(from_the_side(small_), *picture_), ARHOST_OK) << "nothing is allocated per frame";
     expect_to_be_mended();
+}
+
+class OldDevice : public LayeredTest, public testing::Test {
+protected:
+    void SetUp() override {
+        ARHOST_REQUIRE_LAYER();
+        put_layer_in();
+        ::setenv("ARHOST_TEST_VULKAN_IS_OLD", "1", 1);
+    }
+
+    ScratchFolder folder_;
+};
+
+TEST_F(OldDevice, IsRefusedIfAskedFor) {
+    std::ofstream(folder_.path() / "scene.yaml") << small_scene;
+    Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {{"device", "0"}}, "rt_vulkan");
+    EXPECT_EQ(tracer.start(pinhole(48, 36, 48)), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_THAT(tracer.plugin().log(), HasSubstr("knows Vulkan 1.0 only, and 1.1 is needed; choose another with "
+                                                 "option 'device'"));
+}
+
+TEST_F(OldDevice, IsLeftOutForAnotherWithAReason) {
+    const std::string each_twice = copy_drivers(folder_.path() / "a") + ":" + copy_drivers(folder_.path() / "b");
+    ::setenv("VK_DRIVER_FILES", each_twice.c_str(), 1);
+    PluginUnderTest plugin("rt_vulkan");
+    EXPECT_EQ(plugin.create({}), ARHOST_OK) << plugin.log();
+    EXPECT_THAT(plugin.log(), HasSubstr("' is left out: it knows Vulkan 1.0 only, and 1.1 is needed"));
 }
 
 // ---- The run ---------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 //
 // A run whose Vulkan device is gone: the host's other ray tracer goes on.
 #include "arhost_run.hpp"
+#include "copy_drivers.hpp"
 #include "two_tracers.hpp"
 
 #include <gmock/gmock.h>
@@ -15,20 +16,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 constexpr int frames = 400;
-
-// The machine's drivers, as the loader is told of them, where the test can take them away.
-std::string copy_drivers(const fs::path &folder) {
-    fs::create_directories(folder);
-    std::string list;
-    for (const char *place : {"/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"}) {
-        std::error_code ignored;
-        for (const auto &driver : fs::directory_iterator(place, ignored)) {
-            fs::copy_file(driver.path(), folder / driver.path().filename(), fs::copy_options::skip_existing);
-            list += (list.empty() ? "" : ":") + (folder / driver.path().filename()).string();
-        }
-    }
-    return list;
-}
 
 class DriverThatGoes : public testing::Test {
 protected:

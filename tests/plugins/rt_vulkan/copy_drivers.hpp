@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the Vulkan loader is told of this machine's drivers, as a test can change it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace arhost::test {
+
+// Copies all drivers' manifests to `folder`; the list of them is for VK_DRIVER_FILES.
+inline std::string copy_drivers(const std::filesystem::path &folder) {
+    namespace fs = std::filesystem;
+    fs::create_directories(folder);
+    std::string list;
+    for (const char *place : {"/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"}) {
+        std::error_code ignored;
+        for (const auto &driver : fs::directory_iterator(place, ignored)) {
+            fs::copy_file(driver.path(), folder / driver.path().filename(), fs::copy_options::skip_existing);
+            list += (list.empty() ? "" : ":") + (folder / driver.path().filename()).string();
+        }
+    }
+    return list;
+}
+
+} // namespace arhost::test
