@@ -5,6 +5,8 @@
 
 #include <arhost/scene.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,13 +25,17 @@ template <class T> std::span<const T> elements(const arhost_scene &arena, const 
 // Of a transform's 12 numbers, column by column.
 bool is_identity(const float *world_from_object);
 
-// How large the geometry's largest triangle or sphere is along an axis. Its points are read at `points`, `stride`
-// bytes from one to the next.
-float largest_extent(const arhost_scene &arena, const arhost_geometry &geometry, const std::byte *points,
-                     std::uint32_t stride);
-// The same in the world, and how far the transform moves it: where rays meet the object single precision loses a part
-// of this.
-float extent_in_world(float largest_extent, const float *world_from_object);
+// How far an object goes from its own origin, where its box there is low to high; turned into the world, mm along
+// each of its axes. What moves rays start with is counted elsewhere (offset_from_surface).
+template <class Number>
+void put_reach(const Number (&low)[3], const Number (&high)[3], const float *world_from_object, float (&to)[3]) {
+    for (int row = 0; row < 3; ++row) {
+        to[row] = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            to[row] += std::abs(world_from_object[3 * axis + row]) *
+                       static_cast<float>(std::max(std::abs(low[axis]), std::abs(high[axis])));
+    }
+}
 
 // What brings normals to the world and points back from there, of a transform's first 9 numbers. The inverse is
 // cofactor[row][column] / determinant, read by columns.

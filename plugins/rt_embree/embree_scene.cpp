@@ -18,9 +18,8 @@ namespace {
 using arhost::Failure;
 using arhost::view::bytes;
 using arhost::view::elements;
-using arhost::view::extent_in_world;
 using arhost::view::is_identity;
-using arhost::view::largest_extent;
+using arhost::view::put_reach;
 
 unsigned mask_of(const Object &object) {
     return object.role == ARHOST_CATCHER            ? catcher_mask
@@ -164,14 +163,10 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
                              static_cast<std::int32_t>(texture.height), texture.format, texture.wrap_u,
                              texture.wrap_v});
     view_.textures = textures_.data();
-    std::vector<float> extents;
-    for (const arhost_geometry &geometry : elements<arhost_geometry>(arena, arena.geometries))
-        extents.push_back(
-            largest_extent(arena, geometry, bytes(arena) + geometry.positions.offset, geometry.positions.stride));
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
-        places_.push_back({local_box(arena, object), extents[object.geometry], {}});
+        places_.push_back({local_box(arena, object), {}});
         visible_boxes_.push_back(empty_box());
         place_object(number, object.world_from_object);
         view_.has_catchers |= object.role == ARHOST_CATCHER;
@@ -273,23 +268,21 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     }
     const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
     rtcCommitGeometry(instance); // its bounds have changed
-    Place &place = places_[deformed.object];
-    place.local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
-    place.extent = largest_extent(arena_, geometry, positions, 3 * sizeof(float));
-    object.extent = extent_in_world(place.extent, place.world_from_object.data());
-    update_visible_box(deformed.object);
+    places_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
+    update_bounds(deformed.object);
 }
 
 void EmbreeScene::place_object(std::uint32_t object, const float *world_from_object) {
     set_transform(objects_[object], world_from_object);
-    objects_[object].extent = extent_in_world(places_[object].extent, world_from_object);
     std::copy_n(world_from_object, 12, places_[object].world_from_object.begin());
-    update_visible_box(object);
+    update_bounds(object);
 }
 
-void EmbreeScene::update_visible_box(std::uint32_t object) {
+void EmbreeScene::update_bounds(std::uint32_t object) {
+    const auto &[local, world_from_object] = places_[object];
+    put_reach(local.min, local.max, world_from_object.data(), objects_[object].reach);
     if (objects_[object].role != ARHOST_OCCLUDER)
-        visible_boxes_[object] = transformed(places_[object].local, places_[object].world_from_object.data());
+        visible_boxes_[object] = transformed(local, world_from_object.data());
 }
 
 SceneHandle EmbreeScene::new_scene(RTCSceneFlags flags) const {

@@ -76,11 +76,10 @@ private:
     SceneHandle catchers_;                         // nothing but them, where that is worth it
     struct Place {
         Box local;
-        float extent; // common_view/arena.hpp
         std::array<float, 12> world_from_object;
     };
     void place_object(std::uint32_t object, const float *world_from_object);
-    void update_visible_box(std::uint32_t object);
+    void update_bounds(std::uint32_t object);
     std::vector<Object> objects_;
     std::vector<Place> places_;
     std::vector<Box> visible_boxes_;

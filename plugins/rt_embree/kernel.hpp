@@ -32,7 +32,7 @@ struct Object {
     bool has_transform;
     // Column-major, from the object to the world: of directions, and of normals (its inverse transposed).
     float transform[9], normal_transform[9];
-    float extent;           // mm, in the world: common_view/arena.hpp
+    float reach[3];         // common_view/arena.hpp
     const int *indices;     // of triangles
     const float *positions; // of their corners
     const float *normals;   // NULL where the object is flat or a sphere

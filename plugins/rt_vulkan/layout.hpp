@@ -18,7 +18,7 @@ struct Object {
     std::uint32_t material, role, mask, flags;
     std::uint32_t root; // of its tree of ours; where the device has its own, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
-    float extent, unused[3];
+    float reach[3], unused;
 };
 
 struct Material {

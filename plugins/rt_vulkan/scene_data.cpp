@@ -18,9 +18,8 @@ namespace {
 using arhost::Failure;
 using arhost::view::bytes;
 using arhost::view::elements;
-using arhost::view::extent_in_world;
 using arhost::view::is_identity;
-using arhost::view::largest_extent;
+using arhost::view::put_reach;
 
 // From here on a refitted tree costs rays more than building a new one does.
 constexpr double tolerable_decay = 1.3;
@@ -198,7 +197,6 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
     mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
     mesh.local = empty_box();
-    mesh.extent = largest_extent(arena_, geometry, points.first, points.stride);
     mesh.is_empty = boxes.empty();
     if (boxes.empty())
         return mesh;
@@ -316,7 +314,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
 }
 
 void SceneData::place(Object &object, const Mesh &mesh, const float *m) {
-    object.extent = extent_in_world(mesh.extent, m);
+    put_reach(mesh.local.low, mesh.local.high, m, object.reach);
     const arhost::view::Cofactors cofactors(m);
     float normal_transform[9];
     cofactors.put_normal_transform(normal_transform);
@@ -378,8 +376,10 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     if (mesh.is_empty)
         return;
     const Points points{reinterpret_cast<const std::byte *>(deformed.positions), 3 * sizeof(float)};
-    mesh.extent = largest_extent(arena_, geometry, points.first, points.stride);
-    objects_[deformed.object].extent = extent_in_world(mesh.extent, places_[deformed.object].data());
+    mesh.local = empty_box();
+    for (std::uint32_t i = 0; i < deformed.vertex_count; ++i)
+        include(mesh.local, deformed.positions + std::size_t{3} * i);
+    put_reach(mesh.local.low, mesh.local.high, places_[deformed.object].data(), objects_[deformed.object].reach);
     if (has_trees_)
         refit_tree(mesh, boxes_of(arena_, geometry, points));
     write_tree(mesh, geometry, points);
@@ -395,8 +395,6 @@ void SceneData::refit_tree(Mesh &mesh, std::span<const Box> boxes) {
         mesh.built_area = relative_area(mesh.tree);
         ++rebuilds_;
     }
-    std::copy_n(mesh.tree.nodes[0].low, 3, mesh.local.low);
-    std::copy_n(mesh.tree.nodes[0].high, 3, mesh.local.high);
 }
 
 void SceneData::add_textures() {

@@ -54,7 +54,6 @@ private:
     struct Mesh {
         std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord;
         Box local;
-        float extent; // common_view/arena.hpp
         bool is_empty;
         // Where it deforms, or for a moment:
         Tree tree;             // without nodes where trees are not ours

@@ -88,7 +88,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     s.way = length(step);
     s.geometric_normal = facet;
     s.normal = facet;
-    Float extent(0.0f);
+    Vec3 reach = black();
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
         Vec3 geometric = facet, normal = facet;
         if (object.normals) {
@@ -102,7 +102,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (object.material->model == ARHOST_METALLIC_ROUGHNESS && object.material->normal_texture != ARHOST_NONE &&
             object.texcoords)
             normal = bent(scene, object, geometric, normal, hit, here);
-        extent = select(here, Float(object.extent), extent);
+        reach = select(here, splat(object.reach), reach);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
         if (object.role != ARHOST_VIRTUAL)
@@ -148,8 +148,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         }
     });
 
-    s.offset = offset_from_surface(s.position, step, extent);
     s.geometric_normal = unit_or(s.geometric_normal, -normalize(direction));
+    s.offset = offset_from_surface(s.position, step, s.geometric_normal, reach);
     s.from_behind = dot(s.geometric_normal, direction) > Float(0.0f);
     s.geometric_normal = facing(s.geometric_normal, -direction);
     s.normal = shading_normal(s.normal, s.geometric_normal);

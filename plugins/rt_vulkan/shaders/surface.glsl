@@ -70,9 +70,9 @@ Surface surface_at(Ray ray, Hit hit, bool bends) {
     Surface s;
     s.position = ray.origin + ahead;
     s.way = length(ahead);
-    s.offset = offset_from_surface(s.position, ahead, objects[object].extent);
     s.is_real = objects[object].role != VIRTUAL;
     s.geometric_normal = unit_or(geometric, -normalize(ray.direction));
+    s.offset = offset_from_surface(s.position, ahead, s.geometric_normal, objects[object].reach);
     s.from_behind = dot(s.geometric_normal, ray.direction) > 0.0;
     s.geometric_normal = facing(s.geometric_normal, -ray.direction);
     s.normal = shading_normal(normal, s.geometric_normal);

@@ -222,7 +222,8 @@ private:
                     fs::rename(part, name);
                 throw;
             }
-            // Before it has its name: killed between the two it would leave a file as never between frames.
+            // Before it has its name: behind that, killed between the two, it would leave files as never between
+            // frames.
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);

@@ -171,7 +171,7 @@ TEST(Sampling, APlaceInAStepIsItsShare) {
 
 TEST(Surface, RaysStartSomeFloatsAboveIt) {
     EXPECT_EQ(largest({1, -7, 3}), 7);
-    EXPECT_EQ(offset_from_surface({100, -412, 0}, {0, 5, -100}, 88), 600.0 / (1 << 19));
+    EXPECT_EQ(offset_from_surface({100, -412, 0}, {0, 5, -100}, {0.5, 0, -0.5}, {70, 1e6, 106}), 600.0 / (1 << 19));
 }
 
 TEST(Surface, NormalsAreTurnedToTheSideAskedFor) {

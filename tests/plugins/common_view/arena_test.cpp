@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common_view/arena.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,37 +22,14 @@ TEST(Arena, TellsAnIdentity) {
     EXPECT_FALSE(is_identity(m));
 }
 
-TEST(Arena, TellsHowLargeItsLargestTriangleIsAlongAnAxis) {
-    struct {
-        arhost_scene scene{};
-        std::uint32_t triangles[2][4] = {{0, 1, 2, 99}, {2, 1, 3, 99}};
-    } arena;
-    const float points[4][5] = {{0, 0, 0}, {3, 1, 0}, {0, 2, -1}, {4, -5, 1}};
-    arhost_geometry geometry{};
-    geometry.type = ARHOST_TRIANGLES;
-    geometry.indices = {offsetof(decltype(arena), triangles), 2, sizeof arena.triangles[0]};
-    const auto extent = [&] {
-        return largest_extent(arena.scene, geometry, reinterpret_cast<const std::byte *>(points), sizeof points[0]);
-    };
-    EXPECT_EQ(extent(), 7) << "of y, from -5 to 2";
-    geometry.indices.count = 1;
-    EXPECT_EQ(extent(), 3);
-    geometry.indices.count = 0;
-    EXPECT_EQ(extent(), 0);
-}
-
-TEST(Arena, TellsHowLargeItsLargestSphereIs) {
-    const float spheres[2][4] = {{100, 0, 0, 3}, {0, 0, 0, 4}};
-    arhost_geometry geometry{};
-    geometry.type = ARHOST_SPHERES;
-    geometry.positions.count = 2;
-    EXPECT_EQ(largest_extent({}, geometry, reinterpret_cast<const std::byte *>(spheres), sizeof spheres[0]), 8);
-}
-
-TEST(Arena, AnExtentInTheWorldGrowsWithScaleAndWay) {
+TEST(Arena, AnObjectReachesAsFarAsItsCornerThatIsFarthestOff) {
+    const double low[3] = {-1, -10, 50}, high[3] = {0.5, 10, 100};
     const float still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, m[12] = {0, 3, 0, 0, 0, 1, 3, 0, -4, 10, -20, 3};
-    EXPECT_EQ(extent_in_world(7, still), 7);
-    EXPECT_EQ(extent_in_world(7, m), 7 * 5 + 20) << "turned and scaled by 3, 1 and 5";
+    float reach[3];
+    put_reach(low, high, still, reach);
+    EXPECT_THAT(reach, testing::ElementsAre(1, 10, 100));
+    put_reach(low, high, m, reach);
+    EXPECT_THAT(reach, testing::ElementsAre(300, 3, 10 + 400)) << "turned and scaled; moved does not count";
 }
 
 TEST(Arena, CofactorsByTheDeterminantAreTheInverse) {

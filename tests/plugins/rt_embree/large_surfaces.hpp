@@ -1,34 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Something large and askew that goes through the origin, seen and lit from near.
+// Something large that goes through the origin, seen and lit from near.
 #pragma once
 
+#include "scene/motion.hpp"
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
-#include <array>
 #include <ostream>
 
 namespace arhost::test {
 
+// How it comes to be that large, and there.
+enum class Grown { BUILT, MOVED, SCALED, SCALED_IN_MOTION, MORPHED };
+
 struct LargeSurface {
     const char *name;
-    bool is_sphere, is_scaled;
+    bool is_sphere;
     double size_mm; // the sphere's radius, half the square's side
+    Grown grown = Grown::BUILT;
 };
 inline std::ostream &operator<<(std::ostream &stream, const LargeSurface &surface) {
     return stream << surface.name;
 }
 
-// A square of 10 m is a wall of a scanned room.
-inline const LargeSurface large_surfaces[] = {
-    {"Sphere1m", true, false, 1e3},          {"Sphere10m", true, false, 1e4},
-    {"Sphere100m", true, false, 1e5},        {"Sphere1km", true, false, 1e6},
-    {"Square1m", false, false, 1e3},         {"Square10m", false, false, 1e4},
-    {"Square100m", false, false, 1e5},       {"Square1km", false, false, 1e6},
-    {"SphereScaledTo100m", true, true, 1e5}, {"SquareScaledTo100m", false, true, 1e5}};
+// A square of 20 m is a wall of a scanned hall.
+inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
+                                              {"Sphere20m", true, 1e4},
+                                              {"Sphere200m", true, 1e5},
+                                              {"Sphere2km", true, 1e6},
+                                              {"SphereScaledTo200m", true, 1e5, Grown::SCALED},
+                                              {"SphereThatGrowsTo200m", true, 1e5, Grown::SCALED_IN_MOTION},
+                                              {"Square2m", false, 1e3},
+                                              {"Square20m", false, 1e4},
+                                              {"Square200m", false, 1e5},
+                                              {"Square2km", false, 1e6},
+                                              {"SquareFrom200mAway", false, 1e3, Grown::MOVED},
+                                              {"SquareScaledTo200m", false, 1e5, Grown::SCALED},
+                                              {"SquareThatGrowsTo200m", false, 1e5, Grown::SCALED_IN_MOTION},
+                                              {"SquareThatMorphsTo200m", false, 1e5, Grown::MORPHED}};
 
 // Its columns: two directions in the surface at the origin, and out of it.
 inline glm::dmat3 surface_axes() {
@@ -39,24 +51,43 @@ inline glm::dmat3 surface_axes() {
 
 inline scene::ArenaBuilder scene_with(const LargeSurface &surface) {
     const glm::dmat3 axes = surface_axes();
-    const double size = surface.is_scaled ? 1 : surface.size_mm;
+    const bool is_built = surface.grown == Grown::BUILT || surface.grown == Grown::MOVED;
+    const double size = is_built ? surface.size_mm : 1;
+    const auto scale = static_cast<float>(surface.size_mm);
+    const glm::dvec3 away = surface.grown == Grown::MOVED ? glm::dvec3(2e5, -1e5, 5e4) : glm::dvec3(0);
+
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
-    builder.settings.axes = ARHOST_Z_UP;
+    builder.settings.duration_s = 2;
+    scene::Motion motion{.moves = surface.grown == Grown::SCALED_IN_MOTION,
+                         .deforms = surface.grown == Grown::MORPHED};
+    if (motion.moves || motion.deforms)
+        motion.node = builder.add_node({.animated = true, .morph_weights = {0}});
+    if (motion.moves)
+        builder.add_channel({.node = motion.node,
+                             .target = ARHOST_CHANNEL_SCALE,
+                             .times = {0, 1},
+                             .values = {1, 1, 1, scale, scale, scale}});
+    if (motion.deforms)
+        builder.add_channel(
+            {.node = motion.node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+
     std::uint32_t geometry = 0;
     if (surface.is_sphere) {
         geometry = builder.add_spheres({glm::vec4(glm::vec3(axes[2] * -size), static_cast<float>(size))});
     } else {
         scene::TriangleMesh mesh = square(1);
-        for (glm::vec3 &p : mesh.positions)
-            p = glm::vec3(axes * (size * (glm::dvec3(p) + glm::dvec3(0.3, -0.45, 0))));
+        for (glm::vec3 &p : mesh.positions) {
+            p = glm::vec3(axes * (size * (glm::dvec3(p) + glm::dvec3(0.3, -0.45, 0))) - away);
+            if (motion.deforms)
+                mesh.morph_positions.push_back(p * (scale - 1));
+        }
         geometry = builder.add_triangles(std::move(mesh));
     }
-    glm::mat4x3 world_from_object(1);
-    if (surface.is_scaled)
-        world_from_object = glm::mat4x3(static_cast<float>(surface.size_mm));
-    builder.add_object("surface", geometry, builder.add_material(diffuse(1, 1, 1)), ARHOST_VIRTUAL,
-                       world_from_object);
+    glm::mat4x3 world_from_object(surface.grown == Grown::SCALED ? scale : 1.0f);
+    world_from_object[3] = glm::vec3(away);
+    builder.add_object("surface", geometry, builder.add_material(diffuse(1, 1, 1)), ARHOST_VIRTUAL, world_from_object,
+                       motion);
     const glm::dvec3 lamp = axes * glm::dvec3(200, 60, 300);
     builder.add_light(light(static_cast<float>(lamp.x), static_cast<float>(lamp.y), static_cast<float>(lamp.z), 1));
     return builder;
@@ -68,12 +99,43 @@ inline arhost_camera camera_at_surface() {
     return camera({eye.x, eye.y, eye.z}, {0, 0, 0}, {axes[1].x, axes[1].y, axes[1].z});
 }
 
-// All of it is in the light.
-inline int dark_pixels(const Picture &picture) {
-    int dark = 0;
+// A plate of 20 x 20 x 1 mm on a level floor, the lamp low at its left: 5.8 mm of the floor are in its shadow.
+inline scene::ArenaBuilder plate_on_floor(float side_mm) {
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    const std::uint32_t white = builder.add_material(diffuse(1, 1, 1));
+    builder.add_object("floor", builder.add_triangles(square(side_mm / 2)), white);
+    scene::TriangleMesh plate = cube(10);
+    for (glm::vec3 &p : plate.positions)
+        p.z = p.z > 0 ? 1 : 0;
+    builder.add_object("plate", builder.add_triangles(std::move(plate)), white);
+    builder.add_light(light(-1000, 0, 175, 10));
+    return builder;
+}
+
+// Its shadow 3 mm beside it, and the light at the other side.
+inline bool has_its_shadow(const Picture &picture) {
+    return picture.at(125, 74)[0] == 0 && picture.at(74, 74)[0] > 150;
+}
+inline arhost_camera camera_over_plate() {
+    return camera({0, 0, 100}, {0, 0, 0}, {0, 1, 0});
+}
+
+// The surface fills the picture, and all of it is in the light.
+inline int pixels_out_of_light(const LargeSurface &surface, const std::string &plugin, const Options &options = {}) {
+    Tracer tracer(scene_with(surface), options, plugin);
+    const arhost_camera camera = camera_at_surface();
+    EXPECT_EQ(tracer.start(camera.intrinsics), ARHOST_OK) << tracer.plugin().log();
+    scene::MotionEvaluator evaluator(tracer.scene());
+    Picture picture(camera.intrinsics);
+    for (const double time_s : {0, 1}) {
+        const arhost_motion motion = evaluator.at(time_s);
+        EXPECT_EQ(tracer.try_render(camera, picture, &motion), ARHOST_OK) << tracer.plugin().log();
+    }
+    int out_of_light = 0;
     for (const Pixel &pixel : picture.pixels())
-        dark += pixel[3] == 255 && pixel[0] < 150;
-    return dark;
+        out_of_light += pixel[3] != 255 || pixel[0] < 150;
+    return out_of_light;
 }
 
 } // namespace arhost::test

@@ -228,6 +228,24 @@ TEST(Moving, AMeshMayMoveAndDeform) {
     expect_alike(at_time(std::move(both), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
+// Tiles of the image where no object is are not traced.
+TEST(Moving, AMeshIsSeenWhereItsShapeGoes) {
+    constexpr float left = -60, right = 60;
+    ArenaBuilder deforming = under_the_sun(), still = under_the_sun();
+    const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
+    deforming.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 2}, .values = {0, 1}});
+    scene::TriangleMesh mesh = square(8), there = mesh;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        mesh.positions[i].x += left;
+        there.positions[i].x += right;
+    }
+    mesh.morph_positions.assign(mesh.positions.size(), {2 * (right - left), 0, 0});
+    deforming.add_object("square", deforming.add_triangles(mesh), deforming.add_material(white()), ARHOST_VIRTUAL,
+                         glm::mat4x3(1), {.deforms = true, .node = node});
+    still.add_object("square", still.add_triangles(there), still.add_material(white()));
+    expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
+}
+
 // Strips of a sheet that are pushed along themselves, each further than the one before.
 scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     scene::TriangleMesh mesh = sheet(4, n);

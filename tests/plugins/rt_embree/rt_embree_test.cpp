@@ -980,12 +980,18 @@ TEST(Plugin, CanBeStartedAgainAfterAStop) {
 }
 
 } // namespace
+
 class LargeSurfaces : public testing::TestWithParam<LargeSurface> {};
 INSTANTIATE_TEST_SUITE_P(All, LargeSurfaces, testing::ValuesIn(large_surfaces),
                          [](const auto &info) { return info.param.name; });
 
 TEST_P(LargeSurfaces, CastNoShadowOnThemselves) {
-    EXPECT_EQ(dark_pixels(Tracer(scene_with(GetParam())).render(camera_at_surface())), 0);
+    EXPECT_EQ(pixels_out_of_light(GetParam(), "rt_embree"), 0);
+}
+
+TEST(LargeFloor, KeepsTheShadowsOfWhatIsFlatOnIt) {
+    for (const float side_mm : {1e2f, 1e6f})
+        EXPECT_TRUE(has_its_shadow(Tracer(plate_on_floor(side_mm)).render(camera_over_plate()))) << side_mm;
 }
 
 } // namespace arhost::test

@@ -8,8 +8,8 @@
 //   pipelines:N it makes no Nth pipeline for ray tracing, nor later ones
 //   device-with:EXTENSION  it can't be opened with that
 // Where ARHOST_TEST_VULKAN_IS_A_GPU is "query" or "pipeline", all devices say that they are discrete GPUs, and lack
-// the extensions of later paths. Where ARHOST_TEST_VULKAN_IS_OLD is there, the device that is asked first knows
-// Vulkan 1.0 only.
+// the extensions of later paths. Where ARHOST_TEST_VULKAN_IS_OLD is "all", they know Vulkan 1.0 only; where it is
+// "first", the one that is asked first.
 #include <vulkan/vk_layer.h>
 
 #include <cstdint>
@@ -188,7 +188,8 @@ VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical, VkPhysicalD
     VkPhysicalDevice &asked_first = instances.at(key_of(physical)).asked_first;
     if (!asked_first)
         asked_first = physical;
-    if (asked_first == physical && std::getenv("ARHOST_TEST_VULKAN_IS_OLD"))
+    const char *old = std::getenv("ARHOST_TEST_VULKAN_IS_OLD");
+    if (old && (asked_first == physical || !std::strcmp(old, "all")))
         properties->properties.apiVersion = VK_API_VERSION_1_0;
 }
 

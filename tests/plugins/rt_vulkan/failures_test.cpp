@@ -4,6 +4,7 @@
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
 #include "drivers_leak.hpp"
+#include "environment_variable.hpp"
 #include "scene/loader.hpp"
 #include "two_tracers.hpp"
 
@@ -31,8 +32,7 @@ class LayeredTest {
 protected:
     ~LayeredTest() {
         for (const char *name :
-             {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "ARHOST_TEST_VULKAN_IS_OLD",
-              "VK_DRIVER_FILES", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
+             {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
             ::unsetenv(name);
     }
     // Of all instances from now on. (VK_LAYER_PATH, as older loaders know no VK_ADD_LAYER_PATH.)
@@ -171,13 +171,13 @@ protected:
     void SetUp() override {
         ARHOST_REQUIRE_LAYER();
         put_layer_in();
-        ::setenv("ARHOST_TEST_VULKAN_IS_OLD", "1", 1);
     }
 
     ScratchFolder folder_;
 };
 
 TEST_F(OldDevice, IsRefusedIfAskedFor) {
+    const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "all");
     std::ofstream(folder_.path() / "scene.yaml") << small_scene;
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {{"device", "0"}}, "rt_vulkan");
     EXPECT_EQ(tracer.start(pinhole(48, 36, 48)), ARHOST_ERROR_UNSUPPORTED);
@@ -186,8 +186,11 @@ TEST_F(OldDevice, IsRefusedIfAskedFor) {
 }
 
 TEST_F(OldDevice, IsLeftOutForAnotherWithAReason) {
-    const std::string each_twice = copy_drivers(folder_.path() / "a") + ":" + copy_drivers(folder_.path() / "b");
-    ::setenv("VK_DRIVER_FILES", each_twice.c_str(), 1);
+    const std::string once = copy_drivers(folder_.path() / "a"), again = copy_drivers(folder_.path() / "b");
+    if (once.empty())
+        GTEST_SKIP() << "the drivers' manifests are not where they are looked for";
+    const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "first"),
+        drivers("VK_DRIVER_FILES", once + ":" + again), by_old_name("VK_ICD_FILENAMES", once + ":" + again);
     PluginUnderTest plugin("rt_vulkan");
     EXPECT_EQ(plugin.create({}), ARHOST_OK) << plugin.log();
     EXPECT_THAT(plugin.log(), HasSubstr("' is left out: it knows Vulkan 1.0 only, and 1.1 is needed"));

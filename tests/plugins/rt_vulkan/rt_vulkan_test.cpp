@@ -2,6 +2,7 @@
 //
 // The plugin on the device that is here, and what it says where there is none.
 #include "drivers_leak.hpp"
+#include "environment_variable.hpp"
 #include "large_surfaces.hpp"
 #include "renderer.hpp"
 #include "rich_scene.hpp"
@@ -45,27 +46,6 @@ struct LoggingHost {
                          return 0;
                      },
                      [](const arhost_host *, const char *) -> const void * { return nullptr; }};
-};
-
-class EnvironmentVariable {
-public:
-    EnvironmentVariable(const char *name, const std::string &value) : name_(name) {
-        if (const char *before = std::getenv(name))
-            before_ = before;
-        ::setenv(name, value.c_str(), 1);
-    }
-    ~EnvironmentVariable() {
-        if (before_)
-            ::setenv(name_, before_->c_str(), 1);
-        else
-            ::unsetenv(name_);
-    }
-    EnvironmentVariable(const EnvironmentVariable &) = delete;
-    EnvironmentVariable &operator=(const EnvironmentVariable &) = delete;
-
-private:
-    const char *name_;
-    std::optional<std::string> before_;
 };
 
 template <class Call> std::string refusal(arhost_status status, Call call) {
@@ -204,10 +184,14 @@ TEST_P(EachPath, GivesRtEmbreesPicture) {
 
 TEST_P(EachPath, LetsNoLargeSurfaceCastShadowsOnItself) {
     for (const LargeSurface &surface : large_surfaces)
-        EXPECT_EQ(
-            dark_pixels(Tracer(scene_with(surface), {{"path", GetParam()}}, "rt_vulkan").render(camera_at_surface())),
-            0)
-            << surface;
+        EXPECT_EQ(pixels_out_of_light(surface, "rt_vulkan", {{"path", GetParam()}}), 0) << surface;
+}
+
+TEST_P(EachPath, KeepsTheShadowsOfWhatIsFlatOnALargeFloor) {
+    for (const float side_mm : {1e2f, 1e6f}) {
+        Tracer tracer(plate_on_floor(side_mm), {{"path", GetParam()}}, "rt_vulkan");
+        EXPECT_TRUE(has_its_shadow(tracer.render(camera_over_plate()))) << side_mm;
+    }
 }
 
 TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {

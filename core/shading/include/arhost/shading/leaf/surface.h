@@ -13,10 +13,12 @@ ARHOST_LEAF Vec3 unit_or(Vec3 a, Vec3 fallback) {
 }
 
 // How far from a facet rays start that go on from a hit. A hit is as exact as the floats that it was computed
-// from: 2^-24 of their size, a few times. `way` is the ray's, from its origin to the hit; `extent` is how large the
-// triangle or sphere is at most, whose corners or centre may be that far off.
-ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 way, Float extent) {
-    return (largest(position) + largest(way) + extent) * Float(1.0 / 524288.0);
+// from: 2^-24 of their size, a few times. `way` is the ray's, from its origin to the hit; `reach`, along each axis,
+// is how far off the corners or the centre may be that say where the facet is. It counts as much as the axis goes
+// with the normal, of length 1: across an axis a floor is exact, however large. All in the world, mm.
+ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 way, Vec3 normal, Vec3 reach) {
+    Float across = abs(normal.x) * reach.x + abs(normal.y) * reach.y + abs(normal.z) * reach.z;
+    return (largest(position) + largest(way) + across) * Float(1.0 / 524288.0);
 }
 
 // `normal`, or what is opposite to it, whichever does not point away from `to`.
