@@ -26,7 +26,7 @@ template <class T> std::span<const T> elements(const arhost_scene &arena, const 
 bool is_identity(const float *world_from_object);
 
 // How far an object goes from its own origin, where its box there is low to high; turned into the world, mm along
-// each of its axes. What moves rays start with is counted elsewhere (offset_from_surface).
+// each of its axes. How far a transform moves it is counted as a part of the rays' way (offset_from_surface).
 template <class Number>
 void put_reach(const Number (&low)[3], const Number (&high)[3], const float *world_from_object, float (&to)[3]) {
     for (int row = 0; row < 3; ++row) {
