@@ -83,17 +83,19 @@ float alpha_of_code(float alpha) {
 // with room for what single precision loses on a ray's way to the object's axes.
 Box in_world(const Box &local, const float *m) {
     Box world;
+    float reach[3];
+    put_reach(local.low, local.high, m, reach);
     for (int row = 0; row < 3; ++row) {
-        double low = m[9 + row], high = low, size = std::abs(low);
+        double low = m[9 + row], high = low;
+        const double room = 2e-6 * (std::abs(low) + reach[row]);
         for (int axis = 0; axis < 3; ++axis) {
             const double a = double{m[3 * axis + row]} * local.low[axis],
                          b = double{m[3 * axis + row]} * local.high[axis];
             low += std::min(a, b);
             high += std::max(a, b);
-            size += std::max(std::abs(a), std::abs(b));
         }
-        world.low[row] = static_cast<float>(low - 2e-6 * size);
-        world.high[row] = static_cast<float>(high + 2e-6 * size);
+        world.low[row] = static_cast<float>(low - room);
+        world.high[row] = static_cast<float>(high + room);
     }
     return world;
 }
