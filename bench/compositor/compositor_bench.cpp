@@ -74,8 +74,8 @@ arhost_frame_format frame_format(arhost_pixel_format pixel_format) {
     format.pixel_format = pixel_format;
     format.width = width;
     format.height = height;
-    format.yuv_matrix = ARHOST_BT601;
-    format.yuv_range = ARHOST_LIMITED_RANGE;
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601;
+    format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
     if (!arhost_frame_layout(&format))
         throw std::logic_error("frame layout");
     return format;
@@ -108,7 +108,7 @@ template <class Work> void against_memcpy(benchmark::State &state, std::size_t m
 }
 
 void composite_overlay(benchmark::State &state, Overlay kind, bool whole) {
-    const arhost_frame_format format = frame_format(ARHOST_BGR8);
+    const arhost_frame_format format = frame_format(ARHOST_PIXEL_FORMAT_BGR8);
     const Pool frames(format.byte_size), overlays(4 * pixels), outputs(3 * pixels);
     for (std::size_t i = 0; i < overlays.count(); ++i)
         if (i < 4)
@@ -148,12 +148,12 @@ void plain_frame(benchmark::State &state, arhost_pixel_format pixel_format) {
         arhost::composite(format, planes, {}, {}, {outputs.frame(i), 3 * width});
     });
 }
-BENCHMARK_CAPTURE(plain_frame, bgr8, ARHOST_BGR8)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(plain_frame, rgb8, ARHOST_RGB8)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(plain_frame, grey8, ARHOST_GREY8)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(plain_frame, yuyv, ARHOST_YUYV)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(plain_frame, nv12, ARHOST_NV12)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(plain_frame, i420, ARHOST_I420)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, bgr8, ARHOST_PIXEL_FORMAT_BGR8)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, rgb8, ARHOST_PIXEL_FORMAT_RGB8)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, grey8, ARHOST_PIXEL_FORMAT_GREY8)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, yuyv, ARHOST_PIXEL_FORMAT_YUYV)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, nv12, ARHOST_PIXEL_FORMAT_NV12)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(plain_frame, i420, ARHOST_PIXEL_FORMAT_I420)->UseManualTime()->Unit(benchmark::kMillisecond);
 
 void grey_plane(benchmark::State &state, arhost_pixel_format pixel_format) {
     const arhost_frame_format format = frame_format(pixel_format);
@@ -163,8 +163,8 @@ void grey_plane(benchmark::State &state, arhost_pixel_format pixel_format) {
         arhost::fill_grey(format, planes, frames.frame(i) + format.grey_offset);
     });
 }
-BENCHMARK_CAPTURE(grey_plane, bgr8, ARHOST_BGR8)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(grey_plane, yuyv, ARHOST_YUYV)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(grey_plane, bgr8, ARHOST_PIXEL_FORMAT_BGR8)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(grey_plane, yuyv, ARHOST_PIXEL_FORMAT_YUYV)->UseManualTime()->Unit(benchmark::kMillisecond);
 
 } // namespace
 

@@ -2,8 +2,8 @@
 //
 // One-way latency of a command from the host to a worker and of its result back, with a sleeping and with
 // a polling receiver, beside a bare pair of futexes and of eventfds in the same run. Two processes.
-#include "ring/memory.hpp"
-#include "ring/protocol.hpp"
+#include "ipc/memory.hpp"
+#include "ipc/protocol.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -18,7 +18,7 @@
 #include <unistd.h>
 #include <vector>
 
-using namespace arhost::ring;
+using namespace arhost::ipc;
 using namespace std::chrono_literals;
 
 namespace {

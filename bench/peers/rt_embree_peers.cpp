@@ -86,7 +86,7 @@ arhost_material grey(arhost_material_model model, float value) {
     arhost_material material = make_material(model);
     for (int i = 0; i < 3; ++i) {
         material.ambient[i] = 0;
-        if (model == ARHOST_DIFFUSE)
+        if (model == ARHOST_MATERIAL_DIFFUSE)
             material.diffuse[i] = value;
         else
             material.reflectivity[i] = material.refraction[i] = value;
@@ -103,16 +103,16 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
     Case made{Arena(64), {}};
     made.settings.threads = threads;
     ArenaBuilder builder;
-    builder.settings.axes = ARHOST_Y_UP;
+    builder.settings.axes = ARHOST_AXES_Y_UP;
     builder.settings.ambient = glm::vec3(0);
     builder.settings.background = glm::vec3(1);
-    arhost_material material = grey(ARHOST_DIFFUSE, bunny_grey);
+    arhost_material material = grey(ARHOST_MATERIAL_DIFFUSE, bunny_grey);
     const bool is_glass = name.starts_with("glass");
     if (name == "mirror") {
-        material = grey(ARHOST_MIRROR, mirror_grey);
+        material = grey(ARHOST_MATERIAL_MIRROR, mirror_grey);
         builder.settings.max_depth = mirror_depth;
     } else if (is_glass) {
-        material = grey(ARHOST_GLASS, glass_grey);
+        material = grey(ARHOST_MATERIAL_GLASS, glass_grey);
         material.index = glass_index;
         material.fresnel_minimum = std::pow((glass_index - 1) / (glass_index + 1), 2.0f);
         // What is not followed: nothing but what the depth limits ("path", as the peers do), the customary
@@ -126,8 +126,8 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
     builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
     if (!is_glass) {
         builder.add_object("ground", builder.add_triangles(ground()),
-                           builder.add_material(grey(ARHOST_DIFFUSE, ground_grey)));
-        arhost_light light = make_light(ARHOST_POINT_LIGHT);
+                           builder.add_material(grey(ARHOST_MATERIAL_DIFFUSE, ground_grey)));
+        arhost_light light = make_light(ARHOST_LIGHT_POINT);
         light.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
         for (int i = 0; i < 3; ++i) {
             light.position[i] = lamp_position[i];

@@ -25,7 +25,7 @@ constexpr std::uint32_t width = 800, height = 600;
 constexpr int rounds = 101;
 
 arhost_light lamp() {
-    arhost_light light = make_light(ARHOST_POINT_LIGHT);
+    arhost_light light = make_light(ARHOST_LIGHT_POINT);
     light.position[0] = 80, light.position[1] = 200, light.position[2] = 150;
     for (float &channel : light.intensity)
         channel = 0.8f;
@@ -177,7 +177,7 @@ int main(int argc, char **argv) {
         settings.instruction_set = argv[2];
 
     const auto [mesh, name] = arhost::bench::bunny(ARHOST_SHARED_DATA);
-    arhost_material diffuse = make_material(ARHOST_DIFFUSE), mirror = make_material(ARHOST_MIRROR);
+    arhost_material diffuse = make_material(ARHOST_MATERIAL_DIFFUSE), mirror = make_material(ARHOST_MATERIAL_MIRROR);
     for (int i = 0; i < 3; ++i) {
         diffuse.ambient[i] = diffuse.diffuse[i] = 0.7f - 0.1f * static_cast<float>(i);
         mirror.reflectivity[i] = 0.9f;
@@ -219,5 +219,5 @@ int main(int argc, char **argv) {
     };
     time("diffuse", "diffuse and shadows", diffuse);
     time("mirror", "mirror, up to 10 bounces", mirror);
-    time("glass", "glass, the tree to depth 10", make_material(ARHOST_GLASS));
+    time("glass", "glass, the tree to depth 10", make_material(ARHOST_MATERIAL_GLASS));
 }

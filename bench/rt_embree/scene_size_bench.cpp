@@ -77,9 +77,9 @@ template <class Result> Result in_a_process(const std::function<Result()> &measu
 Arena scene_of(TriangleMesh mesh) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
-    arhost_material material = make_material(ARHOST_DIFFUSE);
+    arhost_material material = make_material(ARHOST_MATERIAL_DIFFUSE);
     std::fill_n(material.diffuse, 3, 0.7f);
-    arhost_light lamp = make_light(ARHOST_POINT_LIGHT);
+    arhost_light lamp = make_light(ARHOST_LIGHT_POINT);
     lamp.position[0] = 80, lamp.position[1] = 200, lamp.position[2] = 150;
     std::fill_n(lamp.intensity, 3, 0.8f);
     builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(material));

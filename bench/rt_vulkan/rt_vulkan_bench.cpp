@@ -54,7 +54,7 @@ scene::Arena unlit_bunny() {
     sort_in_space(mesh);
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
-    arhost_material grey = scene::make_material(ARHOST_DIFFUSE);
+    arhost_material grey = scene::make_material(ARHOST_MATERIAL_DIFFUSE);
     std::fill_n(grey.ambient, 3, 0.7f);
     builder.add_object(name, builder.add_triangles(mesh), builder.add_material(grey));
     return std::move(builder).build();
@@ -162,9 +162,10 @@ int trace(const std::vector<std::string> &words) {
     const std::vector<rt_vulkan::Path> paths =
         words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_paths(device, words[5])[0]};
     for (const rt_vulkan::Path path : paths) {
-        nlohmann::json line = measured(
-            instance, device, host, path, arena,
-            camera_from(from, arena.scene().axes == ARHOST_Z_UP && !is_bunny, width, height), std::stoi(words[4]));
+        nlohmann::json line =
+            measured(instance, device, host, path, arena,
+                     camera_from(from, arena.scene().axes == ARHOST_AXES_Z_UP && !is_bunny, width, height),
+                     std::stoi(words[4]));
         line["device"] = device.name;
         line["is_gpu"] = device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
         std::printf("%s\n", line.dump().c_str());
@@ -175,7 +176,7 @@ int trace(const std::vector<std::string> &words) {
 
 // Without the validation layers, which take memory of their own, and with them.
 int run(const std::vector<std::string> &words) {
-    constexpr double most_growth_mib = 2;
+    constexpr double max_growth_mib = 2;
     const int images = std::stoi(words[1]), every = std::stoi(words[2]);
     const std::vector<std::filesystem::path> scenes(words.begin() + 3, words.end());
     bool has_missed = false;
@@ -189,7 +190,7 @@ int run(const std::vector<std::string> &words) {
     const test::LongRun::State &middle = plain.states[plain.states.size() / 2], &last = plain.states.back();
     const double growth_mib = last.memory_mib - middle.memory_mib;
     std::printf("  memory at half time and at the end  %.1f, %.1f MiB (target: %g MiB more at most%s)\n",
-                middle.memory_mib, last.memory_mib, most_growth_mib, judged(growth_mib <= most_growth_mib));
+                middle.memory_mib, last.memory_mib, max_growth_mib, judged(growth_mib <= max_growth_mib));
     std::printf("  descriptors                         %td, %td (target: no more%s)\n", middle.files, last.files,
                 judged(last.files <= middle.files));
     std::fflush(stdout);

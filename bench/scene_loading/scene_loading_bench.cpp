@@ -109,7 +109,7 @@ std::size_t parse_blindly(const char *path, std::vector<char> &text, std::vector
 ArenaBuilder scene_of(TriangleMesh mesh) {
     ArenaBuilder builder;
     builder.add_object("mesh", builder.add_triangles(std::move(mesh)),
-                       builder.add_material(make_material(ARHOST_DIFFUSE)));
+                       builder.add_material(make_material(ARHOST_MATERIAL_DIFFUSE)));
     return builder;
 }
 

@@ -10,7 +10,7 @@
 #include "pixels/grey.hpp"
 #include "scene/loader.hpp"
 
-#include <common_planar_pose/tracker_support.hpp>
+#include <fiducial_common/tracker_support.hpp>
 
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ template <class Call> double cpu_ms_of(int calls, Call &&call) {
 }
 
 void require(arhost_status status, const PluginUnderTest &plugin) {
-    if (status != ARHOST_OK)
+    if (status != ARHOST_STATUS_OK)
         throw std::runtime_error(plugin.log());
 }
 
@@ -72,7 +72,7 @@ double source_alone(const std::string &picture, int frames) {
 
 double tracker_alone(const std::string &picture, const arhost_intrinsics &camera, int frames) {
     Tracker tracker("tracker_aruco", {{"dictionary", "DICT_APRILTAG_36h11"}});
-    if (tracker.created() != ARHOST_OK || tracker.start(camera, {{0, 80}}) != ARHOST_OK)
+    if (tracker.created() != ARHOST_STATUS_OK || tracker.start(camera, {{0, 80}}) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
     const GreyFrame frame(read_grey(picture));
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
@@ -88,7 +88,7 @@ struct VideoFrame {
     std::size_t layout(const std::string &picture) {
         bgr = cv::imread(picture);
         format.struct_size = sizeof format;
-        format.pixel_format = ARHOST_BGR8;
+        format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
         format.width = static_cast<std::uint32_t>(bgr.cols);
         format.height = static_cast<std::uint32_t>(bgr.rows);
         if (!arhost_frame_layout(&format))

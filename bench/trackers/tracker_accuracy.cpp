@@ -2,7 +2,7 @@
 //
 // Prints how exact and how quick the trackers are on a real sequence.
 //   tracker-accuracy [aruco:key=value …] [apriltag:key=value …]     options of the two plugins
-#include <common_planar_pose/rbt_sequence.hpp>
+#include <fiducial_common/rbt_sequence.hpp>
 
 #include <cstdio>
 #include <exception>
@@ -19,7 +19,7 @@ struct Measured {
 
 Measured measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
     Tracker tracker(plugin, options);
-    if (tracker.created() != ARHOST_OK)
+    if (tracker.created() != ARHOST_STATUS_OK)
         throw std::runtime_error(plugin + ": " + tracker.log());
     std::vector<double> ms;
     const auto frames = sequence.run(tracker, &ms);

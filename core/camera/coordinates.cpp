@@ -70,7 +70,7 @@ glm::dmat4 matrix_of(const Rotation &rotation) {
 } // namespace
 
 Coordinates default_for(arhost_axes scene_axes) {
-    if (scene_axes == ARHOST_Y_UP)
+    if (scene_axes == ARHOST_AXES_Y_UP)
         return {profile_z_up, profile_y_up, {{90, {1, 0, 0}}}};
     return {};
 }

@@ -24,15 +24,15 @@ void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, con
                  std::size_t y, std::uint8_t *bgr) {
     const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
     switch (format.pixel_format) {
-    case ARHOST_GREY8:
+    case ARHOST_PIXEL_FORMAT_GREY8:
         return rows::bgr_from_grey(row(0, y), bgr, format.width);
-    case ARHOST_RGB8:
+    case ARHOST_PIXEL_FORMAT_RGB8:
         return rows::bgr_from_rgb(row(0, y), bgr, format.width);
-    case ARHOST_YUYV:
+    case ARHOST_PIXEL_FORMAT_YUYV:
         return rows::bgr_from_yuyv(row(0, y), matrix, bgr, format.width);
-    case ARHOST_NV12:
+    case ARHOST_PIXEL_FORMAT_NV12:
         return rows::bgr_from_nv12(row(0, y), row(1, y / 2), matrix, bgr, format.width);
-    case ARHOST_I420:
+    case ARHOST_PIXEL_FORMAT_I420:
         return rows::bgr_from_i420(row(0, y), row(1, y / 2), row(2, y / 2), matrix, bgr, format.width);
     }
 }
@@ -42,15 +42,15 @@ Bgr pixel(const arhost_frame_format &format, const std::uint8_t *const planes[],
     const std::uint8_t *first = row(0, y);
     const YuvMatrix matrix = yuv_matrix(format);
     switch (format.pixel_format) {
-    case ARHOST_GREY8:
+    case ARHOST_PIXEL_FORMAT_GREY8:
         return {first[x], first[x], first[x]};
-    case ARHOST_RGB8:
+    case ARHOST_PIXEL_FORMAT_RGB8:
         return {first[3 * x + 2], first[3 * x + 1], first[3 * x]};
-    case ARHOST_YUYV:
+    case ARHOST_PIXEL_FORMAT_YUYV:
         return bgr_from_yuv(matrix, first[2 * x], first[x / 2 * 4 + 1], first[x / 2 * 4 + 3]);
-    case ARHOST_NV12:
+    case ARHOST_PIXEL_FORMAT_NV12:
         return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2 * 2], row(1, y / 2)[x / 2 * 2 + 1]);
-    case ARHOST_I420:
+    case ARHOST_PIXEL_FORMAT_I420:
         return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2]);
     default:
         return {first[3 * x], first[3 * x + 1], first[3 * x + 2]};
@@ -69,7 +69,7 @@ void composite(const arhost_frame_format &format, const std::uint8_t *const plan
         std::uint8_t *to = out.bgr + y * out.stride;
         const std::uint8_t *from = to; // once converted, the row is blended where it stands
         const bool blending = contains(inside, inside.x, y);
-        if (format.pixel_format != ARHOST_BGR8) {
+        if (format.pixel_format != ARHOST_PIXEL_FORMAT_BGR8) {
             convert_row(format, matrix, planes, y, to);
         } else {
             from = planes[0] + y * format.stride[0];

@@ -3,8 +3,8 @@
 
 #include "base/text.hpp"
 #include "base/whole_file.hpp"
-#include "config/schema.hpp"
 #include "host/probe.hpp"
+#include "run_config/schema.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -24,7 +24,7 @@ fs::path built_in_plugins() {
     return own_prefix() / "lib/arhost/plugins";
 }
 
-supervise::Context make_context(ring::Reactor &reactor, supervise::Starter &launcher, Console &console) {
+supervise::Context make_context(ipc::Reactor &reactor, supervise::Starter &launcher, Console &console) {
     return {reactor, launcher, own_folder() / "arhost-worker",
             [&console](arhost_severity severity, const std::string &component, const std::string &text) {
                 console.log(severity, component, text);
@@ -56,8 +56,8 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     return coordinates;
 }
 
-void lift_deadlines(config::Configuration &configuration) {
-    const auto lift = [](config::ComponentConfiguration &component) {
+void lift_deadlines(run_config::Configuration &configuration) {
+    const auto lift = [](run_config::ComponentConfiguration &component) {
         supervise::Limits &limits = component.limits;
         limits.start = limits.frame = limits.stop = std::chrono::hours(1000);
     };
@@ -70,7 +70,7 @@ void lift_deadlines(config::Configuration &configuration) {
     std::for_each(configuration.outputs.begin(), configuration.outputs.end(), lift);
 }
 
-config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
+run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
         if (equals == 0 || equals == std::string::npos)
@@ -81,7 +81,7 @@ config::Configuration parse_configuration(yaml::Node &root, const Arguments &arg
         root.override_value("frames", std::to_string(*arguments.frames), "--frames");
     if (arguments.in_process)
         root.override_value("sandbox", "none");
-    config::Configuration configuration = config::parse(root, built_in_plugins());
+    run_config::Configuration configuration = run_config::parse(root, built_in_plugins());
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
     if (arguments.in_process)
@@ -89,7 +89,7 @@ config::Configuration parse_configuration(yaml::Node &root, const Arguments &arg
     return configuration;
 }
 
-config::Configuration read_configuration(const Arguments &arguments) {
+run_config::Configuration read_configuration(const Arguments &arguments) {
     yaml::Node root = yaml::Node::load(arguments.file);
     return parse_configuration(root, arguments);
 }
@@ -110,7 +110,7 @@ std::string sink_for(const fs::path &file) {
 
 // What is replayed is the trajectory in `arguments.file`'s chain or in the simplest one. That file's
 // outputs are not touched: they may be what the recorded run has left.
-config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
+run_config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
     constexpr const char *simplest = "version: 1\nraytracer: {plugin: rt_embree}\n";
     constexpr const char *simplest_chain =
         "version: 1\n"
@@ -146,7 +146,7 @@ config::Configuration replay_configuration(const Arguments &arguments, const Rep
         root.override_text("stats", replay.stats, "--stats");
     if (!replay.timeline.empty())
         root.override_text("timeline", replay.timeline, "--timeline");
-    config::Configuration configuration = parse_configuration(root, arguments);
+    run_config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
         throw yaml::Error("--width, --height: " + replay.trajectory + " tells its own image size; leave them out");
     if (replay.with_pipeline && !(configuration.source && configuration.tracker))
@@ -159,11 +159,11 @@ config::Configuration replay_configuration(const Arguments &arguments, const Rep
         configuration.stats.reset();
     if (replay.timeline.empty())
         configuration.timeline.reset();
-    configuration.mode = config::Mode::lockstep;
+    configuration.mode = run_config::Mode::lockstep;
     return configuration;
 }
 
-void show_warnings(const config::Configuration &configuration, Console &console) {
+void show_warnings(const run_config::Configuration &configuration, Console &console) {
     for (const std::string &warning : configuration.warnings)
         console.log(ARHOST_SEVERITY_WARNING, "arhost", warning);
     if (configuration.trajectory && !configuration.trajectory->warning.empty())
@@ -202,7 +202,7 @@ void tell_of_promises(const Promises &promises, Console &console) {
                     std::to_string(kept) + " of " + std::to_string(promises.all().size()) + " promises kept");
 }
 
-int run(const config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
+int run(const run_config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
@@ -213,7 +213,7 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
 
     Console console(verbose);
     show_warnings(configuration, console);
-    ring::Reactor reactor;
+    ipc::Reactor reactor;
     Pipeline *running = nullptr;
     Pipeline pipeline(configuration, make_context(reactor, launcher, console),
                       [&](const Progress &progress) { console.show(progress, running->statistics()); });
@@ -267,15 +267,15 @@ int run(const config::Configuration &configuration, bool verbose, supervise::Sta
 std::vector<std::string> lines_of(const DevicesResult &result) {
     if (const auto *reason = std::get_if<std::string>(&result))
         return {"its devices can't be listed: " + *reason};
-    const auto &list = std::get<std::optional<ring::DeviceList>>(result);
+    const auto &list = std::get<std::optional<ipc::DeviceList>>(result);
     if (!list)
         return {};
     if (list->devices.empty())
         return {"no device that it could run on"};
     std::vector<std::string> lines;
-    for (const ring::DeviceDescription &device : list->devices) {
+    for (const ipc::DeviceDescription &device : list->devices) {
         lines.push_back(fmt::format("device {}: {} ({}{}{}){}", device.index, device.name,
-                                    ring::device_kind_text(device.kind), device.uuid.empty() ? "" : ", ", device.uuid,
+                                    ipc::device_kind_text(device.kind), device.uuid.empty() ? "" : ", ", device.uuid,
                                     device.is_default ? ", the default" : ""));
         if (!device.abilities.empty())
             lines.push_back("    " + device.abilities);
@@ -308,17 +308,17 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 
 int check(const Arguments &arguments, supervise::Starter &launcher) {
     Console console(arguments.verbose);
-    const config::Configuration configuration = read_configuration(arguments);
+    const run_config::Configuration configuration = read_configuration(arguments);
     show_warnings(configuration, console);
-    ring::Reactor reactor;
+    ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
 
-    const auto check_component = [&](const config::ComponentConfiguration &component, arhost_kind kind) {
+    const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
-            config::options_for(std::get<ring::PluginDescription>(result), kind, component, i);
+            run_config::options_for(std::get<ipc::PluginDescription>(result), kind, component, i);
         }
     };
     if (configuration.source)
@@ -327,15 +327,15 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
         check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
     if (configuration.raytracer)
         check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
-    for (const config::ComponentConfiguration &output : configuration.outputs)
+    for (const run_config::ComponentConfiguration &output : configuration.outputs)
         check_component(output, ARHOST_KIND_SINK);
 
     if (configuration.raytracer) {
         std::optional<std::string> outcome;
-        const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
-                                   configuration.raytracer->limits.start, configuration.files,
-                                   {[&](const ring::SharedMemory &) { outcome = ""; },
-                                    [&](const std::string &reason) { outcome = reason; }});
+        const SceneLoading loading(
+            context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits.start,
+            configuration.files,
+            {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
         while (!outcome)
             reactor.run_once();
         if (!outcome->empty())
@@ -347,9 +347,9 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
 
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher) {
     Console console(arguments.verbose);
-    ring::Reactor reactor;
+    ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    const std::vector<fs::path> files = config::PluginPath({}, built_in_plugins()).all();
+    const std::vector<fs::path> files = run_config::PluginPath({}, built_in_plugins()).all();
     sandbox::Policy policy;
     for (const fs::path &path : plugins.reads)
         policy.readable.push_back(fs::absolute(path));
@@ -363,8 +363,8 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
             status = run_failed;
             continue;
         }
-        const auto &plugin = std::get<ring::PluginDescription>(result);
-        print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, ring::to_text(plugin.kind), plugin.version,
+        const auto &plugin = std::get<ipc::PluginDescription>(result);
+        print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, ipc::to_text(plugin.kind), plugin.version,
                           file.string()));
         print(fmt::format("{:<18} {}", "", plugin.description));
         for (const std::string &need : plugin.needs)
@@ -378,7 +378,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
         }
         if (!plugins.with_options)
             continue;
-        for (const ring::OptionDeclaration &option : plugin.options) {
+        for (const ipc::OptionDeclaration &option : plugin.options) {
             const std::string standard =
                 option.default_value ? "default '" + *option.default_value + "'" : "required";
             print(fmt::format("    {:<20} {} ({})", option.key, option.help, standard));
@@ -394,7 +394,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
 }
 
 int print_schema(bool markdown) {
-    const std::string text = markdown ? config::schema_as_markdown() : config::schema_as_json_schema();
+    const std::string text = markdown ? run_config::schema_as_markdown() : run_config::schema_as_json_schema();
     std::fputs(text.c_str(), stdout);
     return success;
 }

@@ -9,7 +9,7 @@
 
 namespace arhost::host {
 
-using namespace ring;
+using namespace ipc;
 using supervise::Component;
 using Clock = std::chrono::steady_clock;
 
@@ -30,10 +30,10 @@ std::shared_ptr<SlotPool> pool_of(const Component &component) {
 
 } // namespace
 
-Pipeline::Pipeline(const config::Configuration &configuration, supervise::Context context,
+Pipeline::Pipeline(const run_config::Configuration &configuration, supervise::Context context,
                    std::function<void(const Progress &)> on_progress)
     : configuration_(configuration), context_(std::move(context)), on_progress_(std::move(on_progress)),
-      live_(configuration.mode == config::Mode::live) {
+      live_(configuration.mode == run_config::Mode::live) {
     statistics_.promises = Promises([this](const std::string &name, const std::string &sentence) {
         context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
                      "breaks the promise " + name + ": " + sentence);
@@ -78,7 +78,7 @@ Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &
     hooks.running = [] {};
     hooks.ended = [] {};
     hooks.stopped = [this, name](arhost_status status, const std::string &text) {
-        if (status != ARHOST_OK)
+        if (status != ARHOST_STATUS_OK)
             fail(name + ": " + (text.empty() ? status_text(status) : text), false);
     };
     hooks.given_up = [this, name, node](const std::string &reason, bool by_configuration) {
@@ -88,13 +88,13 @@ Component::Hooks Pipeline::hooks_for(const std::string &name, const yaml::Node &
 }
 
 void Pipeline::make_source() {
-    const config::SourceConfiguration &source = *configuration_.source;
+    const run_config::SourceConfiguration &source = *configuration_.source;
     Component::Hooks hooks = hooks_for("source", source.node);
     hooks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &plugin,
                                                          std::size_t candidate) mutable {
         if (std::exchange(last, candidate) != candidate)
             source_promises_.reset(); // another plugin's
-        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate));
+        const Json options = to_json(run_config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate));
         Json setup = {{"first_sequence", next_read_ + skipped_}, {"fps", source.fps}, {"paced", live_}};
         if (configuration_.camera)
             setup["intrinsics"] = to_json(*configuration_.camera);
@@ -107,7 +107,7 @@ void Pipeline::make_source() {
             throw std::runtime_error("the restarted source gives frames of another format");
         format_ = format;
         frame_count_ = ready.at("frame_count").get<std::uint64_t>();
-        const bool is_live = (source_->description().capabilities & ARHOST_IS_LIVE) != 0;
+        const bool is_live = (source_->description().capabilities & ARHOST_CAPABILITY_LIVE) != 0;
         if (source.conform && !source_promises_)
             source_promises_.emplace(SourcePromises::Rate{is_live ? 0 : format.fps, source.fps > 0, live_}, now_ns());
         if (configuration_.camera)
@@ -134,8 +134,8 @@ void Pipeline::make_source() {
         for (const Command &command : unanswered)
             next_read_ = std::min(next_read_, command.sequence);
         const PluginDescription &plugin = source_->description(); // nothing where it died before it was opened
-        if (next_read_ > 0 && !plugin.id.empty() && !(plugin.capabilities & (ARHOST_CAN_SEEK | ARHOST_IS_LIVE)) &&
-            !ended_) {
+        if (next_read_ > 0 && !plugin.id.empty() &&
+            !(plugin.capabilities & (ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE)) && !ended_) {
             ended_ = true;
             fail("source: " + plugin.id + " died, and can't go on in the middle", false);
         }
@@ -149,7 +149,7 @@ void Pipeline::make_black_frames() {
     intrinsics_ = *configuration_.camera;
     arhost_frame_format format{};
     format.struct_size = sizeof format;
-    format.pixel_format = ARHOST_GREY8;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
     format.width = intrinsics_.width;
     format.height = intrinsics_.height;
     format.fps = configuration_.trajectory->fps;
@@ -160,12 +160,12 @@ void Pipeline::make_black_frames() {
 }
 
 void Pipeline::make_tracker() {
-    const config::TrackerConfiguration &tracker = *configuration_.tracker;
+    const run_config::TrackerConfiguration &tracker = *configuration_.tracker;
     for (const arhost_marker_config &marker : tracker.markers)
         marker_ids_.insert(marker.id);
     Component::Hooks hooks = hooks_for("tracker", tracker.node);
     hooks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
-        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate));
+        const Json options = to_json(run_config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate));
         Json markers = Json::array();
         for (const arhost_marker_config &marker : tracker.markers)
             markers.push_back({{"id", marker.id}, {"side_mm", marker.side_mm}});
@@ -185,12 +185,13 @@ void Pipeline::make_tracker() {
 }
 
 void Pipeline::make_raytracer() {
-    const config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
+    const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
     Component::Hooks hooks = hooks_for("raytracer", raytracer.node);
     hooks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
-        const Json options = to_json(config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate));
+        const Json options = to_json(run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate));
         warp_.reset();
-        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE && !(plugin.capabilities & ARHOST_TRACES_LENS)) {
+        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
+            !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION)) {
             warp_ = std::make_shared<LensWarp>(intrinsics_);
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
                          plugin.id + " can't trace through a distorted lens: its images are bent afterwards, which "
@@ -220,7 +221,7 @@ void Pipeline::make_outputs() {
                            // Sinks hold different frames when they are differently behind: none may take all.
                            static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
     for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
-        const config::ComponentConfiguration &output = configuration_.outputs[i];
+        const run_config::ComponentConfiguration &output = configuration_.outputs[i];
         std::string name = output.plugins.front().stem().string();
         if (std::any_of(sinks_.begin(), sinks_.end(),
                         [&](const auto &sink) { return sink->component->name() == name; }))
@@ -230,8 +231,8 @@ void Pipeline::make_outputs() {
         sink->depth = live_ ? live_sink_depth : 0;
         Component::Hooks hooks = hooks_for(name, output.node);
         hooks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
-            const Json options = to_json(config::options_for(plugin, ARHOST_KIND_SINK, output, candidate));
-            if (plugin.capabilities & ARHOST_IS_REALTIME_SINK)
+            const Json options = to_json(run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate));
+            if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
                 sink->depth = live_sink_depth; // a window never makes a film wait
             const bool fps_is_set = configuration_.source && configuration_.source->fps > 0;
             Json setup = {{"width", format_->width},
@@ -244,7 +245,7 @@ void Pipeline::make_outputs() {
         };
         hooks.result = [this, sink, name](const Command &command, const Result &result) {
             sink->on_result(command, result);
-            if (result.status == ARHOST_END)
+            if (result.status == ARHOST_STATUS_END)
                 end_run();
             if (result.status >= 0 || sink->failed)
                 return;
@@ -392,9 +393,9 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     reads_.pop_front();
     if (command.sequence >= next_read_) // the frame before it failed, and comes first
         return;
-    if (result.status == ARHOST_END_CUT_SHORT && !ended_)
+    if (result.status == ARHOST_STATUS_END_TRUNCATED && !ended_)
         fail(configuration_.source->node.where() + ": source: its input is cut short; what there was is kept", false);
-    if (result.status >= ARHOST_END || (ended_ && result.status < 0)) {
+    if (result.status >= ARHOST_STATUS_END || (ended_ && result.status < 0)) {
         ended_ = true;
         return;
     }
@@ -604,7 +605,7 @@ ImageView Pipeline::overlay_of(const Frame &frame) const {
 }
 
 // Bytes that a component has given are its no more.
-void Pipeline::look_at_what_was_given(const Frame &frame) {
+void Pipeline::check_buffers_unmodified(const Frame &frame) {
     const std::uint64_t sequence = frame.record.sequence;
     if (frame.pixels_sample)
         statistics_.promises.look("source.frame-stays", sequence,
@@ -723,7 +724,7 @@ bool Pipeline::compose() {
 }
 
 void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
-    look_at_what_was_given(frame);
+    check_buffers_unmodified(frame);
     const Clock::time_point begin = Clock::now();
     const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};

@@ -10,11 +10,11 @@
 // the place of one that waits, and a stage that is down is passed by.
 #pragma once
 
-#include "config/configuration.hpp"
 #include "host/frames.hpp"
 #include "host/scene_loading.hpp"
 #include "host/sink_queue.hpp"
 #include "host/statistics.hpp"
+#include "run_config/configuration.hpp"
 
 #include <functional>
 #include <map>
@@ -30,7 +30,7 @@ struct Progress {
 
 class Pipeline {
 public:
-    Pipeline(const config::Configuration &configuration, supervise::Context context,
+    Pipeline(const run_config::Configuration &configuration, supervise::Context context,
              std::function<void(const Progress &)> on_progress);
 
     // Runs to the end. Returns false where the run failed or ended with a component given up; failure()
@@ -66,19 +66,19 @@ private:
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
     ImageView overlay_of(const Frame &frame) const;
-    void look_at_what_was_given(const Frame &frame);
+    void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
     void stop_components();
 
-    void on_read(const ring::Command &command, const ring::Result &result);
+    void on_read(const ipc::Command &command, const ipc::Result &result);
     void begin(std::unique_ptr<Frame> frame);
     void take_camera_of_markers(Frame &frame);
     void take_camera_of_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);
-    Frame *take_answer(const ring::Command &command, const ring::Result &result, const char *stage);
-    void on_tracked(const ring::Command &command, const ring::Result &result);
-    void on_rendered(const ring::Command &command, const ring::Result &result);
-    void on_stage_lost(const std::vector<ring::Command> &unanswered, Frame::Stage waiting, const char *stage);
+    Frame *take_answer(const ipc::Command &command, const ipc::Result &result, const char *stage);
+    void on_tracked(const ipc::Command &command, const ipc::Result &result);
+    void on_rendered(const ipc::Command &command, const ipc::Result &result);
+    void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting, const char *stage);
 
     // A stage that does not answer commands at the moment: may the frame go on without it?
     bool may_pass(const supervise::Component *stage) const;
@@ -92,14 +92,14 @@ private:
     void fail(const std::string &reason, bool by_configuration);
     void give_up(const std::string &name, const yaml::Node &node, const std::string &reason, bool by_configuration);
 
-    const config::Configuration &configuration_;
+    const run_config::Configuration &configuration_;
     supervise::Context context_;
     std::function<void(const Progress &)> on_progress_;
     const bool live_;
     Phase phase_ = Phase::source;
 
     std::unique_ptr<SceneLoading> scene_loading_;
-    ring::SharedMemory arena_;
+    ipc::SharedMemory arena_;
     camera::Coordinates coordinates_;
 
     std::unique_ptr<supervise::Component> source_, tracker_, raytracer_;

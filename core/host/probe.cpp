@@ -3,14 +3,14 @@
 
 namespace arhost::host {
 
-using namespace ring;
+using namespace ipc;
 
 namespace {
 
 // Opens the plugin in a worker, and hands its messages to `take` until that returns true: "". Otherwise the reason
-// why it never did. `late`: the reason where `patience` is over.
+// why it never did. `late`: the reason where `timeout` is over.
 std::string converse(supervise::Context &context, const std::filesystem::path &plugin, const sandbox::Policy &policy,
-                     std::chrono::seconds patience, const std::string &late,
+                     std::chrono::seconds timeout, const std::string &late,
                      const std::function<bool(supervise::Process &, const Json &)> &take) {
     std::string reason;
     bool taken = false, dead = false;
@@ -38,8 +38,8 @@ std::string converse(supervise::Context &context, const std::filesystem::path &p
         context, plugin.stem().string(), std::move(events),
         Json{{"type", "open"}, {"plugin", plugin.string()}, {"sandbox", sandbox::to_json(policy)}});
     running = &process;
-    const auto deadline = context.reactor.at(Reactor::Clock::now() + patience, [&] {
-        process.end(late + " within " + std::to_string(patience.count()) + " s");
+    const auto deadline = context.reactor.at(Reactor::Clock::now() + timeout, [&] {
+        process.end(late + " within " + std::to_string(timeout.count()) + " s");
     });
     while (!dead)
         context.reactor.run_once();
@@ -67,13 +67,13 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
 }
 
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
-                           const std::vector<std::string> &needs, std::chrono::seconds patience) {
+                           const std::vector<std::string> &needs, std::chrono::seconds timeout) {
     policy.writable.clear();
     for (const std::string &need : needs)
         if (need == "video" || need == "usb" || need == "gpu")
             policy.allow.insert(need);
     std::optional<DeviceList> list;
-    std::string reason = converse(context, plugin, policy, patience, "no answer",
+    std::string reason = converse(context, plugin, policy, timeout, "no answer",
                                   [&](supervise::Process &process, const Json &message) {
                                       if (message.at("type") == "hello")
                                           process.send({{"type", "devices"}});

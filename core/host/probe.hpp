@@ -3,7 +3,7 @@
 // Asks a plugin, in a worker of its own, who it is and what it could run on: for `arhost plugins` and `arhost check`.
 #pragma once
 
-#include "ring/json_abi.hpp"
+#include "ipc/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
@@ -16,7 +16,7 @@
 namespace arhost::host {
 
 // The description, or the reason why the plugin can't be used.
-using ProbeResult = std::variant<ring::PluginDescription, std::string>;
+using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
 
 // It may read what `policy` says and write nothing: who it is, a plugin tells before it is asked to do anything.
 // Where it answers, `level` gets how far the sandbox was reached.
@@ -24,12 +24,12 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
                   std::string *level = nullptr);
 
 // The devices, nullopt where the plugin tells of none (arhost/devices.h), or the reason why it can't.
-using DevicesResult = std::variant<std::optional<ring::DeviceList>, std::string>;
+using DevicesResult = std::variant<std::optional<ipc::DeviceList>, std::string>;
 
 // Of what it needs (its descriptor's `needs`) it gets the devices, which it could not see otherwise, without a word
 // of a configuration; but no network, no processes and no display. Drivers may take long to load.
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                            const std::vector<std::string> &needs,
-                           std::chrono::seconds patience = std::chrono::seconds(20));
+                           std::chrono::seconds timeout = std::chrono::seconds(20));
 
 } // namespace arhost::host

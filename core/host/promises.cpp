@@ -195,11 +195,11 @@ OverlayPromises::OverlayPromises(const arhost_scene &scene) {
     std::map<std::uint32_t, scene::Box> of_geometries; // which may be many objects'
     for (const arhost_object &object : all(scene.objects, static_cast<const arhost_object *>(nullptr))) {
         const arhost_geometry &geometry = geometries[object.geometry];
-        if (object.role != ARHOST_VIRTUAL || geometry.positions.count == 0)
+        if (object.role != ARHOST_ROLE_VIRTUAL || geometry.positions.count == 0)
             continue;
         const auto [box, is_new] = of_geometries.try_emplace(object.geometry);
         if (is_new)
-            box->second = geometry.type == ARHOST_SPHERES
+            box->second = geometry.type == ARHOST_GEOMETRY_SPHERES
                               ? scene::box_of(all(geometry.positions, static_cast<const glm::vec4 *>(nullptr)))
                               : scene::box_of(all(geometry.positions, static_cast<const glm::vec3 *>(nullptr)));
         if (!virtual_box_)

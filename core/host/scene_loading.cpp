@@ -5,7 +5,7 @@
 
 namespace arhost::host {
 
-using namespace ring;
+using namespace ipc;
 
 namespace {
 
@@ -25,9 +25,9 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
 } // namespace
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                           std::chrono::milliseconds patience, config::FilesInUse files, Hooks hooks)
+                           std::chrono::milliseconds timeout, run_config::FilesInUse files, Hooks hooks)
     : context_(context), hooks_(std::move(hooks)), files_(std::move(files)), scene_(scene.string()),
-      patience_(patience) {
+      timeout_(timeout) {
     supervise::Process::Events events;
     events.message = [this](Message &message) {
         const std::string type = message.body.at("type").get<std::string>();
@@ -50,8 +50,8 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
 }
 
 void SceneLoading::watch() {
-    deadline_ = context_.reactor.at(Reactor::Clock::now() + patience_, [this] {
-        process_->end("without a word of progress for " + std::to_string(patience_.count()) +
+    deadline_ = context_.reactor.at(Reactor::Clock::now() + timeout_, [this] {
+        process_->end("without a word of progress for " + std::to_string(timeout_.count()) +
                       " ms (raytracer.start_deadline_ms)");
     });
 }

@@ -4,7 +4,7 @@
 // comes back before anyone else sees it.
 #pragma once
 
-#include "config/files_in_use.hpp"
+#include "run_config/files_in_use.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
@@ -20,12 +20,12 @@ class SceneLoading {
 public:
     // Exactly one of the two is called, from the reactor; the SceneLoading may be destroyed in it.
     struct Hooks {
-        std::function<void(ring::SharedMemory arena)> loaded; // frozen and valid
+        std::function<void(ipc::SharedMemory arena)> loaded; // frozen and valid
         std::function<void(const std::string &reason)> failed;
     };
-    // `patience`: the longest time without a word of progress. Fails where one of `files` that is written is read.
+    // `timeout`: the longest time without a word of progress. Fails where one of `files` that is written is read.
     SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                 std::chrono::milliseconds patience, config::FilesInUse files, Hooks hooks);
+                 std::chrono::milliseconds timeout, run_config::FilesInUse files, Hooks hooks);
 
 private:
     void watch();
@@ -35,11 +35,11 @@ private:
 
     supervise::Context &context_;
     Hooks hooks_;
-    config::FilesInUse files_;
+    run_config::FilesInUse files_;
     std::string scene_, failure_;
     base::UniqueFd arena_;
-    std::chrono::milliseconds patience_;
-    ring::Reactor::Registration deadline_;
+    std::chrono::milliseconds timeout_;
+    ipc::Reactor::Registration deadline_;
     std::unique_ptr<supervise::Process> process_;
 };
 

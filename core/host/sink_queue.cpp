@@ -3,7 +3,7 @@
 
 namespace arhost::host {
 
-using namespace ring;
+using namespace ipc;
 
 void SinkQueue::offer(OutputFramePointer frame) {
     if (failed)

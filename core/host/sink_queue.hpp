@@ -22,7 +22,7 @@ public:
     void offer(OutputFramePointer frame);
     void pump(); // hands waiting frames to the sink
     // The hooks of its component.
-    void on_result(const ring::Command &command, const ring::Result &result);
+    void on_result(const ipc::Command &command, const ipc::Result &result);
     void on_lost();
 
     bool empty() const { return waiting_.empty() && unconfirmed_.empty(); }

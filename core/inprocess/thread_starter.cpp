@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "inprocess/thread_starter.hpp"
 
-#include "ring/wake.hpp"
+#include "ipc/wake.hpp"
 #include "worker/session.hpp"
 
 #include <algorithm>
@@ -30,9 +30,9 @@ ThreadStarter::~ThreadStarter() {
 
 supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const supervise::LogFunction &) {
     supervise::Spawned spawned;
-    ring::Channel theirs;
-    std::tie(spawned.channel, theirs) = ring::Channel::make_pair();
-    ring::DoorbellPair doorbell = ring::make_doorbell();
+    ipc::Channel theirs;
+    std::tie(spawned.channel, theirs) = ipc::Channel::make_pair();
+    ipc::DoorbellPair doorbell = ipc::make_doorbell();
     spawned.doorbell = std::move(doorbell.host);
     // What it prints goes where this process prints; the pipe is one that has ended already.
     int pipe_ends[2];

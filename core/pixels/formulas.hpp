@@ -41,9 +41,9 @@ constexpr YuvMatrix yuv_matrix(double kr, double kb, bool limited) {
 }
 
 constexpr YuvMatrix yuv_matrix(const arhost_frame_format &format) {
-    const bool limited = format.yuv_range != ARHOST_FULL_RANGE;
-    return format.yuv_matrix == ARHOST_BT709 ? yuv_matrix(0.2126, 0.0722, limited)
-                                             : yuv_matrix(0.299, 0.114, limited);
+    const bool limited = format.yuv_range != ARHOST_YUV_RANGE_FULL;
+    return format.yuv_matrix == ARHOST_YUV_MATRIX_BT709 ? yuv_matrix(0.2126, 0.0722, limited)
+                                                        : yuv_matrix(0.299, 0.114, limited);
 }
 
 constexpr Bgr bgr_from_yuv(const YuvMatrix &m, int y, int u, int v) {

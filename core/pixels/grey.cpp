@@ -11,14 +11,14 @@ void fill_grey(const arhost_frame_format &format, const std::uint8_t *const plan
         const std::uint8_t *from = planes[0] + y * format.stride[0];
         std::uint8_t *to = grey + y * format.grey_stride;
         switch (format.pixel_format) {
-        case ARHOST_RGB8:
+        case ARHOST_PIXEL_FORMAT_RGB8:
             rows::grey_from_rgb(from, to, format.width);
             break;
-        case ARHOST_BGR8:
+        case ARHOST_PIXEL_FORMAT_BGR8:
             rows::grey_from_bgr(from, to, format.width);
             break;
-        case ARHOST_YUYV:
-            rows::grey_from_yuyv(from, format.yuv_range != ARHOST_FULL_RANGE, to, format.width);
+        case ARHOST_PIXEL_FORMAT_YUYV:
+            rows::grey_from_yuyv(from, format.yuv_range != ARHOST_YUV_RANGE_FULL, to, format.width);
             break;
         default:
             return; // the grey plane is plane 0
@@ -33,14 +33,14 @@ void fill_grey_reference(const arhost_frame_format &format, const std::uint8_t *
             const std::uint8_t *row = planes[0] + y * format.stride[0];
             std::uint8_t &to = grey[y * format.grey_stride + x];
             switch (format.pixel_format) {
-            case ARHOST_RGB8:
+            case ARHOST_PIXEL_FORMAT_RGB8:
                 to = grey_from_rgb(row[3 * x], row[3 * x + 1], row[3 * x + 2]);
                 break;
-            case ARHOST_BGR8:
+            case ARHOST_PIXEL_FORMAT_BGR8:
                 to = grey_from_rgb(row[3 * x + 2], row[3 * x + 1], row[3 * x]);
                 break;
-            case ARHOST_YUYV:
-                to = format.yuv_range == ARHOST_FULL_RANGE ? row[2 * x] : full_range(row[2 * x]);
+            case ARHOST_PIXEL_FORMAT_YUYV:
+                to = format.yuv_range == ARHOST_YUV_RANGE_FULL ? row[2 * x] : full_range(row[2 * x]);
                 break;
             default:
                 return;

@@ -46,7 +46,7 @@ private:
 
 arhost_geometry put_geometry(Writer &writer, const TriangleMesh &mesh) {
     arhost_geometry geometry{};
-    geometry.type = ARHOST_TRIANGLES;
+    geometry.type = ARHOST_GEOMETRY_TRIANGLES;
     geometry.positions = writer.put(mesh.positions);
     geometry.normals = writer.put(mesh.normals);
     geometry.texcoords = writer.put(mesh.texcoords);
@@ -60,7 +60,7 @@ arhost_geometry put_geometry(Writer &writer, const TriangleMesh &mesh) {
 
 arhost_geometry put_geometry(Writer &writer, const Spheres &spheres) {
     arhost_geometry geometry{};
-    geometry.type = ARHOST_SPHERES;
+    geometry.type = ARHOST_GEOMETRY_SPHERES;
     geometry.positions = writer.put(spheres);
     return geometry;
 }
@@ -323,7 +323,7 @@ void ArenaBuilder::settle(std::span<std::byte> arena) const {
     for (std::size_t i = 0; i < objects.size(); ++i)
         if (objects[i].geometry < geometries.size() && !objects[i].deforms) {
             const arhost_geometry &geometry = geometries[objects[i].geometry];
-            boxes[i] = geometry.type == ARHOST_SPHERES
+            boxes[i] = geometry.type == ARHOST_GEOMETRY_SPHERES
                            ? box_of(std::span<const glm::vec4>(elements(geometry.positions, glm::vec4())))
                            : box_of(std::span<const glm::vec3>(elements(geometry.positions, glm::vec3())));
         }

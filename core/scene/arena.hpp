@@ -102,7 +102,7 @@ struct Motion {
 };
 
 struct Settings {
-    arhost_axes axes = ARHOST_Z_UP;
+    arhost_axes axes = ARHOST_AXES_Z_UP;
     std::uint32_t max_depth = 5;
     glm::vec3 ambient{0.2f}, background{1}; // linear light
     float shadow_alpha_opaque = 0.6f, shadow_alpha_translucent = 0.3f;
@@ -144,8 +144,8 @@ public:
     std::uint32_t add_texture(const std::string &name, Texture texture);
     std::uint32_t add_material(const arhost_material &material);
     std::uint32_t add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
-                             arhost_role role = ARHOST_VIRTUAL, const glm::mat4x3 &world_from_object = glm::mat4x3(1),
-                             const Motion &motion = {});
+                             arhost_role role = ARHOST_ROLE_VIRTUAL,
+                             const glm::mat4x3 &world_from_object = glm::mat4x3(1), const Motion &motion = {});
     std::uint32_t add_light(const arhost_light &light);
     std::uint32_t add_node(MotionNode node);
     std::uint32_t add_channel(Channel channel);

@@ -695,8 +695,8 @@ private:
                         count, mesh);
         if (attribute(primitive.attributes, "JOINTS_1") >= 0)
             watch_.info(name_ + ": of more than four joints a vertex, the first four are used");
-        constexpr std::size_t most_offsets = 100'000'000; // of all targets together
-        if (primitive.targets.size() > most_offsets / std::max<std::size_t>(count, 1))
+        constexpr std::size_t max_offsets = 100'000'000; // of all targets together
+        if (primitive.targets.size() > max_offsets / std::max<std::size_t>(count, 1))
             accessors_.fail(std::to_string(primitive.targets.size()) + " morph targets of " + std::to_string(count) +
                             " vertices are too many");
         const bool has_normals = !mesh.normals.empty();
@@ -793,8 +793,8 @@ private:
             if (part.deforms)
                 continue;
             const std::uint32_t skin_index = part.skin < 0 ? ARHOST_NONE : at_rest.add_skin(std::move(skin));
-            at_rest.add_object("", at_rest.add_triangles(std::move(part.mesh)), 0, ARHOST_VIRTUAL, glm::mat4x3(1),
-                               {false, true, part.place, skin_index});
+            at_rest.add_object("", at_rest.add_triangles(std::move(part.mesh)), 0, ARHOST_ROLE_VIRTUAL,
+                               glm::mat4x3(1), {false, true, part.place, skin_index});
             resting.push_back(&part);
         }
         if (resting.empty())
@@ -893,7 +893,7 @@ private:
             return static_cast<float>(std::clamp(value, 0.0, limit));
         };
         const auto &pbr = from.pbrMetallicRoughness;
-        arhost_material material = make_material(ARHOST_METALLIC_ROUGHNESS);
+        arhost_material material = make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
         for (std::size_t i = 0; i < 3; ++i) {
             material.ambient[i] = material.diffuse[i] =
                 pbr.baseColorFactor.size() > i ? number(pbr.baseColorFactor[i], 1) : 1;

@@ -20,7 +20,7 @@ struct GltfPlacement {
     std::string name;                 // objects are called "name/node"
     Transform from_gltf;              // into the space of `node`
     std::uint32_t node = ARHOST_NONE; // that carries it, or the world
-    arhost_role role = ARHOST_VIRTUAL;
+    arhost_role role = ARHOST_ROLE_VIRTUAL;
     std::optional<std::uint32_t> material; // in place of the file's
     std::optional<std::string> animation;  // name or number; none: all stands still
 };

@@ -91,7 +91,7 @@ Settings settings_of(const Node &root) {
     Settings settings;
     if (root.require("version").integer() != 1)
         root.require("version").fail("must be 1");
-    settings.axes = root.require("axes").choice({"z-up", "y-up"}) == "z-up" ? ARHOST_Z_UP : ARHOST_Y_UP;
+    settings.axes = root.require("axes").choice({"z-up", "y-up"}) == "z-up" ? ARHOST_AXES_Z_UP : ARHOST_AXES_Y_UP;
     if (const auto node = root.find("max_depth"))
         settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
     if (const auto node = root.find("ambient"))
@@ -149,7 +149,7 @@ arhost_material glass_of(const Node &node) {
     node.allow_keys({"model", "index", "fresnel", "reflection", "refraction", "extinction", "attenuation",
                      "shadow_attenuation", "cutoff_colour", "importance_cutoff", "reflection_depth",
                      "refraction_depth"});
-    arhost_material glass = make_material(ARHOST_GLASS);
+    arhost_material glass = make_material(ARHOST_MATERIAL_GLASS);
     glass.index = real_or(node, "index", 1, 4, glass.index);
     const float at_right_angle = (glass.index - 1) / (glass.index + 1);
     glass.fresnel_minimum = at_right_angle * at_right_angle;
@@ -171,7 +171,7 @@ arhost_material glass_of(const Node &node) {
 }
 
 glm::dvec3 up_of(arhost_axes axes) {
-    return axes == ARHOST_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+    return axes == ARHOST_AXES_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
 }
 
 // A file, or a map that says how it is to be taken.
@@ -215,7 +215,7 @@ Environment environment_of(const Node &node, arhost_axes axes, Textures &texture
     }
     environment.intensity = intensity;
     // The environment turns with its image: a direction is turned back before it is looked up.
-    const Transform y_up = axes == ARHOST_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
+    const Transform y_up = axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
     environment.environment_from_world =
         glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), turn ? -turn->real() : 0)).matrix()));
     return environment;
@@ -230,14 +230,14 @@ arhost_material material_of(const Node &node, Textures &textures) {
         return glass_of(node);
     if (model == "mirror") {
         node.allow_keys({"model", "reflectivity"});
-        arhost_material mirror = make_material(ARHOST_MIRROR);
+        arhost_material mirror = make_material(ARHOST_MATERIAL_MIRROR);
         set(mirror.reflectivity, colour_or(node, "reflectivity", glm::vec3(1)));
         return mirror;
     }
     if (model == "metallic-roughness") {
         node.allow_keys({"model", "colour", "metallic", "roughness", "emission", "texture", "alpha_cutoff",
                          "metallic_roughness_texture", "normal_texture", "emission_texture"});
-        arhost_material material = make_material(ARHOST_METALLIC_ROUGHNESS);
+        arhost_material material = make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
         material.colour_texture = texture_or_none(node, "texture", true, textures);
         material.alpha_cutoff = real_or(node, "alpha_cutoff", 0, 1, 0);
         material.metallic_roughness_texture = texture_or_none(node, "metallic_roughness_texture", false, textures);
@@ -262,9 +262,9 @@ arhost_material material_of(const Node &node, Textures &textures) {
     else
         node.allow_keys(
             {"model", "ambient", "diffuse", "specular", "exponent", "reflectivity", "texture", "alpha_cutoff"});
-    arhost_material material = make_material(model == "diffuse"    ? ARHOST_DIFFUSE
-                                             : model == "specular" ? ARHOST_SPECULAR
-                                                                   : ARHOST_METAL);
+    arhost_material material = make_material(model == "diffuse"    ? ARHOST_MATERIAL_DIFFUSE
+                                             : model == "specular" ? ARHOST_MATERIAL_SPECULAR
+                                                                   : ARHOST_MATERIAL_METAL);
     material.colour_texture = texture_or_none(node, "texture", true, textures);
     material.alpha_cutoff = real_or(node, "alpha_cutoff", 0, 1, 0);
     const glm::vec3 diffuse = material.colour_texture == ARHOST_NONE ? colour_of(node.require("diffuse"))
@@ -307,11 +307,11 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
     const auto type_node = node.find("type");
     const std::string type =
         type_node ? type_node->choice({"point", "directional", "spot", "rectangle", "sphere"}) : "point";
-    arhost_light light = make_light(type == "point"         ? ARHOST_POINT_LIGHT
-                                    : type == "directional" ? ARHOST_DIRECTIONAL_LIGHT
-                                    : type == "spot"        ? ARHOST_SPOT_LIGHT
-                                    : type == "rectangle"   ? ARHOST_RECTANGLE_LIGHT
-                                                            : ARHOST_SPHERE_LIGHT);
+    arhost_light light = make_light(type == "point"         ? ARHOST_LIGHT_POINT
+                                    : type == "directional" ? ARHOST_LIGHT_DIRECTIONAL
+                                    : type == "spot"        ? ARHOST_LIGHT_SPOT
+                                    : type == "rectangle"   ? ARHOST_LIGHT_RECTANGLE
+                                                            : ARHOST_LIGHT_SPHERE);
     const Node intensity_node = node.require("intensity");
     const glm::dvec3 intensity = number_or_vector(intensity_node);
     for (int i = 0; i < 3; ++i)
@@ -614,7 +614,7 @@ private:
         if (shape_key == "gltf") {
             // A glTF file is y-up by its definition, so it is put upright first.
             const Transform upright =
-                builder_.settings.axes == ARHOST_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
+                builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
             add_gltf_file(node, shape, {name, world_from_object * upright, carrier, role, material, {}}, part);
         } else {
             const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
@@ -700,7 +700,9 @@ private:
     static arhost_role role_of(const Node &node) {
         const auto role = node.find("role");
         const std::string text = role ? role->choice({"virtual", "catcher", "occluder"}) : "virtual";
-        return text == "virtual" ? ARHOST_VIRTUAL : text == "catcher" ? ARHOST_CATCHER : ARHOST_OCCLUDER;
+        return text == "virtual"   ? ARHOST_ROLE_VIRTUAL
+               : text == "catcher" ? ARHOST_ROLE_CATCHER
+                                   : ARHOST_ROLE_OCCLUDER;
     }
 
     std::uint32_t add_geometry(const Node &node, const std::string &key, const Node &shape,

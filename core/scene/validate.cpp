@@ -131,7 +131,7 @@ private:
                   std::to_string(arena_.size()) + " are there");
         arena_ = arena_.first(scene_->byte_size);
         unclaimed_ = scene_->byte_size - sizeof(arhost_scene);
-        if (scene_->axes != ARHOST_Z_UP && scene_->axes != ARHOST_Y_UP)
+        if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
             fault("its axes are of no known kind");
         if (scene_->max_depth > max_depth_limit)
             fault("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
@@ -199,7 +199,7 @@ private:
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && geometries_[object.geometry].texcoords.count == 0)
                 fault(name_of(i) + " has a textured material, but its geometry has no texcoords");
-        if (object.role < ARHOST_VIRTUAL || object.role > ARHOST_OCCLUDER)
+        if (object.role < ARHOST_ROLE_VIRTUAL || object.role > ARHOST_ROLE_OCCLUDER)
             fault(name_of(i) + " has a role of no known kind");
         const float *m = object.world_from_object;
         check_floats(object.world_from_object, -coordinate_limit_mm, coordinate_limit_mm,
@@ -222,7 +222,7 @@ private:
         if (object.skin != ARHOST_NONE && (object.moves || !object.deforms || !is_identity(object.world_from_object)))
             fault(name_of(i) +
                   " has a skin, so it must deform, not move, and have the identity as world_from_object");
-        if (object.deforms && geometries_[object.geometry].type != ARHOST_TRIANGLES)
+        if (object.deforms && geometries_[object.geometry].type != ARHOST_GEOMETRY_TRIANGLES)
             fault(name_of(i) + " deforms, but has no triangles");
     }
 
@@ -385,7 +385,7 @@ private:
     void check_material(std::size_t i) {
         const arhost_material &material = materials_[i];
         const std::string what = "material " + std::to_string(i) + ": ";
-        if (material.model < ARHOST_DIFFUSE || material.model > ARHOST_METALLIC_ROUGHNESS)
+        if (material.model < ARHOST_MATERIAL_DIFFUSE || material.model > ARHOST_MATERIAL_METALLIC_ROUGHNESS)
             fault(what + "its model is of no known kind");
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
@@ -415,7 +415,7 @@ private:
     void check_light(std::size_t i) {
         const arhost_light &light = lights_[i];
         const std::string what = "light " + std::to_string(i) + ": ";
-        if (light.type < ARHOST_POINT_LIGHT || light.type > ARHOST_SPHERE_LIGHT)
+        if (light.type < ARHOST_LIGHT_POINT || light.type > ARHOST_LIGHT_SPHERE)
             fault(what + "its type is of no known kind");
         if (light.falloff != ARHOST_FALLOFF_NONE && light.falloff != ARHOST_FALLOFF_INVERSE_SQUARE)
             fault(what + "its falloff is of no known kind");
@@ -423,7 +423,7 @@ private:
         check_floats(light.intensity, 0, std::numeric_limits<float>::max(), what + "intensity");
         const auto length_of = [](const float(&v)[3]) { return glm::length(glm::dvec3(v[0], v[1], v[2])); };
         check_floats(light.direction, -1 - tolerance, 1 + tolerance, what + "direction");
-        if (light.type != ARHOST_POINT_LIGHT && light.type != ARHOST_SPHERE_LIGHT &&
+        if (light.type != ARHOST_LIGHT_POINT && light.type != ARHOST_LIGHT_SPHERE &&
             !within(static_cast<float>(length_of(light.direction)), 1 - tolerance, 1 + tolerance))
             fault(what + "its direction is not of length 1");
         check_floats(light.axis_u, -coordinate_limit_mm, coordinate_limit_mm, what + "axis_u");
@@ -431,7 +431,7 @@ private:
         check_floats({&light.radius, 1}, 0, coordinate_limit_mm, what + "radius");
         check_floats({&light.cosine_outer, 1}, -1, 1, what + "cosine_outer");
         check_floats({&light.cosine_inner, 1}, light.cosine_outer, 1, what + "cosine_inner");
-        if (light.type == ARHOST_DIRECTIONAL_LIGHT && light.falloff != ARHOST_FALLOFF_NONE)
+        if (light.type == ARHOST_LIGHT_DIRECTIONAL && light.falloff != ARHOST_FALLOFF_NONE)
             fault(what + "light from infinitely far can't fall off");
     }
 
@@ -450,10 +450,10 @@ private:
             if (geometry.reserved != 0)
                 fault("a reserved field is not 0");
             switch (geometry.type) {
-            case ARHOST_TRIANGLES:
+            case ARHOST_GEOMETRY_TRIANGLES:
                 check_deformation(geometry, i);
                 return check_triangles(geometry);
-            case ARHOST_SPHERES:
+            case ARHOST_GEOMETRY_SPHERES:
                 return check_spheres(geometry);
             default:
                 fault("its type is of no known kind");

@@ -6,23 +6,23 @@
 
 namespace arhost::supervise {
 
-using namespace ring;
+using namespace ipc;
 
 namespace {
 
 bool may_answer(arhost_kind kind, arhost_status status) {
-    if (status == ARHOST_END)
+    if (status == ARHOST_STATUS_END)
         return kind == ARHOST_KIND_SOURCE || kind == ARHOST_KIND_SINK;
-    if (status == ARHOST_END_CUT_SHORT)
+    if (status == ARHOST_STATUS_END_TRUNCATED)
         return kind == ARHOST_KIND_SOURCE;
-    return status == ARHOST_OK || (status < 0 && status >= ARHOST_ERROR_INTERNAL);
+    return status == ARHOST_STATUS_OK || (status < 0 && status >= ARHOST_STATUS_ERROR_INTERNAL);
 }
 
 // A new process may mend these: it opens its device anew, and has taken no memory yet. The host starts a source anew
 // after any error, and gives a sink up.
 bool calls_for_new_process(arhost_kind kind, arhost_status status) {
     return (kind == ARHOST_KIND_TRACKER || kind == ARHOST_KIND_RAYTRACER) &&
-           (status == ARHOST_ERROR_DEVICE_LOST || status == ARHOST_ERROR_OUT_OF_MEMORY);
+           (status == ARHOST_STATUS_ERROR_DEVICE_LOST || status == ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
 }
 
 } // namespace
@@ -73,7 +73,7 @@ void Component::stop() {
     if (state_ == State::running)
         stop_when_idle();
     else if (state_ == State::idle || state_ == State::given_up)
-        stopped(ARHOST_OK, "");
+        stopped(ARHOST_STATUS_OK, "");
 }
 
 void Component::kill() {
@@ -135,7 +135,7 @@ void Component::on_message(Message &message) {
     } else if (type == "failed" && state_ == State::starting) {
         const auto status = message.body.at("status").get<arhost_status>();
         const std::string text = message.body.at("text").get<std::string>();
-        if (status == ARHOST_ERROR_CONFIGURATION || status == ARHOST_ERROR_UNSUPPORTED)
+        if (status == ARHOST_STATUS_ERROR_CONFIGURATION || status == ARHOST_STATUS_ERROR_UNSUPPORTED)
             configuration_error_ = text;
         else
             failure_ = text;
@@ -265,7 +265,7 @@ void Component::on_died(const Death &death) {
     deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
     if (stop_sent_ && (!matters || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
         context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
-        return stopped(matters ? ARHOST_ERROR_INTERNAL : ARHOST_OK, reason);
+        return stopped(matters ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_OK, reason);
     }
     if (!configuration_error_.empty())
         return give_up(configuration_error_, true);
@@ -304,7 +304,7 @@ void Component::give_up(const std::string &reason, bool by_configuration) {
     state_ = State::given_up;
     hooks_.given_up(reason, by_configuration);
     if (stop_requested_)
-        stopped(ARHOST_ERROR_INTERNAL, reason);
+        stopped(ARHOST_STATUS_ERROR_INTERNAL, reason);
 }
 
 void Component::stopped(arhost_status status, const std::string &text) {

@@ -4,7 +4,7 @@
 // given up when it can't work. The host sees commands go in, results come out, and what was lost.
 #pragma once
 
-#include "ring/json_abi.hpp"
+#include "ipc/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 #include "supervise/restart_policy.hpp"
@@ -22,9 +22,9 @@ struct Limits {
 
 // Memory of slots that one process writes and others read.
 struct Region {
-    ring::SharedMemory memory;
-    ring::SlotLayout layout;
-    ring::Mapping mapping; // this process's view
+    ipc::SharedMemory memory;
+    ipc::SlotLayout layout;
+    ipc::Mapping mapping; // this process's view
     std::uint32_t generation = 0;
 };
 using RegionPointer = std::shared_ptr<const Region>;
@@ -39,7 +39,7 @@ public:
     enum class State { idle, starting, running, waiting, given_up, stopped };
 
     struct Create {
-        ring::Json body; // options and setup; "type" is added
+        ipc::Json body; // options and setup; "type" is added
         std::vector<int> fds;
     };
 
@@ -47,14 +47,14 @@ public:
     struct Hooks {
         // The plugin has been opened: what to create it with. Throws std::runtime_error where the
         // configuration does not fit it.
-        std::function<Create(const ring::PluginDescription &, std::size_t candidate)> hello;
+        std::function<Create(const ipc::PluginDescription &, std::size_t candidate)> hello;
         // It has started. Returns its output slots' layout (count 0: none). Throws where `ready` is bad.
-        std::function<ring::SlotLayout(const ring::Json &ready)> ready;
+        std::function<ipc::SlotLayout(const ipc::Json &ready)> ready;
         std::function<void()> running; // commands may be submitted
-        std::function<void(const ring::Command &, const ring::Result &)> result;
+        std::function<void(const ipc::Command &, const ipc::Result &)> result;
         // The process has ended, whatever comes next. The unanswered commands, oldest first; that one
         // was being worked on.
-        std::function<void(const std::vector<ring::Command> &unanswered)> lost;
+        std::function<void(const std::vector<ipc::Command> &unanswered)> lost;
         // It will not be started again. `by_configuration`: it can't work as it is configured.
         std::function<void(const std::string &reason, bool by_configuration)> given_up;
         std::function<void(arhost_status, const std::string &text)> stopped; // after stop()
@@ -88,7 +88,7 @@ public:
     State state() const { return state_; }
     const std::string &name() const { return name_; }
     const std::filesystem::path &plugin() const { return plugins_[candidate_]; }
-    const ring::PluginDescription &description() const { return description_; }
+    const ipc::PluginDescription &description() const { return description_; }
     pid_t pid() const { return process_ ? process_->pid() : 0; }
 
     // Its output slots of this life; null until it runs.
@@ -96,7 +96,7 @@ public:
 
     std::size_t in_flight() const { return in_flight_.size(); }
     // Fills the ticket, attaches `input` first where it is new, and forgets inputs that nobody holds.
-    void submit(ring::Command command, const RegionPointer &input = nullptr);
+    void submit(ipc::Command command, const RegionPointer &input = nullptr);
 
     std::uint32_t restarts() const { return restarts_; }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
@@ -104,11 +104,11 @@ public:
 
 private:
     void spawn();
-    void on_message(ring::Message &message);
-    void on_hello(const ring::Json &body);
-    void on_ready(const ring::Json &body);
-    void on_attached(const ring::Json &body);
-    void on_result(const ring::Result &result);
+    void on_message(ipc::Message &message);
+    void on_hello(const ipc::Json &body);
+    void on_ready(const ipc::Json &body);
+    void on_attached(const ipc::Json &body);
+    void on_result(const ipc::Result &result);
     void on_died(const Death &death);
     void run();
     void stop_when_idle();
@@ -131,23 +131,23 @@ private:
     bool stop_requested_ = false, stop_sent_ = false;
     std::optional<std::pair<arhost_status, std::string>> stop_answer_;
     std::string configuration_error_, failure_; // what the worker gave as its reason
-    ring::PluginDescription description_;
+    ipc::PluginDescription description_;
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> output_being_attached_;
     RegionPointer output_;
     std::map<std::uint32_t, std::weak_ptr<const Region>> attached_inputs_;
     std::uint32_t next_generation_ = 1;
-    std::deque<ring::Command> in_flight_;
+    std::deque<ipc::Command> in_flight_;
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;
     std::deque<Crash> crashes_;
     std::uint32_t deaths_in_stop_ = 0;
-    ring::Reactor::Registration deadline_, restart_timer_;
+    ipc::Reactor::Registration deadline_, restart_timer_;
     std::minstd_rand jitter_{std::random_device{}()};
 };
 
 // Cuts a region for the host's own writing: mapped writable here, for reading only elsewhere.
-RegionPointer make_host_region(const char *name, const ring::SlotLayout &layout);
+RegionPointer make_host_region(const char *name, const ipc::SlotLayout &layout);
 
 } // namespace arhost::supervise

@@ -2,7 +2,7 @@
 #include "supervise/launcher.hpp"
 
 #include "base/orphans.hpp"
-#include "ring/wake.hpp"
+#include "ipc/wake.hpp"
 #include "supervise/launcher_protocol.hpp"
 
 #include <csignal>
@@ -24,12 +24,12 @@ using base::UniqueFd;
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int most_tries = 5;
+constexpr int max_attempts = 5;
 
 } // namespace
 
-Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds patience)
-    : program_(std::move(program)), patience_(patience), not_of_workers_(base::children()) {
+Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds timeout)
+    : program_(std::move(program)), timeout_(timeout), not_of_workers_(base::children()) {
     if (::access(program_.c_str(), X_OK) != 0)
         throw std::runtime_error(cannot_start(errno));
     ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a killed launcher leaves behind comes here
@@ -65,7 +65,7 @@ void Launcher::start() {
 
 // One that somebody has stopped is made to go on: the host must not stand still.
 std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
-    const auto deadline = Clock::now() + patience_;
+    const auto deadline = Clock::now() + timeout_;
     pollfd ready{socket_.get(), POLLIN, 0};
     for (bool is_late = false;;
          is_late = Clock::now() > deadline) { // asked first: this process may have been stopped
@@ -104,7 +104,7 @@ Launcher::~Launcher() {
     if (!socket_)
         return;
     socket_.reset();
-    const auto deadline = Clock::now() + patience_;
+    const auto deadline = Clock::now() + timeout_;
     while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
         if (Clock::now() > deadline) {
             lose();
@@ -121,16 +121,16 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());
 
-    for (int tries = 0; tries < most_tries; ++tries) {
+    for (int tries = 0; tries < max_attempts; ++tries) {
         if (is_lost_)
             log(ARHOST_SEVERITY_WARNING, "arhost", "the launcher is gone, and all workers with it; starting another");
         if (!socket_)
             start();
         is_lost_ = false;
         Spawned spawned;
-        ring::Channel mine, theirs;
-        std::tie(mine, theirs) = ring::Channel::make_pair();
-        ring::DoorbellPair doorbell = ring::make_doorbell();
+        ipc::Channel mine, theirs;
+        std::tie(mine, theirs) = ipc::Channel::make_pair();
+        ipc::DoorbellPair doorbell = ipc::make_doorbell();
         int pipe_ends[2];
         if (::pipe2(pipe_ends, O_CLOEXEC) != 0)
             base::throw_errno("pipe for a worker's output");
@@ -161,7 +161,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         return spawned;
     }
     throw std::runtime_error("no process can be started: " + program_.string() + " was started " +
-                             std::to_string(most_tries) + " times, and ended or did not answer each time");
+                             std::to_string(max_attempts) + " times, and ended or did not answer each time");
 }
 
 void Launcher::note(const Exit &exit) {

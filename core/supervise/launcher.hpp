@@ -7,7 +7,7 @@
 #pragma once
 
 #include "base/unique_fd.hpp"
-#include "ring/channel.hpp"
+#include "ipc/channel.hpp"
 #include "supervise/exit.hpp"
 
 #include <arhost/plugin.h>
@@ -30,7 +30,7 @@ using LogFunction =
 struct Spawned {
     pid_t pid = 0;
     base::UniqueFd pidfd;    // readable once it is dead
-    ring::Channel channel;   // its descriptor 3
+    ipc::Channel channel;    // its descriptor 3
     base::UniqueFd doorbell; // its descriptor 4
     base::UniqueFd output;   // what it writes to stdout and stderr
 };
@@ -54,8 +54,8 @@ public:
 class Launcher final : public Starter {
 public:
     // `program`: arhost-launcher, which is started together with the first worker. Throws std::runtime_error where it
-    // can't be executed. `patience`: what it has to answer, and at the end to finish.
-    explicit Launcher(std::filesystem::path program, std::chrono::milliseconds patience = std::chrono::seconds(4));
+    // can't be executed. `timeout`: what it has to answer, and at the end to finish.
+    explicit Launcher(std::filesystem::path program, std::chrono::milliseconds timeout = std::chrono::seconds(4));
     ~Launcher() override;
     Launcher(const Launcher &) = delete;
     Launcher &operator=(const Launcher &) = delete;
@@ -71,7 +71,7 @@ private:
     void note(const Exit &exit);
 
     std::filesystem::path program_;
-    std::chrono::milliseconds patience_;
+    std::chrono::milliseconds timeout_;
     std::set<pid_t> not_of_workers_; // children of who became this program by exec
     base::UniqueFd socket_;          // none: no launcher is at work
     pid_t pid_ = 0;

@@ -3,7 +3,7 @@
 // What the host and arhost-launcher send each other, as plain structs: both are of one build.
 #pragma once
 
-#include "ring/fd_passing.hpp"
+#include "ipc/fd_passing.hpp"
 #include "supervise/exit.hpp"
 
 #include <climits>
@@ -24,12 +24,11 @@ struct Reply {
 constexpr int launcher_fd = 3;
 
 template <class Struct> bool send_struct(int socket, const Struct &data, std::initializer_list<int> fds = {}) {
-    return ring::send_with_fds(socket, std::as_bytes(std::span(&data, 1)), fds) == sizeof data;
+    return ipc::send_with_fds(socket, std::as_bytes(std::span(&data, 1)), fds) == sizeof data;
 }
 template <class Struct>
 bool receive_struct(int socket, Struct &data, std::vector<base::UniqueFd> &fds, int flags = 0) {
-    return ring::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds, flags).size ==
-           sizeof data;
+    return ipc::receive_with_fds(socket, std::as_writable_bytes(std::span(&data, 1)), fds, flags).size == sizeof data;
 }
 
 } // namespace arhost::supervise

@@ -12,7 +12,7 @@
 namespace arhost::supervise {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 const char *to_text(Call call) {
     switch (call) {
@@ -155,14 +155,14 @@ void Process::take_messages(int most) {
 
 // What the plugin says; it must not drown what others say, nor its chatter its own warnings.
 void Process::log(arhost_severity severity, const std::string &text) {
-    constexpr int most_a_second = 100;
+    constexpr int max_a_second = 100;
     remember(text);
     if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
         tell_of_lines_left_out();
         log_second_ends_ = now + std::chrono::seconds(1);
     }
     Lines &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : chatter_;
-    if (lines.said++ < most_a_second)
+    if (lines.said++ < max_a_second)
         context_.log(severity, name_, text);
     else
         ++lines.left_out;
@@ -204,9 +204,9 @@ void Process::take_results() {
     }
 }
 
-void Process::take_output(std::size_t most_bytes) {
+void Process::take_output(std::size_t max_bytes) {
     char bytes[4096];
-    for (std::size_t taken = 0; taken < most_bytes; taken += sizeof bytes) {
+    for (std::size_t taken = 0; taken < max_bytes; taken += sizeof bytes) {
         const ssize_t count = ::read(spawned_.output.get(), bytes, sizeof bytes);
         if (count <= 0) {
             if (count == 0)

@@ -3,10 +3,10 @@
 // One live worker process as the host sees it: its messages, results and death, and the ways to end it.
 #pragma once
 
-#include "ring/channel.hpp"
-#include "ring/memory.hpp"
-#include "ring/protocol.hpp"
-#include "ring/reactor.hpp"
+#include "ipc/channel.hpp"
+#include "ipc/memory.hpp"
+#include "ipc/protocol.hpp"
+#include "ipc/reactor.hpp"
 #include "supervise/launcher.hpp"
 
 #include <deque>
@@ -17,7 +17,7 @@ namespace arhost::supervise {
 
 // What every component of a host shares.
 struct Context {
-    ring::Reactor &reactor;
+    ipc::Reactor &reactor;
     Starter &launcher;
     std::filesystem::path worker_program;
     LogFunction log;
@@ -37,22 +37,22 @@ public:
     // Each is called from the reactor. `died` comes last and once; the Process may be destroyed in it,
     // and in none of the others. An exception out of `message` ends the process.
     struct Events {
-        std::function<void(ring::Message &)> message; // but for log messages
-        std::function<void(const ring::Result &)> result;
+        std::function<void(ipc::Message &)> message; // but for log messages
+        std::function<void(const ipc::Result &)> result;
         std::function<void(const Death &)> died;
     };
 
     // Starts a worker and gives it its pages together with `first`, whose body lacks nothing else.
-    Process(Context &context, std::string name, Events events, const ring::Json &first);
+    Process(Context &context, std::string name, Events events, const ipc::Json &first);
     ~Process(); // kills it
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;
 
     // A message of the start-up, which the worker waits for.
-    void send(const ring::Json &body, std::initializer_list<int> fds = {});
+    void send(const ipc::Json &body, std::initializer_list<int> fds = {});
     // A message to a worker that serves commands; taken in its turn.
-    void send_in_turn(const ring::Json &body, std::initializer_list<int> fds = {});
-    void submit(const ring::Command &command);
+    void send_in_turn(const ipc::Json &body, std::initializer_list<int> fds = {});
+    void submit(const ipc::Command &command);
 
     void ask_to_cancel(); // the running call sees host->cancelled
     // Ends it for a reason that stands in Death::how: SIGABRT, and SIGKILL soon after.
@@ -66,7 +66,7 @@ public:
 private:
     void take_messages(int most);
     void on_doorbell();
-    void take_output(std::size_t most_bytes);
+    void take_output(std::size_t max_bytes);
     void on_death();
     void take_results();
     void log(arhost_severity severity, const std::string &text);
@@ -77,19 +77,19 @@ private:
     std::string name_;
     Events events_;
     Spawned spawned_;
-    ring::SharedMemory host_memory_, worker_memory_;
-    ring::Mapping host_page_, worker_page_;
-    ring::CommandProducer commands_;
-    ring::ResultConsumer results_;
+    ipc::SharedMemory host_memory_, worker_memory_;
+    ipc::Mapping host_page_, worker_page_;
+    ipc::CommandProducer commands_;
+    ipc::ResultConsumer results_;
     std::string end_reason_, partial_line_;
     std::deque<std::string> tail_;
-    ring::Reactor::Clock::time_point log_second_ends_{};
+    ipc::Reactor::Clock::time_point log_second_ends_{};
     struct Lines { // within the second
         int said = 0, left_out = 0;
     };
     Lines chatter_, warnings_;
     std::uint64_t rings_ = 0, results_taken_ = 0;
-    ring::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
+    ipc::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
 };
 
 } // namespace arhost::supervise

@@ -15,6 +15,6 @@ int main() {
         return 2;
     }
     worker::keep_freed_memory();
-    worker::Link link{ring::Channel(base::UniqueFd(control_fd)), base::UniqueFd(doorbell_fd)};
+    worker::Link link{ipc::Channel(base::UniqueFd(control_fd)), base::UniqueFd(doorbell_fd)};
     return worker::work(link);
 }

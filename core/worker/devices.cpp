@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/devices.hpp"
 
-#include "ring/json_abi.hpp"
+#include "ipc/json_abi.hpp"
 
 #include <cstddef>
 #include <stdexcept>
@@ -10,7 +10,7 @@
 namespace arhost::worker {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 // As much as one message holds, however many there are.
 struct Taken {
@@ -35,7 +35,7 @@ void take(void *context, const arhost_device *device) noexcept {
 arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host, Json &answer) {
     const auto *extension = static_cast<const arhost_devices *>(plugin.get_extension(ARHOST_DEVICES_EXTENSION));
     if (!extension)
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     constexpr std::size_t whole = offsetof(arhost_devices, list) + sizeof(arhost_devices::list);
     if (extension->struct_size < whole || !extension->list)
         throw std::runtime_error("its extension " ARHOST_DEVICES_EXTENSION " is too short, or has no 'list'");

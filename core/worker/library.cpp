@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/library.hpp"
 
-#include "ring/json_abi.hpp"
+#include "ipc/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <algorithm>
@@ -100,7 +100,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     arhost_answer answer{sizeof answer, 0xffffffffu, nullptr};
     const arhost_status status = entry.negotiate(&offer, &answer);
     const std::string versions = "this arhost speaks ABI version " + std::to_string(ARHOST_ABI_VERSION);
-    if (status != ARHOST_OK)
+    if (status != ARHOST_STATUS_OK)
         refuse(file, "refused the ABI version; " + versions + ": build the plugin against its headers");
     if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
         refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
@@ -126,7 +126,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         (plugin->descriptor->options->struct_size < option_size ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
         refuse(file, "its options' struct_size is not that of an arhost_option_descriptor");
-    const auto options = ring::options_of(*plugin->descriptor);
+    const auto options = ipc::options_of(*plugin->descriptor);
     if (const auto found = std::ranges::find(options, nullptr, &arhost_option_descriptor::key);
         found != options.end())
         refuse(file, "its option " + std::to_string(found - options.begin()) + " has no key");

@@ -8,7 +8,7 @@
 
 namespace arhost::worker {
 
-using namespace ring;
+using namespace ipc;
 
 Message Link::receive() const {
     Message message;
@@ -28,11 +28,11 @@ Message Link::receive() const {
 
 void Link::send(const Json &body, std::initializer_list<int> fds) const {
     // The kernel counts the descriptors that are under way for all processes of a user, and others may have too many.
-    constexpr int most_tries = 500;
+    constexpr int max_attempts = 500;
     for (int tries = 0; !channel_.send(body, fds); ++tries) {
         if (errno != ETOOMANYREFS)
             throw HostGone("the host has closed the channel");
-        if (tries == most_tries)
+        if (tries == max_attempts)
             throw std::runtime_error("this user's processes have too many descriptors under way in messages");
         ::usleep(10'000);
     }

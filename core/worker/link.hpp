@@ -3,9 +3,9 @@
 // The worker's end of its link to the host.
 #pragma once
 
-#include "ring/channel.hpp"
-#include "ring/memory.hpp"
-#include "ring/protocol.hpp"
+#include "ipc/channel.hpp"
+#include "ipc/memory.hpp"
+#include "ipc/protocol.hpp"
 
 #include <atomic>
 #include <mutex>
@@ -20,32 +20,32 @@ class HostGone : public std::runtime_error {
 
 class Link {
 public:
-    Link(ring::Channel channel, base::UniqueFd doorbell)
+    Link(ipc::Channel channel, base::UniqueFd doorbell)
         : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
 
     // Waits for the next control message; throws HostGone.
-    ring::Message receive() const;
-    void send(const ring::Json &body, std::initializer_list<int> fds = {}) const;
+    ipc::Message receive() const;
+    void send(const ipc::Json &body, std::initializer_list<int> fds = {}) const;
     void log(arhost_severity severity, const std::string &text) const; // never blocks
     void progress(double fraction, const char *what) const;            // never blocks
 
     // Maps the pages that came with `open`; before this, there are no rings.
-    void map_pages(ring::Message &open);
+    void map_pages(ipc::Message &open);
     bool cancelled() const {
-        return host_page_ && host_page_.as<ring::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
+        return host_page_ && host_page_.as<ipc::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
     }
 
     // The next command; nullopt after `timeout` without one. Throws HostGone.
-    std::optional<ring::Command> next(std::chrono::milliseconds timeout);
-    void answer(const ring::Result &result);
+    std::optional<ipc::Command> next(std::chrono::milliseconds timeout);
+    void answer(const ipc::Result &result);
 
     bool serving = false; // past `ready`: what fails now is no fault of the configuration
 
     // Marks which of the plugin's functions runs, for crash reports, while it is alive.
     class InCall {
     public:
-        InCall(const Link &link, ring::Call call) : link_(link) { link_.mark(call); }
-        ~InCall() { link_.mark(ring::Call::none); }
+        InCall(const Link &link, ipc::Call call) : link_(link) { link_.mark(call); }
+        ~InCall() { link_.mark(ipc::Call::none); }
         InCall(const InCall &) = delete;
         InCall &operator=(const InCall &) = delete;
 
@@ -55,17 +55,17 @@ public:
 
 private:
     // Relaxed: the host reads it after this process has died.
-    void mark(ring::Call call) const {
+    void mark(ipc::Call call) const {
         if (worker_page_)
-            worker_page_.as<ring::WorkerPage>().call.store(static_cast<std::uint32_t>(call),
-                                                           std::memory_order_relaxed);
+            worker_page_.as<ipc::WorkerPage>().call.store(static_cast<std::uint32_t>(call),
+                                                          std::memory_order_relaxed);
     }
 
-    ring::Channel channel_;
+    ipc::Channel channel_;
     base::UniqueFd doorbell_;
-    ring::Mapping host_page_, worker_page_;
-    std::optional<ring::CommandConsumer> commands_;
-    std::optional<ring::ResultProducer> results_;
+    ipc::Mapping host_page_, worker_page_;
+    std::optional<ipc::CommandConsumer> commands_;
+    std::optional<ipc::ResultProducer> results_;
 };
 
 } // namespace arhost::worker

@@ -10,7 +10,7 @@
 
 namespace arhost::worker {
 
-int load_scene_for(Link &link, const ring::Message &load) {
+int load_scene_for(Link &link, const ipc::Message &load) {
     scene::LoadCallbacks callbacks;
     callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
     callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
@@ -20,9 +20,9 @@ int load_scene_for(Link &link, const ring::Message &load) {
         link.send({{"type", "reads"}, {"path", identity.path}, {"node", identity.node}});
     };
     scene::ArenaBuilder builder = scene::load_scene(load.body.at("scene").get<std::string>(), callbacks);
-    const ring::SharedMemory memory = ring::SharedMemory::create("arhost-scene", builder.byte_size());
+    const ipc::SharedMemory memory = ipc::SharedMemory::create("arhost-scene", builder.byte_size());
     {
-        const ring::Mapping mapping = memory.map(ring::Access::read_write);
+        const ipc::Mapping mapping = memory.map(ipc::Access::read_write);
         std::move(builder).write(mapping.bytes());
     } // unmapped: the host freezes it, which no writable mapping may outlive
     link.send({{"type", "loaded"}}, {memory.fd()});

@@ -8,6 +8,6 @@
 namespace arhost::worker {
 
 // Answers {type: load, scene}. Returns the process's exit status.
-int load_scene_for(Link &link, const ring::Message &load);
+int load_scene_for(Link &link, const ipc::Message &load);
 
 } // namespace arhost::worker

@@ -10,7 +10,7 @@
 namespace arhost::worker {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 std::uint8_t *as_pixels(std::span<std::byte> bytes) {
     return reinterpret_cast<std::uint8_t *>(bytes.data());
@@ -42,7 +42,7 @@ public:
         properties.format.struct_size = sizeof properties.format;
         properties.intrinsics.struct_size = sizeof properties.intrinsics;
         const arhost_status status = source_.start(instance_, &setup, &properties);
-        if (status != ARHOST_OK)
+        if (status != ARHOST_STATUS_OK)
             return status;
         format_ = properties.format;
         if (!arhost_frame_layout(&format_) || format_.byte_size != properties.format.byte_size)
@@ -68,15 +68,15 @@ public:
         buffer.sequence = next_;
         result.frame.struct_size = sizeof result.frame;
         const arhost_status status = source_.read(instance_, &buffer, &result.frame);
-        if (status == ARHOST_OK)
+        if (status == ARHOST_STATUS_OK)
             next_ += std::uint64_t{1} + result.frame.skipped;
         // Once for all trackers, and out of the host's process.
-        if (status == ARHOST_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
+        if (status == ARHOST_STATUS_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
             fill_grey(format_, buffer.plane, buffer.grey);
         return status;
     }
 
-    arhost_status stop() override { return source_.stop(instance_), ARHOST_OK; }
+    arhost_status stop() override { return source_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
     const arhost_source &source_;
@@ -128,7 +128,7 @@ public:
         return tracker_.track(instance_, &frame, &result);
     }
 
-    arhost_status stop() override { return tracker_.stop(instance_), ARHOST_OK; }
+    arhost_status stop() override { return tracker_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
     const arhost_tracker &tracker_;
@@ -182,7 +182,7 @@ public:
         return raytracer_.render(instance_, &request, &image, &result.render);
     }
 
-    arhost_status stop() override { return raytracer_.stop(instance_), ARHOST_OK; }
+    arhost_status stop() override { return raytracer_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
     const arhost_raytracer &raytracer_;

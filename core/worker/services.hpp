@@ -3,8 +3,8 @@
 // How the worker serves each kind of plugin.
 #pragma once
 
-#include "ring/json_abi.hpp"
-#include "ring/protocol.hpp"
+#include "ipc/json_abi.hpp"
+#include "ipc/protocol.hpp"
 #include "worker/link.hpp"
 
 #include <map>
@@ -15,8 +15,8 @@ namespace arhost::worker {
 // The memory that commands refer to.
 struct Memory {
     struct Region {
-        ring::SlotLayout layout;
-        ring::Mapping mapping;
+        ipc::SlotLayout layout;
+        ipc::Mapping mapping;
         std::span<std::byte> slot(std::uint32_t index) const; // throws HostGone where it is out of range
     };
     std::map<std::uint32_t, Region> inputs; // by generation
@@ -29,11 +29,11 @@ class Service {
 public:
     virtual ~Service() = default;
     // The kind's start, with the setup of the host's `create`; what it returns goes into `ready`.
-    virtual arhost_status start(const ring::Message &create, ring::Json &ready) = 0;
+    virtual arhost_status start(const ipc::Message &create, ipc::Json &ready) = 0;
     // One command of the kind's own.
-    virtual arhost_status execute(const ring::Command &command, const Memory &memory, ring::Result &result) = 0;
+    virtual arhost_status execute(const ipc::Command &command, const Memory &memory, ipc::Result &result) = 0;
     virtual bool wants_idle() const { return false; }
-    virtual arhost_status idle() { return ARHOST_OK; }
+    virtual arhost_status idle() { return ARHOST_STATUS_OK; }
     virtual arhost_status stop() = 0;
 };
 

@@ -15,7 +15,7 @@
 namespace arhost::worker {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 // The host's callbacks for a plugin, and the last error that it logged, for `failed`.
 class HostSide {
@@ -74,9 +74,9 @@ public:
     int run(const Message &create) {
         if (!make(create))
             return EXIT_FAILURE;
-        const auto patience = std::chrono::milliseconds(service_->wants_idle() ? 33 : 1000);
+        const auto timeout = std::chrono::milliseconds(service_->wants_idle() ? 33 : 1000);
         while (!stopped_) {
-            const auto command = link_.next(patience);
+            const auto command = link_.next(timeout);
             if (!command)
                 idle();
             else if (command->kind == CommandKind::control)
@@ -100,15 +100,15 @@ private:
             status =
                 plugin_.create(host_.get(), options.data(), static_cast<std::uint32_t>(options.size()), &instance_);
         }
-        if (status == ARHOST_OK && !instance_)
+        if (status == ARHOST_STATUS_OK && !instance_)
             throw std::runtime_error("the plugin's create succeeded without an instance");
         Json ready = {{"type", "ready"}};
-        if (status == ARHOST_OK) {
+        if (status == ARHOST_STATUS_OK) {
             service_ = make_service(plugin_, instance_);
             Link::InCall call(link_, Call::start);
             status = service_->start(create, ready);
         }
-        if (status != ARHOST_OK) {
+        if (status != ARHOST_STATUS_OK) {
             link_.send(host_.failed(status));
             return false;
         }
@@ -119,7 +119,7 @@ private:
 
     void idle() {
         Link::InCall call(link_, Call::idle);
-        if (service_->wants_idle() && service_->idle() == ARHOST_END)
+        if (service_->wants_idle() && service_->idle() == ARHOST_STATUS_END)
             link_.send({{"type", "end"}});
     }
 
@@ -159,7 +159,7 @@ private:
             const arhost_status status = service_->stop();
             link_.send({{"type", "stopped"},
                         {"status", status},
-                        {"text", status == ARHOST_OK ? std::string() : host_.last_error()}});
+                        {"text", status == ARHOST_STATUS_OK ? std::string() : host_.last_error()}});
             stopped_ = true;
         } else {
             throw HostGone("the host sent a message of unknown type '" + type + "'");
@@ -186,7 +186,7 @@ Json answer_devices(const Link &link, const HostSide &host, const arhost_plugin 
     Json answer = {{"type", "devices"}};
     const Link::InCall call(link, Call::devices);
     const arhost_status status = list_devices(plugin, *host.get(), answer);
-    return status == ARHOST_OK ? answer : host.failed(status);
+    return status == ARHOST_STATUS_OK ? answer : host.failed(status);
 }
 
 int serve(Link &link) {
@@ -240,7 +240,8 @@ int work(Link &link) {
         return EXIT_FAILURE; // nobody is left to tell
     } catch (const std::exception &error) {
         try {
-            const arhost_status status = link.serving ? ARHOST_ERROR_INTERNAL : ARHOST_ERROR_CONFIGURATION;
+            const arhost_status status =
+                link.serving ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CONFIGURATION;
             link.send({{"type", "failed"}, {"status", status}, {"text", error.what()}});
         } catch (const HostGone &) {
         }

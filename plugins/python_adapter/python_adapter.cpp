@@ -81,7 +81,7 @@ std::string take_error() {
 
 Object checked(PyObject *object) {
     if (!object)
-        throw Failure(ARHOST_ERROR_INTERNAL, "Python: " + take_error());
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Python: " + take_error());
     return object;
 }
 
@@ -170,8 +170,8 @@ void initialise(const std::string &interpreter) {
     const PyStatus status = Py_InitializeFromConfig(&config);
     PyConfig_Clear(&config);
     if (PyStatus_Exception(status))
-        throw Failure(ARHOST_ERROR_CONFIGURATION, std::string("Python can't be started: ") +
-                                                      (status.err_msg ? status.err_msg : "no reason given"));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::string("Python can't be started: ") +
+                                                             (status.err_msg ? status.err_msg : "no reason given"));
     PyEval_SaveThread();
 }
 
@@ -183,7 +183,7 @@ Object import_arhost(const std::string &interpreter) {
     Object module = PyImport_ExecCodeModule("arhost", code.get());
     if (!module)
         throw Failure(
-            ARHOST_ERROR_CONFIGURATION,
+            ARHOST_STATUS_ERROR_CONFIGURATION,
             "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
                 "; install python3-numpy, or name the python of a virtual "
                 "environment that has numpy in the option 'interpreter' (and let it be read: 'reads: [FOLDER]')");
@@ -239,14 +239,15 @@ public:
                                  &format.fps, &format.yuv_matrix, &format.yuv_range, &frames));
         properties.frame_count = frames;
         if (!arhost_frame_layout(&format))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "start returned a frame format or size that is not valid");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "start returned a frame format or size that is not valid");
     }
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         const Locked locked;
         const Answer answer =
             call("read", "NKN", view_of(buffer.format).release(), static_cast<unsigned long long>(buffer.sequence),
                  views_of_planes(*buffer.format, buffer.plane, PyBUF_WRITE).release());
-        if (answer.status == ARHOST_OK) {
+        if (answer.status == ARHOST_STATUS_OK) {
             long long capture_ns = 0;
             require(PyArg_ParseTuple(answer.value.get(), "iL", &info.clock, &capture_ns));
             info.capture_ns = capture_ns;
@@ -273,7 +274,8 @@ public:
                                    view(result.markers, sizeof result.markers, PyBUF_WRITE).release());
         const long count = PyLong_AsLong(answer.value.get());
         if (count < 0 || count > ARHOST_MAX_MARKERS)
-            throw Failure(ARHOST_ERROR_INTERNAL, "track must return how many markers it has filled in, 0 to 64");
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
+                          "track must return how many markers it has filled in, 0 to 64");
         result.marker_count = static_cast<std::uint32_t>(count);
     }
 
@@ -336,7 +338,7 @@ private:
     // A method of _Adapter. Throws what it says has failed.
     template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
         const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
-        Answer answer{ARHOST_ERROR_INTERNAL, {}};
+        Answer answer{ARHOST_STATUS_ERROR_INTERNAL, {}};
         PyObject *value = nullptr;
         require(PyArg_ParseTuple(pair.get(), "iO", &answer.status, &value));
         answer.value = Py_NewRef(value);
@@ -346,7 +348,7 @@ private:
     }
     static void require(int succeeded) {
         if (!succeeded)
-            throw Failure(ARHOST_ERROR_INTERNAL, "Python: " + take_error());
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Python: " + take_error());
     }
 
     Host host_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "embree_scene.hpp"
 
-#include "common_view/arena.hpp"
+#include "raytracer_common/arena.hpp"
 
 #include <arhost/shading/scalar.hpp>
 
@@ -19,13 +19,13 @@ using arhost::Failure;
 using arhost::view::bytes;
 using arhost::view::elements;
 using arhost::view::is_identity;
-using arhost::view::put_reach;
+using arhost::view::object_extent;
 
 unsigned mask_of(const Object &object) {
-    return object.role == ARHOST_CATCHER            ? catcher_mask
-           : object.role == ARHOST_OCCLUDER         ? occluder_mask
-           : object.material->model == ARHOST_GLASS ? glass_mask
-                                                    : opaque_mask;
+    return object.role == ARHOST_ROLE_CATCHER                ? catcher_mask
+           : object.role == ARHOST_ROLE_OCCLUDER             ? occluder_mask
+           : object.material->model == ARHOST_MATERIAL_GLASS ? glass_mask
+                                                             : opaque_mask;
 }
 
 void set_transform(Object &object, const float *m) {
@@ -39,7 +39,7 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
-    if (geometry.type == ARHOST_TRIANGLES) {
+    if (geometry.type == ARHOST_GEOMETRY_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
             return buffer.count ? reinterpret_cast<const float *>(bytes(arena) + buffer.offset) : nullptr;
         };
@@ -77,7 +77,7 @@ Box box_of(const std::byte *points, std::uint32_t count, std::uint32_t stride, b
 Box local_box(const arhost_scene &arena, const arhost_object &object) {
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[object.geometry];
     return box_of(bytes(arena) + geometry.positions.offset, geometry.positions.count, geometry.positions.stride,
-                  geometry.type == ARHOST_SPHERES);
+                  geometry.type == ARHOST_GEOMETRY_SPHERES);
 }
 
 // The box round the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
@@ -108,7 +108,7 @@ bool catchers_deserve_a_tree(const arhost_scene &arena) {
     for (const arhost_object &object : elements<arhost_object>(arena, arena.objects)) {
         const std::uint64_t count = std::max(geometries[object.geometry].indices.count, std::uint32_t{1});
         all += count;
-        if (object.role != ARHOST_CATCHER)
+        if (object.role != ARHOST_ROLE_CATCHER)
             continue;
         if (is_instance(object))
             return false;
@@ -144,7 +144,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
          {RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED,
           RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, RTC_DEVICE_PROPERTY_POINT_GEOMETRY_SUPPORTED})
         if (!rtcGetDeviceProperty(device_.get(), property))
-            throw Failure(ARHOST_ERROR_UNSUPPORTED,
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                           "this build of Embree lacks ray masks, filter functions, triangles "
                           "or points; install one with its default options");
 
@@ -169,8 +169,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         places_.push_back({local_box(arena, object), {}});
         visible_boxes_.push_back(empty_box());
         place_object(number, object.world_from_object);
-        view_.has_catchers |= object.role == ARHOST_CATCHER;
-        view_.has_occluders |= object.role == ARHOST_OCCLUDER;
+        view_.has_catchers |= object.role == ARHOST_ROLE_CATCHER;
+        view_.has_occluders |= object.role == ARHOST_ROLE_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
 
         if (object.deforms) {
@@ -181,7 +181,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         } else {
             const GeometryHandle geometry = new_geometry(number);
             attach(static_ ? static_.get() : root_.get(), geometry, number);
-            if (catchers_ && object.role == ARHOST_CATCHER)
+            if (catchers_ && object.role == ARHOST_ROLE_CATCHER)
                 rtcAttachGeometryByID(catchers_.get(), geometry.get(), number);
         }
     }
@@ -280,8 +280,8 @@ void EmbreeScene::place_object(std::uint32_t object, const float *world_from_obj
 
 void EmbreeScene::update_bounds(std::uint32_t object) {
     const auto &[local, world_from_object] = places_[object];
-    put_reach(local.min, local.max, world_from_object.data(), objects_[object].reach);
-    if (objects_[object].role != ARHOST_OCCLUDER)
+    object_extent(local.min, local.max, world_from_object.data(), objects_[object].reach);
+    if (objects_[object].role != ARHOST_ROLE_OCCLUDER)
         visible_boxes_[object] = transformed(local, world_from_object.data());
 }
 
@@ -330,7 +330,7 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
 GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
     const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
-    const bool spheres = from.type == ARHOST_SPHERES;
+    const bool spheres = from.type == ARHOST_GEOMETRY_SPHERES;
     GeometryHandle geometry(
         rtcNewGeometry(device_.get(), spheres ? RTC_GEOMETRY_TYPE_SPHERE_POINT : RTC_GEOMETRY_TYPE_TRIANGLE));
     const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
@@ -364,7 +364,7 @@ RTCScene EmbreeScene::instanced_scene(std::uint32_t number) {
 void EmbreeScene::commit(RTCScene scene) const {
     const auto stop_if_cancelled = [&] { // small scenes are built without a report
         if (host_.cancelled())
-            throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
     };
     stop_if_cancelled();
     rtcSetSceneProgressMonitorFunction(scene, report_build, const_cast<arhost::Host *>(&host_));
@@ -382,11 +382,11 @@ void EmbreeScene::check() const {
     case RTC_ERROR_OUT_OF_MEMORY:
         throw std::bad_alloc();
     case RTC_ERROR_CANCELLED:
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
     case RTC_ERROR_UNSUPPORTED_CPU:
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, "Embree does not support this processor");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "Embree does not support this processor");
     default:
-        throw Failure(ARHOST_ERROR_INTERNAL, "Embree reports error " + std::to_string(error));
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Embree reports error " + std::to_string(error));
     }
 }
 

@@ -83,9 +83,9 @@ void on_hit(const RTCFilterFunctionNArguments *arguments) {
 
 HitFilter hit_filter_of(const Object &object, const Texture *textures) {
     HitFilter filter;
-    filter.is_catcher = object.role == ARHOST_CATCHER;
+    filter.is_catcher = object.role == ARHOST_ROLE_CATCHER;
     const arhost_material &material = *object.material;
-    const bool has_colour = material.model != ARHOST_MIRROR && material.model != ARHOST_GLASS;
+    const bool has_colour = material.model != ARHOST_MATERIAL_MIRROR && material.model != ARHOST_MATERIAL_GLASS;
     if (has_colour && material.alpha_cutoff > 0 && material.colour_texture != ARHOST_NONE && object.texcoords) {
         filter.alpha_cutoff = material.alpha_cutoff;
         filter.colour = &textures[material.colour_texture];

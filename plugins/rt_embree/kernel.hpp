@@ -4,8 +4,8 @@
 // instruction sets (kernel/packet.hpp).
 #pragma once
 
-#include "common_view/samples.hpp"
 #include "embree.hpp"
+#include "raytracer_common/samples.hpp"
 
 #include <arhost/scene.h>
 #include <arhost/shading/srgb8.hpp>
@@ -32,7 +32,7 @@ struct Object {
     bool has_transform;
     // Column-major, from the object to the world: of directions, and of normals (its inverse transposed).
     float transform[9], normal_transform[9];
-    float reach[3];         // common_view/arena.hpp
+    float reach[3];         // raytracer_common/arena.hpp
     const int *indices;     // of triangles
     const float *positions; // of their corners
     const float *normals;   // NULL where the object is flat or a sphere

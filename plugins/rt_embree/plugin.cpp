@@ -79,7 +79,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Ray tracer on the processor: packets of 16 rays through Intel Embree.",
-                                          ARHOST_TRACES_LENS,
+                                          ARHOST_CAPABILITY_LENS_DISTORTION,
                                           std::size(options),
                                           options,
                                           nullptr};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
-#include "common_view/view.hpp"
+#include "raytracer_common/view.hpp"
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@ using arhost::view::Pose, arhost::view::same, arhost::view::same_view;
 using Vec3d = arhost::shading::Vec3T<double>;
 
 [[noreturn]] void refuse(const std::string &message) {
-    throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, message);
+    throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, message);
 }
 
 // What of the plane z = 1 a box covers: nothing where it lies behind the camera.
@@ -86,8 +86,8 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #endif
     if (wanted("base"))
         return {base::render_tile, "base"};
-    throw Failure(ARHOST_ERROR_UNSUPPORTED, "option 'instruction_set': this processor or build has no " +
-                                                instruction_set + "; set it to 'auto'");
+    throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "option 'instruction_set': this processor or build has no " +
+                                                       instruction_set + "; set it to 'auto'");
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) {
@@ -174,7 +174,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     });
     if (host_.cancelled()) {
         still_camera_.reset(); // what has been summed up has holes
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while an image was traced");
     }
     if (!history_.empty())
         history_samples_ += static_cast<std::uint32_t>(samples_.size());

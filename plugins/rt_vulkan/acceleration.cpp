@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "acceleration.hpp"
 
-#include "common_view/arena.hpp"
+#include "raytracer_common/arena.hpp"
 #include "scene_data.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using arhost::Failure;
 using arhost::view::elements;
 
 // Refitted trees decay as meshes deform; who looked by how much would pay more than for this.
-constexpr std::uint32_t most_refits = 60;
+constexpr std::uint32_t max_refits = 60;
 constexpr VkDeviceSize block_size = VkDeviceSize{4} << 20; // bytes
 constexpr VkDeviceSize structure_alignment = 256;          // bytes, by the specification
 
@@ -73,25 +73,25 @@ Acceleration::Acceleration(const Device &device, const Submission &submission, c
                            std::span<const Object> objects, const Buffer &indices, VkPipelineStageFlags readers,
                            const arhost::Host &host)
     : device_(device), submission_(submission), arena_(arena), host_(host), readers_(readers),
-      instances_(objects.size()), refits_(most_refits) { // what the arena has need be no pose: built anew at once
+      instances_(objects.size()), refits_(max_refits) { // what the arena has need be no pose: built anew at once
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     const auto from = elements<arhost_object>(arena, arena.objects);
     const auto refuse_over = [&](std::uint64_t count, std::uint64_t most, const char *what) {
         if (count > most)
-            throw Failure(ARHOST_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name + "' traces " +
-                                                        std::to_string(most) + " " + what +
-                                                        " at most, and there are " + std::to_string(count) +
-                                                        ": use option 'path': plain, or rt_embree");
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
+                                                               "' traces " + std::to_string(most) + " " + what +
+                                                               " at most, and there are " + std::to_string(count) +
+                                                               ": use option 'path': plain, or rt_embree");
     };
     // Instances have 24 bits for their objects' numbers.
-    refuse_over(from.size(), std::min<std::uint64_t>(device.physical().tracing.most_objects, 1u << 24), "objects");
+    refuse_over(from.size(), std::min<std::uint64_t>(device.physical().tracing.max_objects, 1u << 24), "objects");
 
     std::size_t moving_size = instances_.size() * sizeof(VkAccelerationStructureInstanceKHR);
     for (std::uint32_t i = 0; i < from.size(); ++i) {
         const arhost_geometry &geometry = geometries[from[i].geometry];
-        const bool has_spheres = geometry.type == ARHOST_SPHERES;
+        const bool has_spheres = geometry.type == ARHOST_GEOMETRY_SPHERES;
         const std::uint32_t count = has_spheres ? geometry.positions.count : geometry.indices.count;
-        refuse_over(count, device.physical().tracing.most_primitives, "triangles or spheres of a mesh");
+        refuse_over(count, device.physical().tracing.max_primitives, "triangles or spheres of a mesh");
         if (count == 0 || trees_.contains(from[i].geometry))
             continue;
         Tree &tree = trees_[from[i].geometry];
@@ -190,20 +190,20 @@ VkDeviceAddress Acceleration::address(const Tree &tree) const {
 // Builds the tree of a mesh that keeps its shape, and then makes it as small as it gets.
 void Acceleration::build_still(Tree &tree, const arhost_geometry &geometry) {
     if (host_.cancelled())
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the trees were built");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the trees were built");
     const DeviceFunctions &vk = device_.functions();
     const arhost_buffer &positions = geometry.positions;
     const auto *first = arhost::view::bytes(arena_) + positions.offset;
     std::vector<Box> sphere_boxes;
     std::span<const std::byte> input(first, std::size_t{positions.stride} * (positions.count - 1) + 12);
-    if (geometry.type == ARHOST_SPHERES) {
+    if (geometry.type == ARHOST_GEOMETRY_SPHERES) {
         sphere_boxes = boxes_of(arena_, geometry, {first, positions.stride});
         input = std::as_bytes(std::span(sphere_boxes));
     }
     const Buffer input_buffer(device_, input.size(), tree_input_usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                               Buffer::Place::device);
     upload(device_, submission_, input_buffer, {&input, 1});
-    if (geometry.type == ARHOST_SPHERES)
+    if (geometry.type == ARHOST_GEOMETRY_SPHERES)
         tree.geometry.geometry.aabbs.data.deviceAddress = input_buffer.address();
     else
         tree.geometry.geometry.triangles.vertexData.deviceAddress = input_buffer.address();
@@ -332,7 +332,7 @@ VkCommandBuffer Acceleration::move(const arhost_motion &motion) {
             std::memcpy(moving_.mapped().data() + tree->second.vertices_offset, deformed.positions,
                         3 * sizeof(float) * deformed.vertex_count);
     }
-    if (++refits_ <= most_refits)
+    if (++refits_ <= max_refits)
         return refit_;
     refits_ = 0;
     return rebuild_;

@@ -30,26 +30,26 @@ struct Bin {
 
 class Builder {
 public:
-    Builder(std::span<const Box> boxes, std::uint32_t most_in_leaf, const std::function<void()> &look_up)
-        : boxes_(boxes), most_in_leaf_(most_in_leaf), look_up_(look_up) {
+    Builder(std::span<const Box> boxes, std::uint32_t max_leaf_size, const std::function<void()> &check_cancelled)
+        : boxes_(boxes), max_leaf_size_(max_leaf_size), check_cancelled_(check_cancelled) {
         tree_.order.resize(boxes.size());
         std::iota(tree_.order.begin(), tree_.order.end(), 0u);
         tree_.nodes.reserve(2 * boxes.size());
         tree_.nodes.emplace_back();
     }
 
-    Tree build(int most_depth) {
+    Tree build(int max_depth) {
         struct Task {
             std::uint32_t node, first, count;
             int depth; // levels that are left below
         };
-        std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(boxes_.size()), most_depth}};
+        std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(boxes_.size()), max_depth}};
         std::uint32_t since_look_up = 0;
         while (!tasks.empty()) {
             const Task task = tasks.back();
             tasks.pop_back();
             if ((since_look_up += task.count) > 1u << 20) {
-                look_up_();
+                check_cancelled_();
                 since_look_up = 0;
             }
             Box box = empty_box();
@@ -116,7 +116,7 @@ private:
             }
         }
         const float area = half_area(box);
-        if (count <= most_in_leaf_ &&
+        if (count <= max_leaf_size_ &&
             !(best_axis >= 0 && best_cost + box_cost * area < area * static_cast<float>(count)))
             return 0;
         if (best_axis >= 0) {
@@ -142,8 +142,8 @@ private:
     }
 
     std::span<const Box> boxes_;
-    std::uint32_t most_in_leaf_;
-    const std::function<void()> &look_up_;
+    std::uint32_t max_leaf_size_;
+    const std::function<void()> &check_cancelled_;
     Tree tree_;
 };
 
@@ -166,9 +166,9 @@ void include(Box &box, const Box &other) {
     include(box, other.high);
 }
 
-Tree build_tree(std::span<const Box> boxes, std::uint32_t most_in_leaf, int most_depth,
-                const std::function<void()> &look_up) {
-    return Builder(boxes, most_in_leaf, look_up).build(most_depth);
+Tree build_tree(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
+                const std::function<void()> &check_cancelled) {
+    return Builder(boxes, max_leaf_size, check_cancelled).build(max_depth);
 }
 
 void refit(Tree &tree, std::span<const Box> boxes) {

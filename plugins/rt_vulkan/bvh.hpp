@@ -28,9 +28,9 @@ struct Tree {
 inline constexpr int top_depth = 22, object_depth = 40;
 
 // By binned surface area (I. Wald, On fast Construction of SAH-based Bounding Volume Hierarchies, 2007). `boxes` is
-// not empty. Calls `look_up` now and then, which may throw.
-Tree build_tree(std::span<const Box> boxes, std::uint32_t most_in_leaf, int most_depth,
-                const std::function<void()> &look_up);
+// not empty. Calls `check_cancelled` now and then, which may throw.
+Tree build_tree(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
+                const std::function<void()> &check_cancelled);
 
 // Brings the nodes round boxes that have moved, without a change of their shape.
 void refit(Tree &tree, std::span<const Box> boxes);

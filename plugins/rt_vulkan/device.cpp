@@ -72,7 +72,7 @@ Device::Device(const Instance &instance, const PhysicalDevice &physical, Path pa
     const auto refuse = [&](const char *name) {
         if (functions_.vkDestroyDevice)
             functions_.vkDestroyDevice(device_, nullptr);
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "the driver of the Vulkan device '" + physical.name + "' lacks " + name + "; install it again");
     };
     const auto load = [&](const char *name) { return from.vkGetDeviceProcAddr(device_, name); };
@@ -126,8 +126,8 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
     const std::vector<std::uint32_t> types =
         device.memory_types(needs.memoryTypeBits, place == Place::device ? 0 : mappable, wished);
     if (types.empty())
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
-                                                    "' has no memory that the host can write; choose another");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
+                                                           "' has no memory that the host can write; choose another");
     const bool has_address = usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     VkMemoryAllocateFlagsInfo flags{};
     flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;

@@ -202,22 +202,22 @@ void check(VkResult result, const char *what) {
     const std::string name = std::string(" (") + name_of(result) + ", " + std::to_string(result) + ")";
     switch (result) {
     case VK_ERROR_DEVICE_LOST:
-        throw Failure(ARHOST_ERROR_DEVICE_LOST, text + "that the device is lost" + name);
+        throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, text + "that the device is lost" + name);
     case VK_ERROR_OUT_OF_HOST_MEMORY:
-        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory" + name);
+        throw Failure(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, text + "that the host is out of memory" + name);
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
-        throw Failure(ARHOST_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory" + name +
-                                                      "; use smaller meshes and textures, or rt_embree");
+        throw Failure(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, text + "that the device is out of memory" + name +
+                                                             "; use smaller meshes and textures, or rt_embree");
     case VK_ERROR_INITIALIZATION_FAILED:
     case VK_ERROR_EXTENSION_NOT_PRESENT:
     case VK_ERROR_FEATURE_NOT_PRESENT:
     case VK_ERROR_INCOMPATIBLE_DRIVER:
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       text + "that it can't" + name +
                           "; look whether the driver's devices (/dev/dri, /dev/nvidia*) are "
                           "there and may be opened, or use another device or rt_embree");
     default:
-        throw Failure(ARHOST_ERROR_INTERNAL,
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
                       text + "an error" + name + "; update the driver, or use another device or rt_embree");
     }
 }
@@ -229,21 +229,22 @@ void Instance::CloseLibrary::operator()(void *library) const {
 Instance::Instance(const arhost::Host &host, bool validate, const std::string &loader)
     : host_(host), library_(dlopen(loader.c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (!library_)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no Vulkan loader: ") + dlerror() +
-                                                    "; install it (Debian: libvulkan1), or use rt_embree");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, std::string("no Vulkan loader: ") + dlerror() +
+                                                           "; install it (Debian: libvulkan1), or use rt_embree");
     get_ = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_.get(), "vkGetInstanceProcAddr"));
     if (!get_)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, loader + " is no Vulkan loader: it lacks vkGetInstanceProcAddr");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                      loader + " is no Vulkan loader: it lacks vkGetInstanceProcAddr");
     create(validate);
 #define RT_VULKAN_LOAD(name)                                                                                         \
     functions_.name = reinterpret_cast<PFN_##name>(get_(instance_, #name));                                          \
     if (!functions_.name)                                                                                            \
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, loader + " lacks " #name "; install the Vulkan loader again");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, loader + " lacks " #name "; reinstall the Vulkan loader");
     RT_VULKAN_INSTANCE_FUNCTIONS(RT_VULKAN_LOAD)
 #undef RT_VULKAN_LOAD
     if (validate && !add_messenger()) {
         functions_.vkDestroyInstance(instance_, nullptr);
-        throw Failure(ARHOST_ERROR_INTERNAL, "Vulkan's validation layers can't be asked for their messages");
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Vulkan's validation layers can't be asked for their messages");
     }
 }
 
@@ -265,7 +266,7 @@ void Instance::create(bool validate) {
         if (std::none_of(layers.begin(), layers.end(), [](const VkLayerProperties &layer) {
                 return !std::strcmp(layer.layerName, validation_layer);
             }))
-            throw Failure(ARHOST_ERROR_UNSUPPORTED,
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                           "option 'validate': Vulkan's validation layers are not installed (Debian: "
                           "vulkan-validationlayers); install them or leave the option out");
     }
@@ -273,7 +274,7 @@ void Instance::create(bool validate) {
     const auto version =
         reinterpret_cast<PFN_vkEnumerateInstanceVersion>(get_(nullptr, "vkEnumerateInstanceVersion"));
     if (!version)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "the Vulkan loader is of version 1.0; 1.1 is needed: install a newer");
     VkApplicationInfo application{};
     application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
@@ -300,15 +301,15 @@ void Instance::create(bool validate) {
     const auto create_instance = reinterpret_cast<PFN_vkCreateInstance>(get_(nullptr, "vkCreateInstance"));
     const VkResult result = create_instance(&info, nullptr, &instance_);
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER || result == VK_ERROR_INITIALIZATION_FAILED)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       std::string("no Vulkan driver: ") + get_driver + told_by_environment());
     if (result == VK_ERROR_LAYER_NOT_PRESENT || (validate && result == VK_ERROR_EXTENSION_NOT_PRESENT))
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "option 'validate': Vulkan's validation layers can't be loaded; install "
                       "them again (Debian: vulkan-validationlayers) or leave the option out");
     if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders say so of garbage, too
         throw Failure(
-            ARHOST_ERROR_UNSUPPORTED,
+            ARHOST_STATUS_ERROR_UNSUPPORTED,
             "Vulkan can't be started (VK_ERROR_OUT_OF_HOST_MEMORY): no memory is left, or a file that names a "
             "driver or layer is damaged; look through vulkan/ in /usr/share and /etc and what VK_LAYER_PATH "
             "names, or use rt_embree" +
@@ -330,7 +331,7 @@ std::vector<PhysicalDevice> Instance::devices() const {
     if (result == VK_SUCCESS && count > 0)
         result = functions_.vkEnumeratePhysicalDevices(instance_, &count, handles.data());
     if (result == VK_ERROR_INITIALIZATION_FAILED || (result == VK_SUCCESS && count == 0))
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       std::string("no Vulkan device: ") + get_driver + told_by_environment());
     check(result, "listing the Vulkan devices");
     handles.resize(count);
@@ -398,9 +399,9 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
         return *std::max_element(devices.begin(), devices.end(),
                                  [](const PhysicalDevice &a, const PhysicalDevice &b) { return rank(a) < rank(b); });
     const auto refuse = [&](const std::string &why) {
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'device': " + why + " '" + wanted +
-                                                      "'; there are: " + list_of(devices) +
-                                                      "; give a number, a UUID, a part of a name, or auto");
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "option 'device': " + why + " '" + wanted +
+                                                             "'; there are: " + list_of(devices) +
+                                                             "; give a number, a UUID, a part of a name, or auto");
     };
     std::string uuid = lower(wanted);
     std::erase(uuid, '-');
@@ -429,9 +430,9 @@ std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &
     for (const Path path : device.paths)
         if (wanted == name_of(path))
             return {path};
-    throw Failure(ARHOST_ERROR_CONFIGURATION, "option 'path': the Vulkan device '" + device.name + "' has no '" +
-                                                  wanted + "'; it has " + list_of(device.paths) +
-                                                  ": give one of these, auto, or another device");
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                  "option 'path': the Vulkan device '" + device.name + "' has no '" + wanted + "'; it has " +
+                      list_of(device.paths) + ": give one of these, auto, or another device");
 }
 
 } // namespace rt_vulkan

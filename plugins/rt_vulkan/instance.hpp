@@ -37,7 +37,7 @@ const char *name_of(Path path);
 
 // What the device says of its tracing of rays; all 0 where it has neither path for it.
 struct TracingLimits {
-    std::uint64_t most_objects, most_primitives;
+    std::uint64_t max_objects, max_primitives;
     std::uint32_t scratch_alignment;                              // bytes
     std::uint32_t handle_size, handle_alignment, table_alignment; // bytes, of shader binding tables
 };

@@ -77,7 +77,7 @@ struct Primitive {
     float edge_2[3], unused_2;
 };
 
-inline constexpr std::uint32_t most_samples = 256; // a pixel and frame
+inline constexpr std::uint32_t max_samples = 256; // a pixel and frame
 
 struct Frame {
     float eye[3];
@@ -94,11 +94,11 @@ struct Frame {
     float environment_intensity;
     float environment_from_world[3][4];
     std::uint32_t environment_rows, environment_columns, unused[2];
-    float samples[most_samples][4];
+    float samples[max_samples][4];
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
-              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * most_samples);
+              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * max_samples);
 
 // The frame is binding 0.
 enum Binding : std::uint32_t {

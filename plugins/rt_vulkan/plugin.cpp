@@ -18,7 +18,7 @@ std::filesystem::path own_folder() {
     static const char in_this_library = 0;
     Dl_info info{};
     if (!dladdr(&in_this_library, &info) || !info.dli_fname)
-        throw arhost::Failure(ARHOST_ERROR_INTERNAL, "the plugin's own file can't be found");
+        throw arhost::Failure(ARHOST_STATUS_ERROR_INTERNAL, "the plugin's own file can't be found");
     return std::filesystem::weakly_canonical(info.dli_fname).parent_path();
 }
 
@@ -119,7 +119,8 @@ private:
             return true;
         } catch (const arhost::Failure &failure) {
             const arhost_status status = failure.status();
-            if (paths_.size() == 1 || status == ARHOST_ERROR_CANCELLED || status == ARHOST_ERROR_INVALID_ARGUMENT)
+            if (paths_.size() == 1 || status == ARHOST_STATUS_ERROR_CANCELLED ||
+                status == ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
                 throw;
             host_.warn("Vulkan device '" + physical_.name + "': path '" + name_of(paths_[0]) + "' is left for '" +
                        name_of(paths_[1]) + "', since it failed: " + failure.what());
@@ -148,7 +149,7 @@ constexpr arhost_option_descriptor options[] = {
         "How rays find what they hit: 'plain' walks trees in a compute shader, 'query' and 'pipeline' have "
         "the device's units for ray tracing do it; auto: on a GPU the last of these that works, else 'plain'.",
         0, 0, paths),
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, most_samples),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, max_samples),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
     arhost::option(
@@ -169,7 +170,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Ray tracer on any GPU of Vulkan 1.1, with rt_embree's picture.",
-                                          ARHOST_TRACES_LENS,
+                                          ARHOST_CAPABILITY_LENS_DISTORTION,
                                           std::size(options),
                                           options,
                                           needs};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
-#include "common_view/view.hpp"
+#include "raytracer_common/view.hpp"
 
 #include <algorithm>
 #include <array>
@@ -24,7 +24,7 @@ constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitive
 // Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
 constexpr std::uint32_t enough_samples = 1u << 16;
 constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // shaders/scene.glsl
-constexpr std::size_t most_targets = 8;                      // places that images come to again (arhost/raytracer.h)
+constexpr std::size_t max_targets = 8;                       // places that images come to again (arhost/raytracer.h)
 enum Moment : std::uint32_t { begun, traced, copied, moment_count }; // of the GPU's clock, in an image
 
 std::string mebibytes(std::uint64_t size) {
@@ -53,7 +53,7 @@ const char *what_is_in(Binding binding) {
 
 PhysicalDevice checked(const PhysicalDevice &device) {
     if (const std::string why = what_it_lacks(device); !why.empty())
-        throw Failure(ARHOST_ERROR_UNSUPPORTED,
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "the Vulkan device '" + device.name + "' " + why + "; choose another with option 'device'");
     return device;
 }
@@ -70,11 +70,11 @@ class Heartbeat {
 public:
     Heartbeat(const arhost::Host &host, const char *what)
         : thread_([host, what](const std::stop_token &stop) {
-              constexpr std::chrono::seconds beat(2), patience(300);
+              constexpr std::chrono::seconds beat(2), timeout(300);
               std::mutex mutex;
               std::condition_variable_any ended;
               std::unique_lock lock(mutex);
-              for (auto passed = std::chrono::seconds(0); passed < patience && !stop.stop_requested();
+              for (auto passed = std::chrono::seconds(0); passed < timeout && !stop.stop_requested();
                    passed += beat) {
                   host.progress(-1, what);
                   ended.wait_for(lock, stop, beat, [] { return false; });
@@ -103,7 +103,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     make_set(shaders);
     make_pipeline(shaders, setup.scene->max_depth);
     if (host_.cancelled())
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the shader was compiled");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the shader was compiled");
     if (physical.timestamp_bits) {
         VkQueryPoolCreateInfo info{};
         info.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
@@ -136,10 +136,10 @@ Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std:
     size = std::max(size, filled);
     const std::uint64_t most = device_.physical().properties.limits.maxStorageBufferRange;
     if (size > most)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string(what_is_in(binding)) + " take " + mebibytes(size) +
-                                                    " at once, and the Vulkan device '" + device_.physical().name +
-                                                    "' reads " + mebibytes(most) +
-                                                    " at most: use smaller ones, another device or rt_embree");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, std::string(what_is_in(binding)) + " take " + mebibytes(size) +
+                                                           " at once, and the Vulkan device '" +
+                                                           device_.physical().name + "' reads " + mebibytes(most) +
+                                                           " at most: use smaller ones, another device or rt_embree");
     Buffer buffer(device_, size,
                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | further_usage,
@@ -287,7 +287,7 @@ Renderer::Target &Renderer::target_of(const arhost_image &image) {
                                Buffer::Place::host_read);
     }
     target.commands = submission_.new_commands();
-    if (targets_.size() > most_targets) { // the oldest goes: nothing is under way here
+    if (targets_.size() > max_targets) { // the oldest goes: nothing is under way here
         submission_.free(targets_.front().commands);
         targets_.erase(targets_.begin());
     }
@@ -370,12 +370,12 @@ void Renderer::write_moving_parts() {
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!arhost::view::same(camera.intrinsics, intrinsics_))
-        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width || image.stride % 4)
-        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the image to write is not of the size of start");
     if (host_.cancelled()) // before anything is told of this image
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled before an image was traced");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled before an image was traced");
     Target &target = target_of(image);
     look(camera, frame_);
     std::vector<VkCommandBuffer> commands;
@@ -416,7 +416,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
     for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
         if (rows.first > 0 && host_.cancelled())
-            throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while an image was traced");
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while an image was traced");
         rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);
         record(target, rows);
         commands.push_back(target.commands);

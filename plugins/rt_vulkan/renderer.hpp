@@ -6,8 +6,8 @@
 
 #include "acceleration.hpp"
 #include "bands.hpp"
-#include "common_view/samples.hpp"
 #include "pipeline.hpp"
+#include "raytracer_common/samples.hpp"
 #include "scene_data.hpp"
 #include "view.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene_data.hpp"
 
-#include "common_view/arena.hpp"
+#include "raytracer_common/arena.hpp"
 
 #include <arhost/shading/srgb8.hpp>
 
@@ -19,11 +19,11 @@ using arhost::Failure;
 using arhost::view::bytes;
 using arhost::view::elements;
 using arhost::view::is_identity;
-using arhost::view::put_reach;
+using arhost::view::object_extent;
 
 // From here on a refitted tree costs rays more than building a new one does.
 constexpr double tolerable_decay = 1.3;
-constexpr std::uint32_t most_in_leaf = 4;
+constexpr std::uint32_t max_leaf_size = 4;
 
 template <std::size_t count> void copy(const float (&from)[count], float (&to)[count]) {
     std::copy_n(from, count, to);
@@ -84,7 +84,7 @@ float alpha_of_code(float alpha) {
 Box in_world(const Box &local, const float *m) {
     Box world;
     float reach[3];
-    put_reach(local.low, local.high, m, reach);
+    object_extent(local.low, local.high, m, reach);
     for (int row = 0; row < 3; ++row) {
         double low = m[9 + row], high = low;
         const double room = 2e-6 * (std::abs(low) + reach[row]);
@@ -123,7 +123,7 @@ SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Ho
     add_textures();
     add_tables();
 
-    look_up();
+    check_cancelled();
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     const auto objects = elements<arhost_object>(arena, arena.objects);
     for (const arhost_object &object : objects)
@@ -140,7 +140,7 @@ SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Ho
         add_texcoords(mesh, geometries[geometry]);
     for (const arhost_object &object : objects) {
         if (!meshes_.contains(object.geometry)) {
-            look_up();
+            check_cancelled();
             Mesh &mesh = mesh_of(object.geometry, false);
             add_normals(mesh, geometries[object.geometry]);
             add_texcoords(mesh, geometries[object.geometry]);
@@ -150,15 +150,15 @@ SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Ho
     build_top();
 }
 
-void SceneData::look_up() const {
+void SceneData::check_cancelled() const {
     if (host_.cancelled())
-        throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while the trees were built");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the trees were built");
     host_.progress(-1, "building the trees");
 }
 
 std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points) {
     std::vector<Box> boxes;
-    if (geometry.type == ARHOST_SPHERES) {
+    if (geometry.type == ARHOST_GEOMETRY_SPHERES) {
         boxes.reserve(geometry.positions.count);
         for (std::uint32_t i = 0; i < geometry.positions.count; ++i) {
             float sphere[4];
@@ -205,7 +205,7 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     for (const Box &box : boxes)
         include(mesh.local, box);
     if (has_trees_) {
-        mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
+        mesh.tree = build_tree(boxes, max_leaf_size, object_depth, [this] { check_cancelled(); });
         mesh.built_area = relative_area(mesh.tree);
         nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.tree.nodes.size()));
     } else {
@@ -264,7 +264,7 @@ void SceneData::write_tree(const Mesh &mesh, const arhost_geometry &geometry, Po
         const std::uint32_t number = mesh.tree.order[i];
         Primitive primitive{};
         primitive.number = number;
-        if (geometry.type == ARHOST_SPHERES) {
+        if (geometry.type == ARHOST_GEOMETRY_SPHERES) {
             std::memcpy(primitive.corner, points.first + std::size_t{points.stride} * number, 12);
             std::memcpy(primitive.edge_1, points.first + std::size_t{points.stride} * number + 12, 4);
         } else {
@@ -286,28 +286,28 @@ void SceneData::write_tree(const Mesh &mesh, const arhost_geometry &geometry, Po
 void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[from.material];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[from.geometry];
-    const bool is_glass = material.model == ARHOST_GLASS;
+    const bool is_glass = material.model == ARHOST_MATERIAL_GLASS;
     Object object{};
     object.material = from.material;
     object.role = static_cast<std::uint32_t>(from.role);
-    object.mask = from.role == ARHOST_CATCHER    ? catcher_mask
-                  : from.role == ARHOST_OCCLUDER ? occluder_mask
-                  : is_glass                     ? glass_mask
-                                                 : opaque_mask;
+    object.mask = from.role == ARHOST_ROLE_CATCHER    ? catcher_mask
+                  : from.role == ARHOST_ROLE_OCCLUDER ? occluder_mask
+                  : is_glass                          ? glass_mask
+                                                      : opaque_mask;
     object.root = mesh.root;
     object.first_index = mesh.first_index;
     object.first_normal = mesh.first_normal;
     object.first_texcoord = mesh.first_texcoord;
-    if (geometry.type == ARHOST_SPHERES)
+    if (geometry.type == ARHOST_GEOMETRY_SPHERES)
         object.flags |= is_spheres;
-    if (!is_glass && material.model != ARHOST_MIRROR && material.alpha_cutoff > 0 &&
+    if (!is_glass && material.model != ARHOST_MATERIAL_MIRROR && material.alpha_cutoff > 0 &&
         material.colour_texture != ARHOST_NONE && mesh.first_texcoord != ARHOST_NONE)
         object.flags |= rt_vulkan::has_holes;
     if (from.moves || !is_identity(from.world_from_object))
         object.flags |= has_transform;
     place(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
-    has_catchers_ |= from.role == ARHOST_CATCHER;
+    has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
     objects_.push_back(object);
     solid_objects_ += !mesh.is_empty;
@@ -316,7 +316,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
 }
 
 void SceneData::place(Object &object, const Mesh &mesh, const float *m) {
-    put_reach(mesh.local.low, mesh.local.high, m, object.reach);
+    object_extent(mesh.local.low, mesh.local.high, m, object.reach);
     const arhost::view::Cofactors cofactors(m);
     float normal_transform[9];
     cofactors.put_normal_transform(normal_transform);
@@ -349,9 +349,9 @@ void SceneData::build_top() {
     if (boxes.empty())
         return;
     if (boxes.size() > std::size_t{1} << top_depth)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, "the scene has more than " + std::to_string(1 << top_depth) +
-                                                    " objects: join some, or use rt_embree");
-    const Tree tree = build_tree(boxes, 1, top_depth, [this] { look_up(); });
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the scene has more than " + std::to_string(1 << top_depth) +
+                                                           " objects: join some, or use rt_embree");
+    const Tree tree = build_tree(boxes, 1, top_depth, [this] { check_cancelled(); });
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
         nodes_[i] = tree.nodes[i];
         if (nodes_[i].count)
@@ -381,7 +381,7 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     mesh.local = empty_box();
     for (std::uint32_t i = 0; i < deformed.vertex_count; ++i)
         include(mesh.local, deformed.positions + std::size_t{3} * i);
-    put_reach(mesh.local.low, mesh.local.high, places_[deformed.object].data(), objects_[deformed.object].reach);
+    object_extent(mesh.local.low, mesh.local.high, places_[deformed.object].data(), objects_[deformed.object].reach);
     if (has_trees_)
         refit_tree(mesh, boxes_of(arena_, geometry, points));
     write_tree(mesh, geometry, points);
@@ -393,7 +393,7 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
 void SceneData::refit_tree(Mesh &mesh, std::span<const Box> boxes) {
     refit(mesh.tree, boxes);
     if (relative_area(mesh.tree) > tolerable_decay * mesh.built_area) {
-        mesh.tree = build_tree(boxes, most_in_leaf, object_depth, [this] { look_up(); });
+        mesh.tree = build_tree(boxes, max_leaf_size, object_depth, [this] { check_cancelled(); });
         mesh.built_area = relative_area(mesh.tree);
         ++rebuilds_;
     }

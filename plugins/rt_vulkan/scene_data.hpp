@@ -71,7 +71,7 @@ private:
     void build_top();
     void add_textures();
     void add_tables();
-    void look_up() const; // throws where the host cancels
+    void check_cancelled() const; // throws where the host cancels
 
     const arhost_scene &arena_;
     bool has_trees_;

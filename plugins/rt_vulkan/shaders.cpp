@@ -48,7 +48,7 @@ ShaderKind kind_of(const std::filesystem::path &file, std::span<const std::uint3
         at += length;
     }
     if (!sound || last != end_of_function)
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the shader '" + file.string() + "' is damaged: no whole SPIR-V; install arhost again");
     return kind;
 }
@@ -73,13 +73,13 @@ std::uint32_t model_of(VkShaderStageFlagBits stage) {
 Shader read_shader(const std::filesystem::path &file, VkShaderStageFlagBits stage, Path path) {
     const std::vector<char> bytes = file_bytes(file, largest_shader);
     if (bytes.empty())
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the shader '" + file.string() + "' is missing or can't be read; install arhost again");
     std::vector<std::uint32_t> words(bytes.size() / 4);
     std::memcpy(words.data(), bytes.data(), words.size() * 4);
     const ShaderKind kind = kind_of(file, words, bytes.size() % 4 == 0);
     if (kind.model != model_of(stage) || kind.asks_rays != (path == Path::query))
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the shader '" + file.string() + "' is another one than its name says; install arhost again");
     return {stage, std::move(words)};
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view.hpp"
 
-#include "common_view/view.hpp"
+#include "raytracer_common/view.hpp"
 
 #include <atomic>
 #include <thread>

@@ -26,7 +26,7 @@ public:
         unsigned long size = file_.size();
         if (tjCompress2(compressor_.get(), image.bgr, width, static_cast<int>(image.stride), height, TJPF_BGR, &bytes,
                         &size, subsampling, quality_, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
-            throw Failure(ARHOST_ERROR_INTERNAL,
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
                           std::string("can't make the JPEG: ") + tjGetErrorStr2(compressor_.get()));
         return std::span(file_).first(size);
     }

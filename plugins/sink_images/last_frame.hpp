@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "common_files/files.hpp"
 #include "encoder.hpp"
+#include "sink_common/files.hpp"
 
 #include <array>
 #include <cstdint>

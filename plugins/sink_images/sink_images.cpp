@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Frames as image files: numbered ones, or a single one.
-#include "common_files/files.hpp"
-#include "common_files/pattern.hpp"
 #include "encoder.hpp"
 #include "last_frame.hpp"
+#include "sink_common/files.hpp"
+#include "sink_common/pattern.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -29,7 +29,7 @@ std::unique_ptr<images::Encoder> make_encoder(const fs::path &path, const Option
         return images::make_png_encoder(static_cast<int>(options.integer("compression")));
     if (extension == ".jpg" || extension == ".jpeg")
         return images::make_jpeg_encoder(static_cast<int>(options.integer("quality")));
-    throw Failure(ARHOST_ERROR_CONFIGURATION,
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                   "path: '" + path.string() + "' ends in neither .png nor .jpg: the ending chooses the format");
 }
 
@@ -42,10 +42,10 @@ public:
           every_(static_cast<std::uint64_t>(options.integer("every"))) {
         if (pattern_ && frame_ >= 0)
             throw Failure(
-                ARHOST_ERROR_CONFIGURATION,
+                ARHOST_STATUS_ERROR_CONFIGURATION,
                 "frame: picks one frame for a plain path such as out/demo.png, but 'path' has a number in it");
         if (!pattern_ && every_ != 1)
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "every: needs a 'path' with a number in it, such as out/frame_%05d.png");
     }
 
@@ -59,7 +59,7 @@ public:
         }
         std::error_code ignored;
         if (fs::is_directory(path_, ignored))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "path: '" + path_.string() + "' is a folder: add a file's name");
         setup_ = setup;
         if (frame_ < 0 && setup.first_sequence > 0)
@@ -85,7 +85,7 @@ public:
         } else if (sequence >= wanted() && !fs::exists(path_)) {
             replace(path_, image);
         }
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
     void stop() {

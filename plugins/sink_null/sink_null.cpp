@@ -23,10 +23,10 @@ public:
         for (auto left = end - std::chrono::steady_clock::now(); left > 0ns;
              left = end - std::chrono::steady_clock::now()) {
             if (host_.cancelled())
-                return ARHOST_ERROR_CANCELLED;
+                return ARHOST_STATUS_ERROR_CANCELLED;
             std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, 10ms));
         }
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
 private:

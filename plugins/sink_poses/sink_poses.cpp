@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A log of the poses: a line of JSON a frame.
-#include "common_files/json_text.hpp"
-#include "common_files/line_file.hpp"
 #include "pose_line.hpp"
+#include "sink_common/json_text.hpp"
+#include "sink_common/line_file.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -26,7 +26,7 @@ public:
         line_.clear();
         arhost::poses::append_line(line_, *output.record);
         file_.append(line_);
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
 private:

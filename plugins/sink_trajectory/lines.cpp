@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lines.hpp"
 
-#include "common_files/json_text.hpp"
+#include "sink_common/json_text.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Records every frame's camera, to be traced again by `arhost replay`.
-#include "common_files/json_text.hpp"
-#include "common_files/line_file.hpp"
 #include "lines.hpp"
+#include "sink_common/json_text.hpp"
+#include "sink_common/line_file.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -20,7 +20,7 @@ public:
 
     void start(const arhost_sink_setup &setup) {
         if (!setup.intrinsics)
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "there is no camera to record: add a tracker, or 'camera:' (docs/camera.md)");
         intrinsics_ = *setup.intrinsics;
         fps_ = setup.fps;
@@ -50,7 +50,7 @@ public:
         }
         file_.append(text_);
         next_line_ = record.sequence + 1;
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
 private:

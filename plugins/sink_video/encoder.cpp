@@ -12,8 +12,9 @@ const AVCodec *find_encoder(const std::string &codec) {
     const AVCodec *found =
         codec == "h264" ? avcodec_find_encoder_by_name("libx264") : avcodec_find_encoder(AV_CODEC_ID_MPEG4);
     if (!found)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, "codec: this machine's libavcodec has no encoder for " + codec +
-                                                    (codec == "h264" ? " (libx264); try codec: mpeg4" : ""));
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "codec: this machine's libavcodec has no encoder for " +
+                                                           codec +
+                                                           (codec == "h264" ? " (libx264); try codec: mpeg4" : ""));
     return found;
 }
 
@@ -44,7 +45,7 @@ SwsPointer make_converter(int width, int height) {
     constexpr int full = 1, limited = 0, brightness = 0, contrast = 1 << 16, saturation = 1 << 16;
     sws_setColorspaceDetails(sws.get(), bt709, full, bt709, limited, brightness, contrast, saturation);
     if (const int code = sws_init_context(sws.get(), nullptr, nullptr); code < 0)
-        throw libav_failure(ARHOST_ERROR_UNSUPPORTED, "can't convert the frames to YUV", code);
+        throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "can't convert the frames to YUV", code);
     return sws;
 }
 
@@ -81,7 +82,7 @@ Encoder::Encoder(const EncoderSettings &settings)
         context_->gop_size = 250; // as x264's
     }
     if (const int code = avcodec_open2(context_.get(), codec, nullptr); code < 0)
-        throw libav_failure(ARHOST_ERROR_UNSUPPORTED,
+        throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                             "can't encode frames of " + std::to_string(width_) + "×" + std::to_string(height_) +
                                 " with " + codec->name,
                             code);
@@ -101,7 +102,7 @@ AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int6
     if (code >= 0)
         code = avcodec_receive_packet(context_.get(), packet_.get());
     if (code < 0)
-        throw libav_failure(ARHOST_ERROR_INTERNAL, "can't encode frame " + std::to_string(number), code);
+        throw libav_failure(ARHOST_STATUS_ERROR_INTERNAL, "can't encode frame " + std::to_string(number), code);
     packet_->duration = 1;
     return *packet_;
 }

@@ -22,7 +22,7 @@ struct EncoderSettings {
 // frame has become a packet when the call returns, and can be on its way to the disk.
 class Encoder {
 public:
-    explicit Encoder(const EncoderSettings &settings); // throws Failure of ARHOST_ERROR_UNSUPPORTED
+    explicit Encoder(const EncoderSettings &settings); // throws Failure of ARHOST_STATUS_ERROR_UNSUPPORTED
 
     const AVCodecContext &context() const { return *context_; }
 

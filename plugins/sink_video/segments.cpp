@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "segments.hpp"
 
-#include "common_files/files.hpp"
+#include "sink_common/files.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -27,7 +27,8 @@ std::string url(const fs::path &path) {
 OutputPointer open_output(const fs::path &path, const char *format) {
     AVFormatContext *context = nullptr;
     if (avformat_alloc_output_context2(&context, nullptr, format, url(path).c_str()) < 0)
-        throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("this machine's libavformat can't write ") + format);
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                      std::string("this machine's libavformat can't write ") + format);
     OutputPointer output(context);
     output->flags |= AVFMT_FLAG_BITEXACT; // no dates and versions
     check_written(avio_open(&output->pb, url(path).c_str(), AVIO_FLAG_WRITE), path);
@@ -90,7 +91,7 @@ public:
 private:
     void check_fits(const AVCodecParameters &segment, const fs::path &segment_path) const {
         if (out_ && !same_codec(*out_->codecpar, segment))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "'" + segment_path.string() + "' was encoded with other options than what came before it");
     }
 
@@ -171,13 +172,13 @@ std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, co
                 avformat_open_input(&context, url(path).c_str(), av_find_input_format("matroska"), nullptr);
             code < 0) {
             if (code != AVERROR_EOF) // a header and no frame: a restart that was followed by none
-                warn(
-                    libav_failure(ARHOST_ERROR_IO, "no frame can be read from '" + path.string() + "'", code).what());
+                warn(libav_failure(ARHOST_STATUS_ERROR_IO, "no frame can be read from '" + path.string() + "'", code)
+                         .what());
             continue;
         }
         const InputPointer segment(context);
         if (segment->nb_streams != 1)
-            throw Failure(ARHOST_ERROR_IO, "'" + path.string() + "' is no segment of a film: delete it");
+            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path.string() + "' is no segment of a film: delete it");
         joined.append(*segment, path,
                       i + 1 < segments.size() ? segments[i + 1].first : std::numeric_limits<std::int64_t>::max(),
                       progress);

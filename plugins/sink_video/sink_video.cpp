@@ -2,9 +2,9 @@
 //
 // A film. Frames are encoded at once into a segment file beside it; at the end all segments, one more
 // for each restart, are joined without encoding again and put in place as a whole.
-#include "common_files/files.hpp"
 #include "encoder.hpp"
 #include "segments.hpp"
+#include "sink_common/files.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -29,7 +29,7 @@ const char *format_of(const fs::path &path) {
         return "mov";
     if (extension == ".mkv")
         return "matroska";
-    throw Failure(ARHOST_ERROR_CONFIGURATION,
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                   "path: '" + path.string() + "' ends in none of .mp4, .mkv and .mov: the ending chooses the format");
 }
 
@@ -38,8 +38,9 @@ AVRational rational(double fps) {
         return {30, 1}; // unknown
     // Segments count milliseconds, from which a frame's number must be found again.
     if (fps < 0.001 || fps > 500)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "a film has 0.001 to 500 frames a second, not the source's " +
-                                                      std::to_string(fps) + ": set the source's fps");
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "a film has 0.001 to 500 frames a second, not the source's " + std::to_string(fps) +
+                          ": set the source's fps");
     return av_d2q(fps, 65535); // MPEG-4 has 16 bits for it
 }
 
@@ -66,7 +67,7 @@ public:
         files::make_parent_folders(path_);
         std::error_code ignored;
         if (fs::is_directory(path_, ignored))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "path: '" + path_.string() + "' is a folder: add a file's name");
         files::check_can_write(partial_);
         first_ = static_cast<std::int64_t>(setup.first_sequence);
@@ -76,9 +77,9 @@ public:
 
     arhost_status write(const arhost_output &output) {
         if (static_cast<int>(output.width) != settings_.width || static_cast<int>(output.height) != settings_.height)
-            throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "a frame's size is not that of the start");
+            throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "a frame's size is not that of the start");
         if (failed_)
-            return ARHOST_ERROR_IO; // said already
+            return ARHOST_STATUS_ERROR_IO; // said already
         if (!writer_) {
             failed_ = true; // unless the next lines succeed
             begin();
@@ -87,7 +88,7 @@ public:
         const auto number = static_cast<std::int64_t>(output.record->sequence);
         writer_->append(encoder_->encode(output.bgr, output.stride, number));
         finished_ = false;
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
     void stop() {

@@ -23,7 +23,7 @@ Failure glfw_failure(const std::string &what) {
     const char *reason = nullptr;
     glfwGetError(&reason);
     return Failure(
-        ARHOST_ERROR_CONFIGURATION,
+        ARHOST_STATUS_ERROR_CONFIGURATION,
         what + (reason ? std::string(": ") + reason : "") +
             ". A window needs a desktop (the variable DISPLAY) and OpenGL 2.1: start arhost there, or under "
             "`xvfb-run -a`, or write to a file with sink_video or sink_images instead");
@@ -134,8 +134,9 @@ private:
         GLint largest = 0;
         glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
         if (width_ > largest || height_ > largest)
-            throw Failure(ARHOST_ERROR_UNSUPPORTED, "this machine's OpenGL shows images of at most " +
-                                                        std::to_string(largest) + " px a side: use smaller frames");
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "this machine's OpenGL shows images of at most " +
+                                                               std::to_string(largest) +
+                                                               " px a side: use smaller frames");
         GLuint texture = 0; // goes with the context
         glGenTextures(1, &texture);
         glBindTexture(GL_TEXTURE_2D, texture);
@@ -186,7 +187,7 @@ private:
 
     arhost_status poll() {
         glfwPollEvents();
-        return glfwWindowShouldClose(window_.get()) ? ARHOST_END : ARHOST_OK;
+        return glfwWindowShouldClose(window_.get()) ? ARHOST_STATUS_END : ARHOST_STATUS_OK;
     }
 
     void toggle_full_screen() {
@@ -247,7 +248,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Shows frames in a window.",
-    ARHOST_IS_REALTIME_SINK,
+    ARHOST_CAPABILITY_REALTIME_SINK,
     std::size(options),
     options,
     needs,

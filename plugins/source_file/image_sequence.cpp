@@ -34,12 +34,12 @@ cv::Mat read_image(const fs::path &file, int flags) {
             reason = error.message();
         else if (size == 0)
             reason = "it is empty";
-        throw Failure(ARHOST_ERROR_IO, "the image " + quoted(file) + " can't be read: " + reason);
+        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " can't be read: " + reason);
     }
     if (image.cols > ARHOST_MAX_IMAGE_SIDE || image.rows > ARHOST_MAX_IMAGE_SIDE)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +
-                                                      " px: no side may be longer than " +
-                                                      std::to_string(ARHOST_MAX_IMAGE_SIDE));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +
+                                                             " px: no side may be longer than " +
+                                                             std::to_string(ARHOST_MAX_IMAGE_SIDE));
     return image;
 }
 
@@ -62,7 +62,7 @@ ImageSequence::ImageSequence(std::vector<fs::path> files)
 arhost_frame_format ImageSequence::format() const {
     arhost_frame_format format{};
     format.struct_size = sizeof format;
-    format.pixel_format = image_.channels() == 1 ? ARHOST_GREY8 : ARHOST_BGR8;
+    format.pixel_format = image_.channels() == 1 ? ARHOST_PIXEL_FORMAT_GREY8 : ARHOST_PIXEL_FORMAT_BGR8;
     format.width = static_cast<std::uint32_t>(image_.cols);
     format.height = static_cast<std::uint32_t>(image_.rows);
     return format;
@@ -70,17 +70,17 @@ arhost_frame_format ImageSequence::format() const {
 
 arhost_status ImageSequence::go_to(std::uint64_t index) {
     if (index >= files_.size())
-        return ARHOST_END;
+        return ARHOST_STATUS_END;
     if (index == current_)
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     const cv::Mat next = read_image(files_[index], image_.channels() == 1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR);
     if (next.size() != image_.size())
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "the size changes within the sequence: " + quoted(files_[index]) +
-                                                      " is " + size_text(next) + ", but " + quoted(files_.front()) +
-                                                      " is " + size_text(image_));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "the size changes within the sequence: " + quoted(files_[index]) + " is " + size_text(next) +
+                          ", but " + quoted(files_.front()) + " is " + size_text(image_));
     image_ = next;
     current_ = index;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 void ImageSequence::copy_to(const arhost_frame_buffer &buffer) {
@@ -109,7 +109,7 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
                 .append(" to ")
                 .append(std::to_string(found.rbegin()->first))
                 .append(": set the option 'start'");
-        throw Failure(ARHOST_ERROR_CONFIGURATION, message);
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, message);
     }
     std::vector<fs::path> files;
     std::int64_t number = start;

@@ -15,7 +15,7 @@ std::optional<Pattern> Pattern::parse(const fs::path &path) {
     if (text.find('%') == std::string::npos)
         return std::nullopt;
     const auto refuse = [&](const std::string &why) {
-        return Failure(ARHOST_ERROR_CONFIGURATION,
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                        "path: '" + text + "': " + why +
                            "; a pattern has one %d (or %04d for four digits, and so on) in its file's name, and %% "
                            "for a percent sign");

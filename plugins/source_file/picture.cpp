@@ -26,10 +26,10 @@ AVColorSpace colour_space(const AVFrame &picture) {
 std::optional<arhost_yuv_matrix> yuv_matrix(const AVFrame &picture) {
     switch (colour_space(picture)) {
     case AVCOL_SPC_BT709:
-        return ARHOST_BT709;
+        return ARHOST_YUV_MATRIX_BT709;
     case AVCOL_SPC_BT470BG:
     case AVCOL_SPC_SMPTE170M:
-        return ARHOST_BT601;
+        return ARHOST_YUV_MATRIX_BT601;
     default: // BT.2020 and rarer ones: left to swscale
         return std::nullopt;
     }
@@ -40,7 +40,7 @@ bool is_grey(AVPixelFormat format) {
 }
 
 std::size_t bytes_a_pixel(arhost_pixel_format format, std::uint32_t plane) {
-    return format == ARHOST_BGR8 ? 3 : format == ARHOST_NV12 && plane == 1 ? 2 : 1;
+    return format == ARHOST_PIXEL_FORMAT_BGR8 ? 3 : format == ARHOST_PIXEL_FORMAT_NV12 && plane == 1 ? 2 : 1;
 }
 
 // A plane that may be read in any of four directions: pixel (x, y) of it lies at x·step_x + y·step_y.
@@ -83,21 +83,21 @@ PictureConverter::PictureConverter(const AVFrame &first, int quarter_turns)
     const bool even = first.width % 2 == 0 && first.height % 2 == 0;
     const auto matrix = yuv_matrix(first);
     if ((source_ == AV_PIX_FMT_YUV420P || source_ == AV_PIX_FMT_YUVJ420P) && even && matrix)
-        format_.pixel_format = ARHOST_I420;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_I420;
     else if (source_ == AV_PIX_FMT_NV12 && even && matrix)
-        format_.pixel_format = ARHOST_NV12;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_NV12;
     else if (is_grey(source_)) {
-        format_.pixel_format = ARHOST_GREY8;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
         target_ = AV_PIX_FMT_GRAY8;
     } else {
-        format_.pixel_format = ARHOST_BGR8;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
         target_ = AV_PIX_FMT_BGR24;
     }
     format_.struct_size = sizeof format_;
     format_.width = static_cast<std::uint32_t>(quarter_turns % 2 ? first.height : first.width);
     format_.height = static_cast<std::uint32_t>(quarter_turns % 2 ? first.width : first.height);
-    format_.yuv_matrix = matrix.value_or(ARHOST_BT601);
-    format_.yuv_range = is_full_range(first) ? ARHOST_FULL_RANGE : ARHOST_LIMITED_RANGE;
+    format_.yuv_matrix = matrix.value_or(ARHOST_YUV_MATRIX_BT601);
+    format_.yuv_range = is_full_range(first) ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
 }
 
 void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer &buffer) {
@@ -110,11 +110,12 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
             scaler_.release(), picture.width, picture.height, format, picture.width, picture.height, target_,
             SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_BITEXACT, nullptr, nullptr, nullptr));
         if (!scaler_)
-            throw Failure(ARHOST_ERROR_UNSUPPORTED, std::string("no conversion is known from the pixel format '") +
-                                                        av_get_pix_fmt_name(format) + "'");
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                          std::string("no conversion is known from the pixel format '") +
+                              av_get_pix_fmt_name(format) + "'");
         // The numbers of AVColorSpace are those of SWS_CS_…
         const int *matrix = sws_getCoefficients(colour_space(picture));
-        const bool to_full = target_ == AV_PIX_FMT_BGR24 || format_.yuv_range == ARHOST_FULL_RANGE;
+        const bool to_full = target_ == AV_PIX_FMT_BGR24 || format_.yuv_range == ARHOST_YUV_RANGE_FULL;
         sws_setColorspaceDetails(scaler_.get(), matrix, is_full_range(picture), matrix, to_full, 0, 1 << 16, 1 << 16);
 
         arhost_frame_format upright = format_;
@@ -143,7 +144,7 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
     }
 
     // GREY8 is full range by definition; swscale takes every grey for that.
-    if (format_.pixel_format == ARHOST_GREY8 && picture.color_range == AVCOL_RANGE_MPEG)
+    if (format_.pixel_format == ARHOST_PIXEL_FORMAT_GREY8 && picture.color_range == AVCOL_RANGE_MPEG)
         for (std::uint32_t y = 0; y < format_.height; ++y) {
             std::uint8_t *row = buffer.plane[0] + static_cast<std::size_t>(y) * buffer.format->stride[0];
             std::transform(row, row + format_.width, row, [](std::uint8_t v) {

@@ -18,8 +18,8 @@ public:
     // What is known of it: a video's is what its header says, until its end has been read. 0: unknown.
     virtual std::uint64_t frame_count() const = 0;
 
-    // Makes frame `index` the current one: ARHOST_OK, ARHOST_END, ARHOST_END_CUT_SHORT or
-    // ARHOST_ERROR_CANCELLED. The same index gives the same bytes, whatever was read before.
+    // Makes frame `index` the current one: ARHOST_STATUS_OK, ARHOST_STATUS_END, ARHOST_STATUS_END_TRUNCATED or
+    // ARHOST_STATUS_ERROR_CANCELLED. The same index gives the same bytes, whatever was read before.
     virtual arhost_status go_to(std::uint64_t index) = 0;
 
     // Of the current frame: when it is shown, with frame 0 at 0, and until when. None where the medium

@@ -41,7 +41,7 @@ public:
         arhost_frame_layout(&format);
         if (const arhost_intrinsics *camera = setup.intrinsics;
             camera && (camera->width != format.width || camera->height != format.height))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           quoted(path_) + " has frames of " + std::to_string(format.width) + "×" +
                               std::to_string(format.height) + " px, but the camera's calibration is for " +
                               std::to_string(camera->width) + "×" + std::to_string(camera->height));
@@ -49,22 +49,22 @@ public:
         const std::uint64_t count = reader_->frame_count();
         properties.frame_count = loop_ ? limit_ : limit_ && count ? std::min(limit_, count) : count;
 
-        if (go_to(setup.first_sequence) == ARHOST_ERROR_CANCELLED)
-            throw Failure(ARHOST_ERROR_CANCELLED, "going to frame " + std::to_string(setup.first_sequence) + " of " +
-                                                      quoted(path_) + " was cancelled");
+        if (go_to(setup.first_sequence) == ARHOST_STATUS_ERROR_CANCELLED)
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "going to frame " + std::to_string(setup.first_sequence) +
+                                                             " of " + quoted(path_) + " was cancelled");
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         std::uint64_t frame = buffer.sequence;
-        if (const arhost_status status = go_to(frame); status != ARHOST_OK)
+        if (const arhost_status status = go_to(frame); status != ARHOST_STATUS_OK)
             return status;
         if (paced_)
-            if (const arhost_status status = wait_for(frame, info); status != ARHOST_OK)
+            if (const arhost_status status = wait_for(frame, info); status != ARHOST_STATUS_OK)
                 return status;
         reader_->copy_to(buffer);
         info.clock = ARHOST_CLOCK_MEDIA;
         info.capture_ns = time_ns(frame);
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
     void stop() { reader_.reset(); }
@@ -75,7 +75,7 @@ private:
         const fs::file_status status = fs::status(path_, error);
         if (fs::is_directory(status))
             throw Failure(
-                ARHOST_ERROR_CONFIGURATION,
+                ARHOST_STATUS_ERROR_CONFIGURATION,
                 "path: " + quoted(path_) +
                     " is a folder: give a video, an image, or numbered images as 'folder/image_%04d.png'; " +
                     arhost::describe_folder(path_));
@@ -88,10 +88,10 @@ private:
             std::string why = error ? error.message() : "there is no such file";
             if (fs::is_directory(path_.parent_path(), error))
                 why += "; " + arhost::describe_folder(path_.parent_path());
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "path: " + quoted(path_) + " can't be opened: " + why);
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "path: " + quoted(path_) + " can't be opened: " + why);
         }
         if (!fs::is_regular_file(status))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "path: " + quoted(path_) + " is no file; a camera is read by source_v4l2");
         if (arhost::is_image_name(path_)) {
             reader_ = std::make_unique<arhost::ImageSequence>(std::vector{path_});
@@ -105,10 +105,10 @@ private:
     // Makes frame `frame`, counted over all rounds of a loop, the reader's current one.
     arhost_status go_to(std::uint64_t frame) {
         if (limit_ && frame >= limit_)
-            return ARHOST_END;
+            return ARHOST_STATUS_END;
         for (;;) {
             const arhost_status status = reader_->go_to(round_frames_ ? frame % round_frames_ : frame);
-            if (status < ARHOST_END || !loop_ || round_frames_)
+            if (status < ARHOST_STATUS_END || !loop_ || round_frames_)
                 return status;
             round_frames_ = reader_->frame_count(); // only the end tells a video's true length
             round_ns_ = reader_->end_ns();
@@ -133,14 +133,14 @@ private:
             // At most a second's frames: after a long halt the time in between was not meant to be seen.
             info.skipped = static_cast<std::uint32_t>(std::min(late_ns, std::int64_t{1'000'000'000}) / period_ns);
             frame += info.skipped;
-            if (const arhost_status status = go_to(frame); status != ARHOST_OK)
+            if (const arhost_status status = go_to(frame); status != ARHOST_STATUS_OK)
                 return status;
             // A decoder that can't keep up plays slower, instead of skipping ever more.
             if (now_ns() - epoch_ns_ - time_ns(frame) >= period_ns)
                 epoch_ns_ = now_ns() - time_ns(frame);
         }
         const std::chrono::steady_clock::time_point due(std::chrono::nanoseconds(epoch_ns_ + time_ns(frame)));
-        return host_.wait_until(due) ? ARHOST_OK : ARHOST_ERROR_CANCELLED;
+        return host_.wait_until(due) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_CANCELLED;
     }
 
     arhost::Host host_;
@@ -178,7 +178,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Frames from a video file, from numbered images or from one image.",
-                                          ARHOST_CAN_SEEK,
+                                          ARHOST_CAPABILITY_SEEK,
                                           std::size(options),
                                           options,
                                           nullptr};

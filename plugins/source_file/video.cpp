@@ -47,8 +47,8 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
       frame_(allocated(av_frame_alloc())) {
     const auto refuse = [&](const std::string &why) {
         if (host_.cancelled())
-            return Failure(ARHOST_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
-        return Failure(ARHOST_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
+            return Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
     };
     log_.take_reason();
     short_avi_ = is_short_avi(file);
@@ -93,9 +93,9 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     period_ns_ = std::llround(1e9 / fps_);
 
     const arhost_status first = next();
-    if (first == ARHOST_ERROR_CANCELLED)
-        throw Failure(ARHOST_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
-    if (first >= ARHOST_END)
+    if (first == ARHOST_STATUS_ERROR_CANCELLED)
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
+    if (first >= ARHOST_STATUS_END)
         throw refuse("not one picture of it can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
@@ -110,7 +110,7 @@ arhost_status Decoder::next() {
             lost_data_ = false;
             ++count_;
             take_time();
-            return ARHOST_OK;
+            return ARHOST_STATUS_OK;
         }
         if (received == AVERROR_EOF) {
             finish();
@@ -118,39 +118,39 @@ arhost_status Decoder::next() {
         }
         if (received != AVERROR(EAGAIN))
             lost_data_ = true;
-        else if (const arhost_status fed = feed(); fed != ARHOST_OK)
+        else if (const arhost_status fed = feed(); fed != ARHOST_STATUS_OK)
             return fed;
     }
-    return cut_short_.empty() ? ARHOST_END : ARHOST_END_CUT_SHORT;
+    return cut_short_.empty() ? ARHOST_STATUS_END : ARHOST_STATUS_END_TRUNCATED;
 }
 
 // Gives the decoder the next packet, or tells it that there is none.
 arhost_status Decoder::feed() {
     if (host_.cancelled())
-        return ARHOST_ERROR_CANCELLED;
+        return ARHOST_STATUS_ERROR_CANCELLED;
     if (const std::string fault = log_.take_reason(); !fault.empty())
         decoder_fault_ = fault;
     av_packet_unref(packet_.get());
     const int read = checked(av_read_frame(file_.get(), packet_.get()));
     if (read == AVERROR_EXIT && host_.cancelled())
-        return ARHOST_ERROR_CANCELLED;
+        return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
         read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
         end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" is in no error code
         checked(avcodec_send_packet(codec_.get(), nullptr));
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
     if (packet_->stream_index != stream_->index)
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     // Half a packet is left out: a picture that is half grey would pass for a real one.
     if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
     ++packets_;
     if (checked(avcodec_send_packet(codec_.get(), packet_.get())) < 0)
         lost_data_ = true;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 void Decoder::take_time() {
@@ -198,7 +198,7 @@ int Decoder::quarter_turns() const {
     const double quarters = std::round(clockwise / 90);
     const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
     if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       name_ + " asks to be shown " + (mirrored ? "mirrored" : "at an angle") +
                           ", which is not supported: write it out upright with ffmpeg -i … -c:v libx264 …");
     return (static_cast<int>(quarters) + 4) % 4;
@@ -210,7 +210,7 @@ Video::Video(std::filesystem::path file, const Host &host) : file_(std::move(fil
     width_ = first.width;
     height_ = first.height;
     if (width_ > ARHOST_MAX_IMAGE_SIDE || height_ > ARHOST_MAX_IMAGE_SIDE)
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the video " + quoted(file_) + " is " + std::to_string(width_) + "×" + std::to_string(height_) +
                           " px: no side may be longer than " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
     converter_.emplace(first, decoder_->quarter_turns());
@@ -246,7 +246,7 @@ arhost_status Video::go_to(std::uint64_t index) {
         const arhost_status status = decoder_->next();
         tell(decoder_->damage(), damage_told_);
         tell(decoder_->cut_short(), cut_short_told_);
-        if (status != ARHOST_OK)
+        if (status != ARHOST_STATUS_OK)
             return status;
         check_size();
         if (const auto now = std::chrono::steady_clock::now(); now - told > std::chrono::milliseconds(500)) {
@@ -255,17 +255,17 @@ arhost_status Video::go_to(std::uint64_t index) {
                            ("decoding up to frame " + std::to_string(index)).c_str());
         }
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 void Video::check_size() const {
     const AVFrame &picture = decoder_->picture();
     if (picture.width != width_ || picture.height != height_)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) + ": frame " +
-                                                      std::to_string(decoder_->index()) + " is " +
-                                                      std::to_string(picture.width) + "×" +
-                                                      std::to_string(picture.height) + ", those before it " +
-                                                      std::to_string(width_) + "×" + std::to_string(height_));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) +
+                                                             ": frame " + std::to_string(decoder_->index()) + " is " +
+                                                             std::to_string(picture.width) + "×" +
+                                                             std::to_string(picture.height) + ", those before it " +
+                                                             std::to_string(width_) + "×" + std::to_string(height_));
 }
 
 // Once: a loop meets the same place again and again.

@@ -18,7 +18,8 @@ public:
     Decoder(const Decoder &) = delete; // libav holds its address
     Decoder &operator=(const Decoder &) = delete;
 
-    // Decodes the next picture: ARHOST_OK, ARHOST_END, ARHOST_END_CUT_SHORT or ARHOST_ERROR_CANCELLED.
+    // Decodes the next picture: ARHOST_STATUS_OK, ARHOST_STATUS_END, ARHOST_STATUS_END_TRUNCATED or
+    // ARHOST_STATUS_ERROR_CANCELLED.
     arhost_status next();
 
     const AVFrame &picture() const { return *frame_; }

@@ -65,7 +65,7 @@ std::span<const char *const> marker_families() {
 cv::Mat_<uint8_t> marker_cells(std::string_view name, std::int64_t id) {
     const auto family = std::ranges::find(families, name, [](const Family &f) { return std::string_view(f.name); });
     if (family == families.end())
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "family: there is no '" + std::string(name) +
                           "'; give tag36h11 or a dictionary of OpenCV, DICT_6X6_250, say");
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
@@ -74,9 +74,9 @@ cv::Mat_<uint8_t> marker_cells(std::string_view name, std::int64_t id) {
     const cv::aruco::Dictionary dictionary = *cv::aruco::getPredefinedDictionary(family->dictionary);
 #endif
     if (id < 0 || id >= dictionary.bytesList.rows)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "id: " + std::string(name) + " has the ids 0 to " +
-                                                      std::to_string(dictionary.bytesList.rows - 1) + ", not " +
-                                                      std::to_string(id));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "id: " + std::string(name) + " has the ids 0 to " +
+                                                             std::to_string(dictionary.bytesList.rows - 1) +
+                                                             ", not " + std::to_string(id));
     cv::Mat cells;
     const int side = dictionary.markerSize + 2;
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR

@@ -70,14 +70,15 @@ public:
         sensor_ = {options.real("blur_px"), options.real("noise"), options.real("exposure_ev"),
                    static_cast<std::uint64_t>(options.integer("seed"))};
         if (!(sheet_.side_mm > 0))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "side_mm: must be more than 0");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "side_mm: must be more than 0");
         if (!(period_s_ > 0))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "period: must be more than 0 s");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "period: must be more than 0 s");
         if (!(fps_ > 0))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "fps: must be more than 0");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "fps: must be more than 0");
         if (occlude_from_ >= 0 && occlude_to_ <= occlude_from_)
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "occlude_to: must be more than occlude_from; it is the first "
-                                                      "frame in which the marker is not covered any more");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "occlude_to: must be more than occlude_from; it is the first "
+                          "frame in which the marker is not covered any more");
         if (threads_ < 1)
             threads_ = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     }
@@ -93,14 +94,15 @@ public:
         properties.intrinsics = camera_;
         properties.intrinsics.struct_size = sizeof(arhost_intrinsics);
         arhost_frame_format &format = properties.format;
-        format.pixel_format = ARHOST_BGR8;
+        format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
         format.width = camera_.width;
         format.height = camera_.height;
         format.fps = fps_;
         if (!arhost_frame_layout(&format))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "the camera's image of " + std::to_string(camera_.width) + "×" +
-                                                          std::to_string(camera_.height) + " px is not 1 to " +
-                                                          std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "the camera's image of " + std::to_string(camera_.width) + "×" +
+                              std::to_string(camera_.height) + " px is not 1 to " +
+                              std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
         properties.frame_count = frames_;
 
         host_.progress(0, "lens");
@@ -111,7 +113,7 @@ public:
         const auto report = [&](double done) {
             host_.progress(0.1 + 0.85 * done, "painting the desk");
             if (host_.cancelled())
-                throw Failure(ARHOST_ERROR_CANCELLED, "cancelled while painting the desk");
+                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while painting the desk");
         };
         const int side = std::min(1024, static_cast<int>(256 / texel)); // the finest level covers the sheet
         // All cores, once: the rest of a run waits for a source that starts again.
@@ -126,10 +128,10 @@ public:
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         std::uint64_t frame = buffer.sequence;
         if (paced_)
-            if (const arhost_status status = wait_for(frame, info); status != ARHOST_OK)
+            if (const arhost_status status = wait_for(frame, info); status != ARHOST_STATUS_OK)
                 return status;
         if (frames_ && frame >= frames_)
-            return ARHOST_END;
+            return ARHOST_STATUS_END;
         const double unit_mm = sheet_.side_mm / drawn_side;
         std::vector<Mt> poses;
         const int count = motion_blur_ > 0 ? 5 : 1;
@@ -144,7 +146,7 @@ public:
         info.has_truth = 1;
         info.truth_id = sheet_.id;
         std::ranges::copy(pose_at(static_cast<double>(frame), unit_mm), info.true_mt);
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
     void stop() {
@@ -188,7 +190,7 @@ private:
         info.skipped = static_cast<std::uint32_t>(std::clamp(static_cast<double>(late_ns) * fps_ / 1e9, 0.0, most));
         frame += info.skipped;
         const std::chrono::steady_clock::time_point due(std::chrono::nanoseconds(epoch_ns_ + time_ns(frame)));
-        return host_.wait_until(due) ? ARHOST_OK : ARHOST_ERROR_CANCELLED;
+        return host_.wait_until(due) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_CANCELLED;
     }
 
     arhost::Host host_;
@@ -252,7 +254,7 @@ const arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "A printed marker on a desk, seen by a moving camera whose poses are exactly known.",
-    ARHOST_CAN_SEEK,
+    ARHOST_CAPABILITY_SEEK,
     std::size(options),
     options,
     nullptr};

@@ -131,26 +131,27 @@ CaptureDevice::CaptureDevice(const std::string &path)
         const int error = errno;
         const std::string start = "device: '" + path + "' ";
         if (error == ENOENT || error == ENODEV || error == ENXIO || error == ENOTDIR)
-            throw Failure(ARHOST_ERROR_CONFIGURATION, start + "does not exist; " + other_devices());
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices());
         if (error == EACCES || error == EPERM)
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           start +
                               "may not be opened by this user: cameras belong to the group 'video' ('sudo usermod "
                               "-aG video $USER', then log in again)");
         if (error == EISDIR)
-            throw Failure(ARHOST_ERROR_CONFIGURATION, start + "is a folder, no camera; " + other_devices());
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, no camera; " + other_devices());
         fail("opening it", error);
     }
     v4l2_capability capability{};
     if (const int error = control(VIDIOC_QUERYCAP, &capability); error == ENODEV)
         fail("asking what it is", error);
     else if (error != 0)
-        throw Failure(ARHOST_ERROR_CONFIGURATION, "device: '" + path + "' is no video device; " + other_devices());
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "device: '" + path + "' is no video device; " + other_devices());
     card_ = reinterpret_cast<const char *>(capability.card);
     const std::uint32_t able =
         capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
     if (!(able & V4L2_CAP_VIDEO_CAPTURE) || !(able & V4L2_CAP_STREAMING))
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "device: '" + path + "' (" + card_ + ") does not capture pictures" +
                           (able & V4L2_CAP_META_CAPTURE ? " (it gives a camera's metadata; the camera itself is "
                                                           "mostly the node with the number below)"
@@ -167,15 +168,15 @@ int CaptureDevice::control(unsigned long request, void *argument) const {
 void CaptureDevice::fail(const std::string &what, int error) const {
     const std::string start = "the camera '" + path_ + "'" + (card_.empty() ? "" : " (" + card_ + ")") + " ";
     if (error == ENODEV || error == ENXIO || error == ESHUTDOWN)
-        throw Failure(ARHOST_ERROR_DEVICE_LOST, start + "has gone away: was it unplugged?");
+        throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has gone away: was it unplugged?");
     if (error == EBUSY)
-        throw Failure(ARHOST_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
-                                           "' tells which): end that, or set 'device' to another camera");
+        throw Failure(ARHOST_STATUS_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
+                                                  "' tells which): end that, or set 'device' to another camera");
     if (error == ENOSPC)
-        throw Failure(ARHOST_ERROR_CONFIGURATION,
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       start + "finds not enough bandwidth on its USB bus: choose a smaller size, 'format: mjpeg', or "
                               "another port");
-    throw Failure(ARHOST_ERROR_IO, start + "failed at " + what + ": " + std::strerror(error));
+    throw Failure(ARHOST_STATUS_ERROR_IO, start + "failed at " + what + ": " + std::strerror(error));
 }
 
 const CaptureFormat *CaptureDevice::find(std::uint32_t fourcc) const {
@@ -328,8 +329,8 @@ std::optional<v4l2_buffer> CaptureStream::dequeue() const {
 }
 
 void CaptureStream::fail_stopped() const {
-    throw Failure(ARHOST_ERROR_DEVICE_LOST, "the driver of the camera '" + device_.path() + "' (" + device_.card() +
-                                                ") has stopped streaming after an error");
+    throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, "the driver of the camera '" + device_.path() + "' (" +
+                                                       device_.card() + ") has stopped streaming after an error");
 }
 
 bool CaptureStream::wait(int timeout_ms) const {

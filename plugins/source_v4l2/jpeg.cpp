@@ -34,13 +34,14 @@ bool JpegDecoder::describe(std::span<const std::uint8_t> jpeg, arhost_frame_form
         width < 1 || height < 1)
         return false;
     const bool even = width % 2 == 0 && height % 2 == 0;
-    format.pixel_format = subsampling == TJSAMP_GRAY                                        ? ARHOST_GREY8
-                          : subsampling == TJSAMP_420 && colour_space == TJCS_YCbCr && even ? ARHOST_I420
-                                                                                            : ARHOST_BGR8;
+    format.pixel_format = subsampling == TJSAMP_GRAY ? ARHOST_PIXEL_FORMAT_GREY8
+                          : subsampling == TJSAMP_420 && colour_space == TJCS_YCbCr && even
+                              ? ARHOST_PIXEL_FORMAT_I420
+                              : ARHOST_PIXEL_FORMAT_BGR8;
     format.width = static_cast<std::uint32_t>(width);
     format.height = static_cast<std::uint32_t>(height);
-    format.yuv_matrix = ARHOST_BT601; // by JFIF
-    format.yuv_range = ARHOST_FULL_RANGE;
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601; // by JFIF
+    format.yuv_range = ARHOST_YUV_RANGE_FULL;
     return true;
 }
 
@@ -55,13 +56,13 @@ bool JpegDecoder::decode(std::span<const std::uint8_t> jpeg, const arhost_frame_
         fault = "it is " + std::to_string(found.width) + "×" + std::to_string(found.height) + " px";
         return false;
     }
-    if (format.pixel_format != ARHOST_BGR8 && found.pixel_format != format.pixel_format) {
+    if (format.pixel_format != ARHOST_PIXEL_FORMAT_BGR8 && found.pixel_format != format.pixel_format) {
         fault = "its chroma subsampling differs from the first picture's";
         return false;
     }
     const auto width = static_cast<int>(format.width), height = static_cast<int>(format.height);
     int result = 0;
-    if (format.pixel_format == ARHOST_I420) {
+    if (format.pixel_format == ARHOST_PIXEL_FORMAT_I420) {
         std::array<unsigned char *, 3> to = {planes[0], planes[1], planes[2]};
         std::array<int, 3> strides{};
         for (std::size_t p = 0; p < 3; ++p)
@@ -71,7 +72,7 @@ bool JpegDecoder::decode(std::span<const std::uint8_t> jpeg, const arhost_frame_
     } else {
         result = tjDecompress2(handle_.get(), jpeg.data(), jpeg.size(), planes[0], width,
                                static_cast<int>(format.stride[0]), height,
-                               format.pixel_format == ARHOST_GREY8 ? TJPF_GRAY : TJPF_BGR, 0);
+                               format.pixel_format == ARHOST_PIXEL_FORMAT_GREY8 ? TJPF_GRAY : TJPF_BGR, 0);
     }
     if (result == 0)
         return true;

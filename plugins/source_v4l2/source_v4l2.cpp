@@ -57,7 +57,7 @@ public:
           format_option_(options.text("format")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
         if ((asked_.width == 0) != (asked_.height == 0))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "width, height: give both or neither");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: give both or neither");
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
@@ -76,20 +76,20 @@ public:
         stream_.emplace(*device_, buffer_count_);
         if (pixels.pixelformat == V4L2_PIX_FMT_YUYV) {
             yuyv_stride_ = pixels.bytesperline;
-            format.pixel_format = ARHOST_YUYV;
+            format.pixel_format = ARHOST_PIXEL_FORMAT_YUYV;
             format.width = pixels.width;
             format.height = pixels.height;
             set_colours(pixels, format);
         } else {
             describe_first_picture(format);
             if (Size{format.width, format.height} != Size{pixels.width, pixels.height})
-                throw Failure(ARHOST_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
-                                                   ", but sends pictures of " +
-                                                   Size{format.width, format.height}.text());
+                throw Failure(ARHOST_STATUS_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
+                                                          ", but sends pictures of " +
+                                                          Size{format.width, format.height}.text());
         }
         format.fps = fps > 0 ? fps : setup.fps;
         if (!arhost_frame_layout(&format))
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "the camera '" + path_ + "' gives " + mode + ", a size that can't be used here");
         properties.format = format;
         host_.info(device_->card() + " at " + path_ + ": " + mode + ", " + std::to_string(fps) + " frames a second");
@@ -100,7 +100,7 @@ public:
         for (;;) {
             const auto captured = next(give_up);
             if (!captured)
-                return ARHOST_ERROR_CANCELLED;
+                return ARHOST_STATUS_ERROR_CANCELLED;
             const bool good = copy(stream_->bytes(*captured), buffer);
             stream_->queue(captured->index);
             if (!good) {
@@ -110,7 +110,7 @@ public:
             info.clock = ARHOST_CLOCK_MONOTONIC;
             info.capture_ns = last_ns_ = std::max(last_ns_, capture_ns(*captured));
             info.skipped = skipped_before(captured->sequence);
-            return ARHOST_OK;
+            return ARHOST_STATUS_OK;
         }
     }
 
@@ -126,9 +126,9 @@ private:
         if (setup.intrinsics) {
             const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
             if (size != Size{} && size != calibrated)
-                throw Failure(ARHOST_ERROR_CONFIGURATION, "width, height: " + size.text() +
-                                                              " is asked for, but the camera's calibration is for " +
-                                                              calibrated.text());
+                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                              "width, height: " + size.text() +
+                                  " is asked for, but the camera's calibration is for " + calibrated.text());
             if (size == Size{})
                 wanted_by = "the camera's calibration is for " + calibrated.text() + ": calibrate for the size used";
             size = calibrated;
@@ -142,18 +142,18 @@ private:
         const v4l2_pix_format set = device_->set_format(chosen.fourcc, size.width, size.height).fmt.pix;
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
         if (set.pixelformat != chosen.fourcc)
-            throw Failure(ARHOST_ERROR_CONFIGURATION, camera + " does not give " +
-                                                          arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
-                                                          ", though it offers " + device_->describe_formats());
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          camera + " does not give " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                              ", though it offers " + device_->describe_formats());
         if (demanded && size != Size{set.width, set.height})
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
                               " (it would give " + Size{set.width, set.height}.text() + "); the nearest are " +
                               device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted_by);
         if (set.pixelformat == V4L2_PIX_FMT_YUYV && set.bytesperline < 2 * set.width)
-            throw Failure(ARHOST_ERROR_IO, camera + " has a broken driver: rows of " +
-                                               std::to_string(set.bytesperline) + " bytes for " +
-                                               std::to_string(set.width) + " px");
+            throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a broken driver: rows of " +
+                                                      std::to_string(set.bytesperline) + " bytes for " +
+                                                      std::to_string(set.width) + " px");
         return set;
     }
 
@@ -165,7 +165,7 @@ private:
                 format && (format_option_ == "auto" || (format_option_ == "yuyv") == (fourcc == V4L2_PIX_FMT_YUYV)))
                 known.push_back(format);
         if (known.empty())
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "format: the camera '" + path_ + "' (" + device_->card() + ") offers no " +
                               (format_option_ == "auto" ? "YUYV and no MJPG" : format_option_) + ", only " +
                               device_->describe_formats());
@@ -190,13 +190,14 @@ private:
         const std::uint32_t encoding = pixels.ycbcr_enc == V4L2_YCBCR_ENC_DEFAULT
                                            ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(pixels.colorspace)}
                                            : pixels.ycbcr_enc;
-        format.yuv_matrix =
-            encoding == V4L2_YCBCR_ENC_709 || encoding == V4L2_YCBCR_ENC_XV709 ? ARHOST_BT709 : ARHOST_BT601;
+        format.yuv_matrix = encoding == V4L2_YCBCR_ENC_709 || encoding == V4L2_YCBCR_ENC_XV709
+                                ? ARHOST_YUV_MATRIX_BT709
+                                : ARHOST_YUV_MATRIX_BT601;
         const std::uint32_t range =
             pixels.quantization == V4L2_QUANTIZATION_DEFAULT
                 ? std::uint32_t{V4L2_MAP_QUANTIZATION_DEFAULT(false, pixels.colorspace, encoding)}
                 : pixels.quantization;
-        format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_FULL_RANGE : ARHOST_LIMITED_RANGE;
+        format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     }
 
     // Only a picture tells how its chroma is subsampled.
@@ -205,7 +206,7 @@ private:
             host_.progress(-1, "waiting for the camera's first picture");
             const auto captured = next(give_up);
             if (!captured)
-                throw Failure(ARHOST_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
+                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
             const bool good = jpeg_.describe(stream_->bytes(*captured), format);
             stream_->queue(captured->index);
             if (good)
@@ -237,17 +238,17 @@ private:
             if (found)
                 return found;
             if (Clock::now() > give_up)
-                throw Failure(ARHOST_ERROR_DEVICE_LOST, "the camera '" + path_ + "' (" + device_->card() +
-                                                            ") has given no good picture for " +
-                                                            std::to_string(silence_limit.count()) + " s" +
-                                                            (fault_.empty() ? "" : "; of the last one: " + fault_));
+                throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
+                              "the camera '" + path_ + "' (" + device_->card() + ") has given no good picture for " +
+                                  std::to_string(silence_limit.count()) + " s" +
+                                  (fault_.empty() ? "" : "; of the last one: " + fault_));
             stream_->wait(poll_slice_ms);
         }
     }
 
     bool copy(std::span<const std::uint8_t> bytes, const arhost_frame_buffer &buffer) {
         const arhost_frame_format &format = *buffer.format;
-        if (format.pixel_format != ARHOST_YUYV)
+        if (format.pixel_format != ARHOST_PIXEL_FORMAT_YUYV)
             return jpeg_.decode(bytes, format, buffer.plane, fault_);
         const std::size_t row_bytes = std::size_t{2} * format.width;
         if (bytes.size() < std::size_t{yuyv_stride_} * (format.height - 1) + row_bytes) {
@@ -334,7 +335,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Frames from a camera through Video4Linux, uncompressed or Motion-JPEG.",
-                                          ARHOST_IS_LIVE,
+                                          ARHOST_CAPABILITY_LIVE,
                                           std::size(options),
                                           options,
                                           needs};

@@ -3,8 +3,8 @@
 // AprilTags, found by AprilTag's own library (version 3).
 #include "families.hpp"
 
-#include <common_planar_pose/edge_refinement.hpp>
-#include <common_planar_pose/marker_report.hpp>
+#include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/marker_report.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -103,7 +103,7 @@ const FamilyType &family_type(const std::string &name) {
     for (const FamilyType &type : family_types)
         if (name == type.name)
             return type;
-    throw Failure(ARHOST_ERROR_CONFIGURATION, "family: there is none named '" + name + "'");
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "family: there is none named '" + name + "'");
 }
 
 class AprilTagTracker {
@@ -116,7 +116,7 @@ public:
           min_margin_(options.real("min_decision_margin")), threads_(static_cast<int>(options.integer("threads"))) {
         // The library would decimate by the whole part and scale back by the fraction.
         if (decimate_ != 1.5 && decimate_ != std::floor(decimate_))
-            throw Failure(ARHOST_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or a whole number");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or a whole number");
     }
 
     void start(const arhost_tracker_setup &setup) {

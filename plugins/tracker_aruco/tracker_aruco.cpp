@@ -4,8 +4,8 @@
 #include "dictionaries.hpp"
 #include "opencv_aruco.hpp"
 
-#include <common_planar_pose/edge_refinement.hpp>
-#include <common_planar_pose/marker_report.hpp>
+#include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/marker_report.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -85,7 +85,7 @@ const DictionaryType &dictionary_type(const std::string &name) {
     for (const DictionaryType &type : dictionary_types)
         if (name == type.option)
             return type;
-    throw Failure(ARHOST_ERROR_CONFIGURATION, "dictionary: there is none named '" + name + "'");
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary: there is none named '" + name + "'");
 }
 
 // OpenCV reads past the end of strings that are too short.
@@ -108,7 +108,8 @@ bool is_dictionary(const cv::FileNode &root) {
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {
     const auto refuse = [&](const std::string &reason) {
-        return Failure(ARHOST_ERROR_CONFIGURATION, "dictionary_file: " + file + " is no dictionary: " + reason);
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                       "dictionary_file: " + file + " is no dictionary: " + reason);
     };
     if (!std::ifstream(file))
         throw refuse("it can't be read");
@@ -156,7 +157,7 @@ public:
         parameters_.markerBorderBits = static_cast<int>(options.integer("border_bits"));
         parameters_.detectInvertedMarker = options.boolean("inverted");
         if (parameters_.adaptiveThreshWinSizeMax < parameters_.adaptiveThreshWinSizeMin)
-            throw Failure(ARHOST_ERROR_CONFIGURATION,
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "threshold_window_max_px must not be less than threshold_window_min_px");
         if (refinement == "apriltag")
             centre_shift_px_ = 0.5;

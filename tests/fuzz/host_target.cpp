@@ -8,7 +8,7 @@
 #include "targets.hpp"
 
 #include "host/pipeline.hpp"
-#include "ring/fd_passing.hpp"
+#include "ipc/fd_passing.hpp"
 
 #include <csignal>
 #include <fcntl.h>
@@ -24,7 +24,7 @@
 namespace arhost::fuzz {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 constexpr const char *configuration_text = R"(version: 1
 plugin_path: [plugins]
@@ -39,12 +39,12 @@ outputs:
 restart: {first_delay_ms: 0, longest_delay_ms: 0, quarantine_after: 4}
 )";
 
-config::Configuration make_configuration(const char *mode) {
+run_config::Configuration make_configuration(const char *mode) {
     for (const char *plugin : {"source.so", "tracker.so", "tracker2.so", "rt.so", "sink.so", "sink2.so"})
         write_scratch(std::filesystem::path("plugins") / plugin, {});
     write_scratch("scene.yaml", {});
     const std::string text = std::string(configuration_text) + "mode: " + mode + "\n";
-    return config::parse(yaml::Node::parse(text, (scratch() / "run.yaml").string()), scratch() / "plugins");
+    return run_config::parse(yaml::Node::parse(text, (scratch() / "run.yaml").string()), scratch() / "plugins");
 }
 
 base::UniqueFd scene_memory() {
@@ -173,7 +173,8 @@ private:
                                               "",
                                               "",
                                               "",
-                                              kind_ == ARHOST_KIND_SOURCE ? std::uint32_t(ARHOST_CAN_SEEK) : 0u,
+                                              kind_ == ARHOST_KIND_SOURCE ? std::uint32_t(ARHOST_CAPABILITY_SEEK)
+                                                                          : 0u,
                                               0,
                                               nullptr,
                                               nullptr};
@@ -193,11 +194,11 @@ private:
         if (kind_ != ARHOST_KIND_SOURCE)
             return {{"type", "ready"}};
         arhost_frame_format format{};
-        format.pixel_format = ARHOST_NV12;
+        format.pixel_format = ARHOST_PIXEL_FORMAT_NV12;
         format.width = 18;
         format.height = 10;
-        format.yuv_matrix = ARHOST_BT601;
-        format.yuv_range = ARHOST_FULL_RANGE;
+        format.yuv_matrix = ARHOST_YUV_MATRIX_BT601;
+        format.yuv_range = ARHOST_YUV_RANGE_FULL;
         format.fps = 30;
         arhost_intrinsics camera{};
         camera.width = format.width;
@@ -224,7 +225,7 @@ private:
     void answer(const Command &command, Input &input) {
         Result result{};
         result.ticket = command.ticket;
-        result.status = ARHOST_OK;
+        result.status = ARHOST_STATUS_OK;
         result.frame.clock = ARHOST_CLOCK_MEDIA;
         result.frame.capture_ns = static_cast<std::int64_t>(command.sequence) * 1000;
         if (kind_ == ARHOST_KIND_TRACKER && output_memory_) {
@@ -322,9 +323,10 @@ private:
 
 void run_host(Bytes bytes) {
     [[maybe_unused]] static const auto ignored = ::signal(SIGPIPE, SIG_IGN); // as arhost does
-    static const config::Configuration lockstep = make_configuration("lockstep"), live = make_configuration("live");
+    static const run_config::Configuration lockstep = make_configuration("lockstep"),
+                                           live = make_configuration("live");
     Input input(bytes);
-    const config::Configuration &configuration = input.number() % 2 ? live : lockstep;
+    const run_config::Configuration &configuration = input.number() % 2 ? live : lockstep;
     Troupe troupe;
     Reactor reactor;
     host::Pipeline pipeline(configuration, {reactor, troupe, "", [](arhost_severity, auto &, auto &) {}},

@@ -7,7 +7,7 @@
 
 #include "compositor/compositor.hpp"
 #include "host/frames.hpp"
-#include "ring/protocol.hpp"
+#include "ipc/protocol.hpp"
 
 #include <chrono>
 #include <cmath>
@@ -18,7 +18,7 @@
 namespace arhost::fuzz {
 namespace {
 
-using namespace ring;
+using namespace ipc;
 
 void require(bool condition, const char *otherwise) {
     if (!condition)
@@ -55,7 +55,7 @@ void take_result(Input &input) {
 
 void lay_over(const arhost_render_info &info) {
     arhost_frame_format format{};
-    format.pixel_format = ARHOST_BGR8;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
     format.width = 21;
     format.height = 5;
     arhost_frame_layout(&format);

@@ -40,7 +40,7 @@ void load(Bytes bytes, const char *name) {
         options.byte_limit = std::uint64_t(16) << 20;
         ArenaBuilder builder;
         const std::uint32_t mesh = builder.add_triangles(load_mesh(write_scratch(name, bytes), options));
-        builder.add_object("mesh", mesh, builder.add_material(make_material(ARHOST_DIFFUSE)));
+        builder.add_object("mesh", mesh, builder.add_material(make_material(ARHOST_MATERIAL_DIFFUSE)));
         check(std::move(builder));
     } catch (const MeshError &) {
     }

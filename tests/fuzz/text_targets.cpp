@@ -6,10 +6,10 @@
 
 #include "camera/calibration.hpp"
 #include "camera/trajectory.hpp"
-#include "config/configuration.hpp"
+#include "run_config/configuration.hpp"
 
 #include <arhost-cpp/plugin.hpp>
-#include <common_files/pattern.hpp>
+#include <sink_common/pattern.hpp>
 
 namespace arhost::fuzz {
 namespace {
@@ -22,8 +22,8 @@ Bytes bytes_of(std::string_view text) {
 }
 
 // An option of every type.
-ring::PluginDescription plugin_of(arhost_kind kind) {
-    ring::PluginDescription plugin;
+ipc::PluginDescription plugin_of(arhost_kind kind) {
+    ipc::PluginDescription plugin;
     plugin.kind = kind;
     plugin.id = "plugin";
     plugin.options = {{"on", ARHOST_OPTION_BOOL, "false", 0, 0, {}, ""},
@@ -51,11 +51,11 @@ void run_configuration(Bytes bytes) {
     [[maybe_unused]] static const bool made = (make_folder(), true);
     try {
         const auto root = yaml::Node::parse(text_of(bytes), (scratch() / "run.yaml").string());
-        const config::Configuration configuration = config::parse(root, scratch() / "plugins");
+        const run_config::Configuration configuration = run_config::parse(root, scratch() / "plugins");
         if (configuration.source)
-            config::options_for(plugin_of(ARHOST_KIND_SOURCE), ARHOST_KIND_SOURCE, *configuration.source, 0);
+            run_config::options_for(plugin_of(ARHOST_KIND_SOURCE), ARHOST_KIND_SOURCE, *configuration.source, 0);
         for (const auto &output : configuration.outputs)
-            config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0);
+            run_config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0);
     } catch (const yaml::Error &) {
     }
 }

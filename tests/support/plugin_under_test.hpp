@@ -90,7 +90,7 @@ public:
             throw std::runtime_error(file + " exports no arhost_entry");
         const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
         arhost_answer answer{sizeof answer, 0, nullptr};
-        if (entry->negotiate(&offer, &answer) != ARHOST_OK)
+        if (entry->negotiate(&offer, &answer) != ARHOST_STATUS_OK)
             throw std::runtime_error("negotiate failed");
         plugin_ = answer.plugin;
         host_ = {sizeof host_, ARHOST_ABI_VERSION, "arhost-test", "0",          this,

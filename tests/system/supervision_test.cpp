@@ -257,8 +257,8 @@ TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {
 // A new process opens the device anew, and has memory: only a frame that brings it about each time goes without.
 class FailureThatCallsForANewWorker : public testing::TestWithParam<std::pair<arhost_status, const char *>> {};
 INSTANTIATE_TEST_SUITE_P(Statuses, FailureThatCallsForANewWorker,
-                         testing::Values(std::pair(ARHOST_ERROR_DEVICE_LOST, "device lost"),
-                                         std::pair(ARHOST_ERROR_OUT_OF_MEMORY, "out of memory")));
+                         testing::Values(std::pair(ARHOST_STATUS_ERROR_DEVICE_LOST, "device lost"),
+                                         std::pair(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, "out of memory")));
 
 TEST_P(FailureThatCallsForANewWorker, GetsOne) {
     const std::string error = ", error: " + std::to_string(GetParam().first);

@@ -2,10 +2,10 @@
 #include "ray_tracer.hpp"
 
 #include "base/text.hpp"
-#include "config/options.hpp"
-#include "config/plugin_path.hpp"
-#include "ring/json_abi.hpp"
-#include "ring/protocol.hpp"
+#include "ipc/json_abi.hpp"
+#include "ipc/protocol.hpp"
+#include "run_config/options.hpp"
+#include "run_config/plugin_path.hpp"
 #include "scene/motion.hpp"
 #include "worker/library.hpp"
 
@@ -40,8 +40,8 @@ constexpr arhost_host host = {sizeof(arhost_host),
                               [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 
 // More than the plugin's 1, for pictures that stand still, where it can take as many.
-void prefer_samples(yaml::Node &options, const ring::PluginDescription &plugin) {
-    for (const ring::OptionDeclaration &o : plugin.options)
+void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
+    for (const ipc::OptionDeclaration &o : plugin.options)
         if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
             ((o.minimum == 0 && o.maximum == 0) || (o.minimum <= 16 && o.maximum >= 16)))
             options.override_value("samples", "16");
@@ -70,16 +70,16 @@ private:
 
 RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     const yaml::Node asked = yaml::Node::scalar(name, "--raytracer");
-    const std::filesystem::path file = config::PluginPath({}, built_in_plugins()).resolve(asked);
+    const std::filesystem::path file = run_config::PluginPath({}, built_in_plugins()).resolve(asked);
     plugin_ = &worker::negotiate(file, worker::open_library(file));
-    const ring::PluginDescription plugin = ring::description_from_json(ring::to_json(*plugin_->descriptor));
+    const ipc::PluginDescription plugin = ipc::description_from_json(ipc::to_json(*plugin_->descriptor));
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
-        asked.fail("'" + plugin.id + "' is a " + ring::to_text(plugin.kind) + ", not a ray tracer");
+        asked.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
-    const std::vector<ring::OptionValue> values = config::resolve_options(plugin, options, std::nullopt, asked);
+    const std::vector<ipc::OptionValue> values = run_config::resolve_options(plugin, options, std::nullopt, asked);
     std::vector<arhost_option> passed;
     passed.reserve(values.size());
-    for (const ring::OptionValue &v : values)
+    for (const ipc::OptionValue &v : values)
         passed.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
     expect_ok("create", plugin_->create(&host, passed.data(), static_cast<std::uint32_t>(passed.size()), &instance_));
     if (!instance_)
@@ -87,15 +87,15 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
 }
 
 void RayTracer::expect_ok(const char *call, arhost_status status) const {
-    if (status != ARHOST_OK) // its reason has been logged
+    if (status != ARHOST_STATUS_OK) // its reason has been logged
         throw std::runtime_error(std::string(plugin_->descriptor->id) + ": " + call + ": " +
-                                 ring::status_text(status));
+                                 ipc::status_text(status));
 }
 
 cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera, double time_s) const {
     const auto &functions = *static_cast<const arhost_raytracer *>(plugin_->functions);
     const std::uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
-    const std::uint32_t stride = ring::overlay_stride(width);
+    const std::uint32_t stride = ipc::overlay_stride(width);
     const ImageMemory memory(std::size_t{stride} * height);
     const arhost_image image{sizeof image, stride, width, height, memory.get()};
     arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr};

@@ -82,7 +82,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     if (const std::string wrong = arhost::scene::validate(arena.bytes()); !wrong.empty())
         throw std::runtime_error(file + ": " + wrong);
     if (view.up == Vector{})
-        view.up[arena.scene().axes == ARHOST_Z_UP ? 2 : 1] = 1;
+        view.up[arena.scene().axes == ARHOST_AXES_Z_UP ? 2 : 1] = 1;
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);
 }
 

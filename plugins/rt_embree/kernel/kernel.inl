@@ -25,7 +25,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     Bool occluded = bool_of(false);
     if (scene.has_occluders)
         for_each_object(scene, rays.hit, hit, [&](const Object &object, Bool here) {
-            if (object.role == ARHOST_OCCLUDER)
+            if (object.role == ARHOST_ROLE_OCCLUDER)
                 occluded = occluded | here;
         });
     const Bool is_virtual = hit & ~occluded, rest = active & ~is_virtual;

@@ -29,24 +29,24 @@ ARHOST_INLINE Incidence incidence_along(const Surface &s, Vec3 way, float end, F
 }
 
 ARHOST_INLINE bool is_extended(const arhost_light &light) {
-    return light.type == ARHOST_RECTANGLE_LIGHT || light.type == ARHOST_SPHERE_LIGHT;
+    return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
 }
 
 // `where` chooses the point of an extended light.
 ARHOST_INLINE Incidence incidence(const arhost_light &light, const Surface &s, Pair where) {
-    if (light.type == ARHOST_DIRECTIONAL_LIGHT)
+    if (light.type == ARHOST_LIGHT_DIRECTIONAL)
         return incidence_along(s, -splat(light.direction), far_away, Float(1.0f));
     Vec3 way = splat(light.position) - s.position;
-    if (light.type == ARHOST_RECTANGLE_LIGHT)
+    if (light.type == ARHOST_LIGHT_RECTANGLE)
         way = way_to_rectangle(way, splat(light.axis_u), splat(light.axis_v), where.u, where.v);
-    else if (light.type == ARHOST_SPHERE_LIGHT)
+    else if (light.type == ARHOST_LIGHT_SPHERE)
         way = way_to_disc(way, Float(light.radius), where.u, where.v);
     const Bool falls_off = bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE);
     Incidence in = incidence_along(s, way, 1, point_light_falloff(falls_off, dot(way, way)));
-    if (light.type == ARHOST_SPOT_LIGHT)
+    if (light.type == ARHOST_LIGHT_SPOT)
         in.irradiance = in.irradiance * spot_share(dot(splat(light.direction), -in.direction),
                                                    Float(light.cosine_inner), Float(light.cosine_outer));
-    if (light.type == ARHOST_RECTANGLE_LIGHT)
+    if (light.type == ARHOST_LIGHT_RECTANGLE)
         in.irradiance = in.irradiance * lambert(splat(light.direction), -in.direction);
     return in;
 }
@@ -61,9 +61,9 @@ struct Passage {
 // The tint of the glass between surface points and a light.
 ARHOST_INLINE Vec3 tint_on_the_way(const Scene &scene, Vec3 origin, const Incidence &in, Bool active,
                                    Bool &is_tinted) {
-    constexpr int most_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
+    constexpr int max_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
     Vec3 tint = white(), start = origin, left = in.way;
-    for (int i = 0; i < most_surfaces && any(active); ++i) {
+    for (int i = 0; i < max_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
         set_ray(rays.ray, start, left, Float(in.end), Int(glass_mask));
         active = trace(scene, scene.root, make_query(Coherence::incoherent), rays, active);

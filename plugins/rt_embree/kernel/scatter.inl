@@ -172,21 +172,21 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     if (paths.depth >= scene.max_depth) {
         // What a ray would have brought that starts no more: of glass the colour that stands for it.
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
-            if (object.material->model == ARHOST_GLASS)
+            if (object.material->model == ARHOST_MATERIAL_GLASS)
                 add_light(work, paths, splat(object.material->cutoff_colour), here);
         });
         return;
     }
     for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
         const arhost_material &material = *object.material;
-        if (material.model == ARHOST_MIRROR)
+        if (material.model == ARHOST_MATERIAL_MIRROR)
             reflect(work, paths, s, direction, splat(material.reflectivity), here);
-        else if (material.model == ARHOST_METAL)
+        else if (material.model == ARHOST_MATERIAL_METAL)
             reflect(work, paths, s, direction, schlick(splat(material.reflectivity), -dot(direction, s.normal)),
                     here);
-        else if (material.model == ARHOST_GLASS)
+        else if (material.model == ARHOST_MATERIAL_GLASS)
             scatter_in_glass(work, paths, s, direction, material, here);
-        else if (material.model == ARHOST_METALLIC_ROUGHNESS)
+        else if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS)
             scatter_off_roughness(work, paths, s, -direction, here);
     });
 }

@@ -99,18 +99,18 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             geometric = transform(object.normal_transform, geometric);
             normal = transform(object.normal_transform, normal);
         }
-        if (object.material->model == ARHOST_METALLIC_ROUGHNESS && object.material->normal_texture != ARHOST_NONE &&
-            object.texcoords)
+        if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
+            object.material->normal_texture != ARHOST_NONE && object.texcoords)
             normal = bent(scene, object, geometric, normal, hit, here);
         reach = select(here, splat(object.reach), reach);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
-        if (object.role != ARHOST_VIRTUAL)
+        if (object.role != ARHOST_ROLE_VIRTUAL)
             s.is_real = s.is_real | here;
 
         const arhost_material &material = *object.material;
-        s.any_scattering |= material.model >= ARHOST_MIRROR;
-        if (material.model == ARHOST_MIRROR || material.model == ARHOST_GLASS)
+        s.any_scattering |= material.model >= ARHOST_MATERIAL_MIRROR;
+        if (material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
             return;
         s.is_lit = s.is_lit | here;
         Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);
@@ -119,12 +119,12 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             ambient = ambient * colour;
             diffuse = diffuse * colour;
         }
-        if (material.model == ARHOST_SPECULAR || material.model == ARHOST_METAL) {
+        if (material.model == ARHOST_MATERIAL_SPECULAR || material.model == ARHOST_MATERIAL_METAL) {
             s.specular = select(here, splat(material.specular), s.specular);
             s.exponent = select(here, Float(material.exponent), s.exponent);
             s.any_specular = true;
         }
-        if (material.model == ARHOST_METALLIC_ROUGHNESS) {
+        if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS) {
             Float metallic = material.metallic, roughness = material.roughness;
             if (material.metallic_roughness_texture != ARHOST_NONE) {
                 const Vec3 factors = textured(scene, object, material.metallic_roughness_texture, hit, here).colour;

@@ -54,13 +54,13 @@ struct Passage {
 // Real surfaces cast no shadow on each other: that one is in the video. First a ray for what is opaque, then one from
 // each surface of glass to the next, in one loop: trace() is long.
 Passage passage(Incidence arriving, Surface s) {
-    const int most_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
+    const int max_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
     vec3 start = s.position + s.geometric_normal * s.offset, left = arriving.way;
     bool ends = arriving.end < INFINITY;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
     Ray ray = Ray(start, ends ? left - s.geometric_normal * s.offset : left, arriving.end, mask);
     Passage way = Passage(false, false, vec3(1.0));
-    for (int i = 0; i <= most_surfaces; ++i) {
+    for (int i = 0; i <= max_surfaces; ++i) {
         Hit hit = trace(ray, i == 0, false);
         bool is_hit = hit.object != NONE;
         if (i == 0)

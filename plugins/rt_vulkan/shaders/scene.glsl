@@ -32,7 +32,7 @@ struct Object {
     uint material, role, mask, flags;
     uint root; // of its tree, among the nodes; where the device has its own, its mesh's first primitive
     uint first_index, first_normal, first_texcoord; // NONE where there are none
-    vec3 reach;                                     // common_view/arena.hpp
+    vec3 reach;                                     // raytracer_common/arena.hpp
 };
 
 struct Material {

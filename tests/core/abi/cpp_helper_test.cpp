@@ -11,13 +11,13 @@ class Thrower {
 public:
     Thrower(const arhost::Host &, const arhost::Options &options) {
         if (options.boolean("refuse"))
-            throw arhost::Failure(ARHOST_ERROR_CONFIGURATION, "refused");
+            throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "refused");
     }
     void start(const arhost_tracker_setup &) { throw std::runtime_error("no luck"); }
     void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
     static std::vector<arhost::Device> devices() {
         if (no_devices)
-            throw arhost::Failure(ARHOST_ERROR_IO, "no driver");
+            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "no driver");
         return {{3, ARHOST_DEVICE_VIRTUAL_GPU, true, "Thrower's", "a-b", "throws"},
                 {.index = 4, .kind = ARHOST_DEVICE_CPU, .name = "Else", .uuid = "", .abilities = ""}};
     }
@@ -55,28 +55,28 @@ ARHOST_TRACKER(Thrower, descriptor)
 TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
     arhost_answer answer{sizeof answer, 99, nullptr};
-    ASSERT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_OK);
+    ASSERT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_STATUS_OK);
     EXPECT_EQ(answer.abi_version, ARHOST_ABI_VERSION);
     const auto &tracker = *static_cast<const arhost_tracker *>(answer.plugin->functions);
 
     arhost_option refuse{sizeof refuse, ARHOST_OPTION_BOOL, "refuse", 1, 0, ""};
     arhost_instance *instance = nullptr;
-    EXPECT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_EQ(logged, "refused");
     EXPECT_EQ(instance, nullptr);
 
     refuse.integer = 0;
-    ASSERT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_OK);
+    ASSERT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_STATUS_OK);
     const arhost_tracker_setup setup{};
-    EXPECT_EQ(tracker.start(instance, &setup), ARHOST_ERROR_INTERNAL);
+    EXPECT_EQ(tracker.start(instance, &setup), ARHOST_STATUS_ERROR_INTERNAL);
     EXPECT_EQ(logged, "no luck");
     const arhost_frame frame{};
     arhost_tracker_result result{};
-    EXPECT_EQ(tracker.track(instance, &frame, &result), ARHOST_ERROR_OUT_OF_MEMORY);
+    EXPECT_EQ(tracker.track(instance, &frame, &result), ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
     tracker.stop(instance);
     answer.plugin->destroy(instance);
 
-    EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_ERROR_INVALID_ARGUMENT)
+    EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
         << "an option is missing";
 }
 
@@ -96,11 +96,11 @@ TEST(CppHelper, GivesAClassThatHasDevicesTheExtension) {
             (device->is_default ? " default " : " ") + device->name + " " + text(device->uuid) + " " +
             text(device->abilities));
     };
-    ASSERT_EQ(devices.list(&host, take, &told), ARHOST_OK);
+    ASSERT_EQ(devices.list(&host, take, &told), ARHOST_STATUS_OK);
     EXPECT_EQ(told, (std::vector<std::string>{"3 3 default Thrower's a-b throws", "4 4 Else none none"}));
 
     Thrower::no_devices = true;
-    EXPECT_EQ(devices.list(&host, take, &told), ARHOST_ERROR_IO);
+    EXPECT_EQ(devices.list(&host, take, &told), ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(logged, "no driver");
     EXPECT_EQ(told.size(), 2u);
     Thrower::no_devices = false;
@@ -133,7 +133,7 @@ TEST(CppHelper, GivesDevicesTheHostIfTheyTakeIt) {
     ASSERT_NE(devices, nullptr);
     EXPECT_EQ(devices->list(
                   &host, [](void *, const arhost_device *) {}, nullptr),
-              ARHOST_OK);
+              ARHOST_STATUS_OK);
     EXPECT_EQ(logged, "looking");
 }
 
@@ -150,7 +150,7 @@ TEST(CppHelper, LeavesOtherExtensionsToTheClass) {
 TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION + 1, ARHOST_ABI_VERSION + 9};
     arhost_answer answer{sizeof answer, 99, nullptr};
-    EXPECT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_STATUS_ERROR_UNSUPPORTED);
     EXPECT_EQ(answer.plugin, nullptr);
 }
 

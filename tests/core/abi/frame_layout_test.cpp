@@ -16,7 +16,7 @@ arhost_frame_format format_of(arhost_pixel_format pixel_format, std::uint32_t wi
 } // namespace
 
 TEST(FrameLayout, AlignsRowsAndPlanes) {
-    arhost_frame_format format = format_of(ARHOST_BGR8, 101, 7);
+    arhost_frame_format format = format_of(ARHOST_PIXEL_FORMAT_BGR8, 101, 7);
     ASSERT_TRUE(arhost_frame_layout(&format));
     EXPECT_EQ(format.stride[0], 320u);
     EXPECT_EQ(format.grey_offset, 320u * 7);
@@ -25,7 +25,7 @@ TEST(FrameLayout, AlignsRowsAndPlanes) {
 }
 
 TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyOne) {
-    arhost_frame_format format = format_of(ARHOST_I420, 100, 50);
+    arhost_frame_format format = format_of(ARHOST_PIXEL_FORMAT_I420, 100, 50);
     ASSERT_TRUE(arhost_frame_layout(&format));
     EXPECT_EQ(format.plane_count, 3u);
     EXPECT_EQ(format.grey_offset, 0u);
@@ -35,11 +35,11 @@ TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyOne) {
 }
 
 TEST(FrameLayout, RefusesWhatIsNoFormat) {
-    for (auto [pixel_format, width, height] : {std::tuple{ARHOST_YUYV, 101, 8},
-                                               {ARHOST_NV12, 100, 7},
-                                               {ARHOST_I420, 99, 8},
-                                               {ARHOST_BGR8, 0, 8},
-                                               {ARHOST_BGR8, 8, 20000}}) {
+    for (auto [pixel_format, width, height] : {std::tuple{ARHOST_PIXEL_FORMAT_YUYV, 101, 8},
+                                               {ARHOST_PIXEL_FORMAT_NV12, 100, 7},
+                                               {ARHOST_PIXEL_FORMAT_I420, 99, 8},
+                                               {ARHOST_PIXEL_FORMAT_BGR8, 0, 8},
+                                               {ARHOST_PIXEL_FORMAT_BGR8, 8, 20000}}) {
         arhost_frame_format format =
             format_of(pixel_format, static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
         EXPECT_FALSE(arhost_frame_layout(&format));

@@ -75,10 +75,10 @@ TEST(Coordinates, TakeAxesOfAnyLength) {
 }
 
 TEST(Coordinates, FollowTheScenesAxes) {
-    EXPECT_EQ(rotation_of(default_for(ARHOST_Z_UP)), glm::dmat4(1));
-    EXPECT_EQ(turned_back(default_for(ARHOST_Y_UP), {1, 2, 3}), glm::dvec3(1, 3, -2));
-    EXPECT_EQ(problem_with(default_for(ARHOST_Z_UP)), "");
-    EXPECT_EQ(problem_with(default_for(ARHOST_Y_UP)), "");
+    EXPECT_EQ(rotation_of(default_for(ARHOST_AXES_Z_UP)), glm::dmat4(1));
+    EXPECT_EQ(turned_back(default_for(ARHOST_AXES_Y_UP), {1, 2, 3}), glm::dvec3(1, 3, -2));
+    EXPECT_EQ(problem_with(default_for(ARHOST_AXES_Z_UP)), "");
+    EXPECT_EQ(problem_with(default_for(ARHOST_AXES_Y_UP)), "");
 }
 
 TEST(Coordinates, ThatCantBeUsedSayWhy) {

@@ -17,11 +17,13 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr arhost_pixel_format all_formats[] = {ARHOST_GREY8, ARHOST_RGB8, ARHOST_BGR8,
-                                               ARHOST_YUYV,  ARHOST_NV12, ARHOST_I420};
+constexpr arhost_pixel_format all_formats[] = {ARHOST_PIXEL_FORMAT_GREY8, ARHOST_PIXEL_FORMAT_RGB8,
+                                               ARHOST_PIXEL_FORMAT_BGR8,  ARHOST_PIXEL_FORMAT_YUYV,
+                                               ARHOST_PIXEL_FORMAT_NV12,  ARHOST_PIXEL_FORMAT_I420};
 
 arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width, std::uint32_t height,
-                           arhost_yuv_matrix matrix = ARHOST_BT601, arhost_yuv_range range = ARHOST_LIMITED_RANGE) {
+                           arhost_yuv_matrix matrix = ARHOST_YUV_MATRIX_BT601,
+                           arhost_yuv_range range = ARHOST_YUV_RANGE_LIMITED) {
     arhost_frame_format format{};
     format.struct_size = sizeof format;
     format.pixel_format = pixel_format;
@@ -34,7 +36,8 @@ arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width
 }
 
 bool has_chroma_pairs(arhost_pixel_format format) {
-    return format == ARHOST_YUYV || format == ARHOST_NV12 || format == ARHOST_I420;
+    return format == ARHOST_PIXEL_FORMAT_YUYV || format == ARHOST_PIXEL_FORMAT_NV12 ||
+           format == ARHOST_PIXEL_FORMAT_I420;
 }
 
 // A random frame and overlay. `shift` moves every pointer off its alignment and makes the strides odd.
@@ -85,8 +88,8 @@ TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
     test::on_each_instruction_set([] {
         std::mt19937 random(4);
         for (const arhost_pixel_format pixel_format : all_formats)
-            for (const arhost_yuv_matrix matrix : {ARHOST_BT601, ARHOST_BT709})
-                for (const arhost_yuv_range range : {ARHOST_LIMITED_RANGE, ARHOST_FULL_RANGE}) {
+            for (const arhost_yuv_matrix matrix : {ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_MATRIX_BT709})
+                for (const arhost_yuv_range range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL}) {
                     const std::uint32_t step = has_chroma_pairs(pixel_format) ? 2 : 1;
                     for (std::uint32_t width = step; width <= 130; width += step) {
                         const Scene scene(layout(pixel_format, width, 4, matrix, range), random() % 4, random);
@@ -101,7 +104,7 @@ TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
 }
 
 TEST(Composite, IsEquation36) {
-    const arhost_frame_format format = layout(ARHOST_BGR8, 4, 1);
+    const arhost_frame_format format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4, 1);
     Bytes frame(format.byte_size);
     const std::uint8_t bgr[] = {10, 20, 30, 10, 20, 30, 10, 20, 30, 200, 100, 50};
     std::copy(std::begin(bgr), std::end(bgr), frame.begin());
@@ -117,7 +120,7 @@ TEST(Composite, IsEquation36) {
 
 TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
     std::mt19937 random(5);
-    const Scene scene(layout(ARHOST_BGR8, 67, 5), 1, random);
+    const Scene scene(layout(ARHOST_PIXEL_FORMAT_BGR8, 67, 5), 1, random);
     const Bytes none = scene.output(composite, ImageView{}, Region{0, 0, 67, 5});
     for (std::size_t y = 0; y < 5; ++y)
         EXPECT_EQ(std::memcmp(none.data() + scene.out_shift + y * scene.out_stride,
@@ -131,7 +134,7 @@ TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
 
 TEST(Composite, ClipsARegionThatReachesOutOfTheImage) {
     std::mt19937 random(6);
-    const Scene scene(layout(ARHOST_NV12, 66, 6), 3, random);
+    const Scene scene(layout(ARHOST_PIXEL_FORMAT_NV12, 66, 6), 3, random);
     const std::uint32_t most = 0xffffffffu;
     EXPECT_EQ(scene.output(composite, scene.overlay(), Region{7, 1, most, most}),
               scene.output(composite, scene.overlay(), Region{7, 1, 59, 5}));
@@ -164,7 +167,8 @@ TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
 TEST(Composite, ConvertsBt601AsOpenCvDoes) {
     std::mt19937 random(7);
     const int codes[] = {cv::COLOR_YUV2BGR_YUY2, cv::COLOR_YUV2BGR_NV12, cv::COLOR_YUV2BGR_I420};
-    const arhost_pixel_format formats[] = {ARHOST_YUYV, ARHOST_NV12, ARHOST_I420};
+    const arhost_pixel_format formats[] = {ARHOST_PIXEL_FORMAT_YUYV, ARHOST_PIXEL_FORMAT_NV12,
+                                           ARHOST_PIXEL_FORMAT_I420};
     for (int i = 0; i < 3; ++i) {
         constexpr int width = 128, height = 64; // strides without padding, as OpenCV's planar images
         const arhost_frame_format format = layout(formats[i], width, height);
@@ -175,11 +179,12 @@ TEST(Composite, ConvertsBt601AsOpenCvDoes) {
             frame.data() + format.offset[0], frame.data() + format.offset[1], frame.data() + format.offset[2]};
         cv::Mat ours(height, width, CV_8UC3), opencv, difference;
         composite(format, planes, {}, {}, {ours.data, ours.step});
-        if (formats[i] == ARHOST_I420) { // its chroma rows are padded to 64 bytes already: width/2 is 64
+        if (formats[i] == ARHOST_PIXEL_FORMAT_I420) { // its chroma rows are padded to 64 bytes already: width/2 is 64
             ASSERT_EQ(format.stride[1], width / 2);
         }
-        const cv::Mat yuv = formats[i] == ARHOST_YUYV ? cv::Mat(height, width, CV_8UC2, frame.data())
-                                                      : cv::Mat(height * 3 / 2, width, CV_8UC1, frame.data());
+        const cv::Mat yuv = formats[i] == ARHOST_PIXEL_FORMAT_YUYV
+                                ? cv::Mat(height, width, CV_8UC2, frame.data())
+                                : cv::Mat(height * 3 / 2, width, CV_8UC1, frame.data());
         cv::cvtColor(yuv, opencv, codes[i]);
         cv::absdiff(ours, opencv, difference);
         double greatest = 0;

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 using namespace arhost;
-using namespace arhost::ring;
+using namespace arhost::ipc;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -18,8 +18,8 @@ struct Probe : testing::Test {
     void SetUp() override { ::setenv("XDG_CACHE_HOME", scratch.path().c_str(), 1); }
 
     host::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
-                                std::chrono::seconds patience = std::chrono::seconds(60)) {
-        return host::list_devices(context(), file(plugin), {}, needs, patience);
+                                std::chrono::seconds timeout = std::chrono::seconds(60)) {
+        return host::list_devices(context(), file(plugin), {}, needs, timeout);
     }
     DeviceList list(const std::string &plugin, const std::vector<std::string> &needs = {}) {
         const host::DevicesResult result = devices(plugin, needs);
@@ -27,8 +27,8 @@ struct Probe : testing::Test {
             throw std::runtime_error(*reason);
         return std::get<std::optional<DeviceList>>(result).value();
     }
-    std::string reason(const std::string &plugin, std::chrono::seconds patience = std::chrono::seconds(60)) {
-        return std::get<std::string>(devices(plugin, {}, patience));
+    std::string reason(const std::string &plugin, std::chrono::seconds timeout = std::chrono::seconds(60)) {
+        return std::get<std::string>(devices(plugin, {}, timeout));
     }
     static std::filesystem::path file(const std::string &plugin) {
         return ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so";

@@ -87,7 +87,7 @@ arhost_marker spoilt(void (*spoil)(arhost_marker &)) {
 
 // A ball of 10 mm radius at the origin, seen from 200 mm in front of it.
 struct View {
-    explicit View(std::optional<arhost_role> role = ARHOST_VIRTUAL)
+    explicit View(std::optional<arhost_role> role = ARHOST_ROLE_VIRTUAL)
         : scene(scene_with(role)), pixels(640 * 480 * 4) {}
     static scene::Arena scene_with(std::optional<arhost_role> role) {
         scene::ArenaBuilder builder;
@@ -260,7 +260,7 @@ TEST(OverlayPromises, AreBrokenOutsideTheRegionAndOffTheObjects) {
 }
 
 TEST(OverlayPromises, KnowThatACatcherIsNoVirtualObject) {
-    View view(ARHOST_CATCHER);
+    View view(ARHOST_ROLE_CATCHER);
     view.set(330, 235, 255);
     EXPECT_THAT(view.broken(), HasSubstr("alpha is 255, but there is no virtual object"));
     View empty(std::nullopt);

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 using namespace arhost;
-using namespace arhost::ring;
+using namespace arhost::ipc;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
@@ -37,7 +37,7 @@ struct PlayedLoader final : supervise::Starter {
 struct SceneLoadingTest : testing::Test {
     // Why it fails where the loader says all this and ends.
     std::string reason_after(const std::vector<Json> &messages) {
-        config::FilesInUse files;
+        run_config::FilesInUse files;
         for (const char *name : {"a.mp4", "b.mp4"})
             files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
         std::string failure;

@@ -15,13 +15,13 @@ namespace arhost {
 namespace {
 
 arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width, std::uint32_t height,
-                           arhost_yuv_range range = ARHOST_LIMITED_RANGE) {
+                           arhost_yuv_range range = ARHOST_YUV_RANGE_LIMITED) {
     arhost_frame_format format{};
     format.struct_size = sizeof format;
     format.pixel_format = pixel_format;
     format.width = width;
     format.height = height;
-    format.yuv_matrix = ARHOST_BT601;
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601;
     format.yuv_range = range;
     EXPECT_TRUE(arhost_frame_layout(&format));
     return format;
@@ -42,8 +42,8 @@ template <class Fill> std::vector<std::uint8_t> filled(const arhost_frame_format
 
 TEST(Grey, IsTheReferencesForEveryFormatAndWidthAndLeavesThePaddingAlone) {
     test::on_each_instruction_set([] {
-        for (const auto pixel_format : {ARHOST_RGB8, ARHOST_BGR8, ARHOST_YUYV})
-            for (const auto range : {ARHOST_LIMITED_RANGE, ARHOST_FULL_RANGE})
+        for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_RGB8, ARHOST_PIXEL_FORMAT_BGR8, ARHOST_PIXEL_FORMAT_YUYV})
+            for (const auto range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL})
                 for (std::uint32_t width = 2; width <= 130; width += 2) {
                     const auto format = layout(pixel_format, width, 3, range);
                     ASSERT_EQ(filled(format, fill_grey), filled(format, fill_grey_reference))
@@ -53,7 +53,7 @@ TEST(Grey, IsTheReferencesForEveryFormatAndWidthAndLeavesThePaddingAlone) {
 }
 
 TEST(Grey, OfFormatsWithALumaPlaneIsThatPlaneUntouched) {
-    for (const auto pixel_format : {ARHOST_GREY8, ARHOST_NV12, ARHOST_I420}) {
+    for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_GREY8, ARHOST_PIXEL_FORMAT_NV12, ARHOST_PIXEL_FORMAT_I420}) {
         const auto format = layout(pixel_format, 66, 4);
         EXPECT_EQ(filled(format, fill_grey), filled(format, [](auto &&...) {}));
     }
@@ -61,7 +61,7 @@ TEST(Grey, OfFormatsWithALumaPlaneIsThatPlaneUntouched) {
 
 // Every colour there is: 65536 rows of 256.
 TEST(Grey, IsWithinOneOfOpenCvsForEveryColour) {
-    const auto format = layout(ARHOST_BGR8, 4096, 4096);
+    const auto format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4096, 4096);
     std::vector<std::uint8_t> bytes(format.byte_size);
     for (std::uint32_t colour = 0; colour < 1u << 24; ++colour) {
         std::uint8_t *pixel = &bytes[3 * std::size_t(colour)];
@@ -83,8 +83,8 @@ TEST(Grey, IsWithinOneOfOpenCvsForEveryColour) {
 }
 
 TEST(Grey, OfLimitedYuyvIsStretchedAndOfFullYuyvIsNot) {
-    for (const auto range : {ARHOST_LIMITED_RANGE, ARHOST_FULL_RANGE}) {
-        const auto format = layout(ARHOST_YUYV, 4, 1, range);
+    for (const auto range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL}) {
+        const auto format = layout(ARHOST_PIXEL_FORMAT_YUYV, 4, 1, range);
         std::vector<std::uint8_t> bytes(format.byte_size);
         const std::uint8_t row[] = {16, 7, 235, 7, 126, 7, 255, 7};
         std::copy(std::begin(row), std::end(row), bytes.begin());
@@ -92,8 +92,8 @@ TEST(Grey, OfLimitedYuyvIsStretchedAndOfFullYuyvIsNot) {
         fill_grey(format, planes, bytes.data() + format.grey_offset);
         const std::vector<std::uint8_t> grey(bytes.begin() + std::ptrdiff_t(format.grey_offset),
                                              bytes.begin() + std::ptrdiff_t(format.grey_offset) + 4);
-        EXPECT_EQ(grey, (range == ARHOST_LIMITED_RANGE ? std::vector<std::uint8_t>{0, 255, 128, 255}
-                                                       : std::vector<std::uint8_t>{16, 235, 126, 255}));
+        EXPECT_EQ(grey, (range == ARHOST_YUV_RANGE_LIMITED ? std::vector<std::uint8_t>{0, 255, 128, 255}
+                                                           : std::vector<std::uint8_t>{16, 235, 126, 255}));
     }
 }
 

@@ -62,7 +62,7 @@ std::vector<arhost_buffer *> buffers(Arena &a) {
 
 TEST(ArenaBuilder, WritesWhatItWasGiven) {
     ArenaBuilder builder = small_scene();
-    builder.settings = {ARHOST_Y_UP, 7, glm::vec3(0.1f, 0.2f, 0.3f), glm::vec3(0.4f), 0.5f, 0.25f};
+    builder.settings = {ARHOST_AXES_Y_UP, 7, glm::vec3(0.1f, 0.2f, 0.3f), glm::vec3(0.4f), 0.5f, 0.25f};
     EXPECT_EQ(builder.triangle_count(), 2u);
     EXPECT_EQ(builder.object_count(), 2u);
     const std::size_t size = builder.byte_size();
@@ -71,7 +71,7 @@ TEST(ArenaBuilder, WritesWhatItWasGiven) {
 
     const arhost_scene &scene = arena.scene();
     EXPECT_EQ(scene.byte_size, size);
-    EXPECT_EQ(scene.axes, ARHOST_Y_UP);
+    EXPECT_EQ(scene.axes, ARHOST_AXES_Y_UP);
     EXPECT_EQ(scene.max_depth, 7u);
     EXPECT_THAT(scene.ambient, testing::ElementsAre(0.1f, 0.2f, 0.3f));
     EXPECT_THAT(scene.background, testing::Each(0.4f));
@@ -91,7 +91,7 @@ TEST(ArenaBuilder, WritesWhatItWasGiven) {
     const char *names = elements<char>(arena, scene.names);
     EXPECT_STREQ(names + objects(arena)[0].name, "square");
     EXPECT_STREQ(names + objects(arena)[1].name, "ball");
-    EXPECT_EQ(objects(arena)[1].role, ARHOST_CATCHER);
+    EXPECT_EQ(objects(arena)[1].role, ARHOST_ROLE_CATCHER);
     EXPECT_THAT(objects(arena)[0].world_from_object, testing::ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0));
 }
 
@@ -130,7 +130,7 @@ TEST(ArenaBuilder, PutsTransformedObjectsIntoTheBounds) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
     const glm::mat4x3 moved(glm::vec3(2, 0, 0), glm::vec3(0, 2, 0), glm::vec3(0, 0, 2), glm::vec3(100, 0, 0));
-    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 5}}), material, ARHOST_VIRTUAL, moved);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 5}}), material, ARHOST_ROLE_VIRTUAL, moved);
     const Arena arena = std::move(builder).build();
     EXPECT_EQ(validate(arena.bytes()), "");
     EXPECT_THAT(arena.scene().bounds_min, testing::ElementsAre(90, -10, -10));
@@ -150,7 +150,7 @@ TEST(ArenaBuilder, PutsMovingObjectsWhereTheyAreAtTimeZero) {
     node.animated = true;
     builder.add_node(node);
     builder.add_channel({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 1}, {5, 0, 0, 0, 0, 0}});
-    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_VIRTUAL,
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, false, 0, ARHOST_NONE});
     Arena arena = std::move(builder).build();
     EXPECT_EQ(validate(arena.bytes()), "");
@@ -266,13 +266,13 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"LightType", [](Arena &a) { lights(a)[0].type = 6; }, "light 0: its type is of no known kind"},
         Corruption{"LightDirection",
                    [](Arena &a) {
-                       lights(a)[0].type = ARHOST_SPOT_LIGHT;
+                       lights(a)[0].type = ARHOST_LIGHT_SPOT;
                        lights(a)[0].direction[2] = 0.5f;
                    },
                    "its direction is not of length 1"},
         Corruption{"LightFallsOffFromInfinity",
                    [](Arena &a) {
-                       lights(a)[0].type = ARHOST_DIRECTIONAL_LIGHT;
+                       lights(a)[0].type = ARHOST_LIGHT_DIRECTIONAL;
                        lights(a)[0].falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
                    },
                    "can't fall off"},
@@ -292,7 +292,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"GeometryType", [](Arena &a) { geometries(a)[0].type = 3; },
                    "geometry 0 (object 0 'square'): its type is of no known kind"},
         Corruption{"GeometryReserved", [](Arena &a) { geometries(a)[0].reserved = 1; }, "reserved field"},
-        Corruption{"TrianglesAsSpheres", [](Arena &a) { geometries(a)[0].type = ARHOST_SPHERES; },
+        Corruption{"TrianglesAsSpheres", [](Arena &a) { geometries(a)[0].type = ARHOST_GEOMETRY_SPHERES; },
                    "stride of 12 bytes, not 16"},
         Corruption{"PositionsCount", [](Arena &a) { geometries(a)[0].positions.count = 100000; },
                    "the buffer of positions reaches past the end"},

@@ -171,7 +171,7 @@ TEST(Gltf, PutsStaticMeshesIntoTheWorld) {
     EXPECT_THAT(vertex(arena, 1), ElementsAre(102, 0, 10));
     EXPECT_EQ(at<glm::vec2>(arena, geometry(arena).texcoords)[2], glm::vec2(0, 1)) << "from the top, as the arena's";
     EXPECT_EQ(arena.scene().nodes.count, 0u);
-    EXPECT_EQ(material(arena, object(arena).material).model, ARHOST_METALLIC_ROUGHNESS);
+    EXPECT_EQ(material(arena, object(arena).material).model, ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("a.gltf: 1 triangles, 3 vertices, 2 x 2 x 0 mm")));
 }
 
@@ -187,8 +187,8 @@ TEST(Gltf, ReadsBinaryFiles) {
 
 TEST(Gltf, TakesAMaterialOfTheScene) {
     const Loaded loaded = load(triangle().text(), ", material: grey, role: occluder");
-    EXPECT_EQ(material(loaded.arena, object(loaded.arena).material).model, ARHOST_MIRROR);
-    EXPECT_EQ(object(loaded.arena).role, ARHOST_OCCLUDER);
+    EXPECT_EQ(material(loaded.arena, object(loaded.arena).material).model, ARHOST_MATERIAL_MIRROR);
+    EXPECT_EQ(object(loaded.arena).role, ARHOST_ROLE_OCCLUDER);
 }
 
 TEST(Gltf, ReadsStridesIndicesAndSparseAccessors) {

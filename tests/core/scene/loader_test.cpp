@@ -98,7 +98,7 @@ const std::string triangle_with_normals = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0.6 0
 
 TEST(SceneFile, HasDefaults) {
     const Arena arena = load(start + "objects: []\n");
-    EXPECT_EQ(arena.scene().axes, ARHOST_Z_UP);
+    EXPECT_EQ(arena.scene().axes, ARHOST_AXES_Z_UP);
     EXPECT_EQ(arena.scene().max_depth, 5u);
     EXPECT_THAT(arena.scene().ambient, testing::Each(0.2f));
     EXPECT_THAT(arena.scene().background, testing::Each(1.0f));
@@ -109,7 +109,7 @@ TEST(SceneFile, HasDefaults) {
 TEST(SceneFile, SetsTheScene) {
     const Arena arena = load("version: 1\naxes: y-up\nmax_depth: 9\nambient: [0.1, 0.2, 0.3]\nbackground: '#ff0000'\n"
                              "shadow_alpha: {opaque: 0.5, translucent: 0}\nmaterials: {}\nobjects: []\n");
-    EXPECT_EQ(arena.scene().axes, ARHOST_Y_UP);
+    EXPECT_EQ(arena.scene().axes, ARHOST_AXES_Y_UP);
     EXPECT_EQ(arena.scene().max_depth, 9u);
     EXPECT_THAT(arena.scene().ambient, ElementsAre(0.1f, 0.2f, 0.3f));
     EXPECT_THAT(arena.scene().background, ElementsAre(1, 0, 0));
@@ -138,11 +138,11 @@ TEST(SceneFile, DescribesMaterials) {
                              "  b: {model: mirror, reflectivity: [0.9, 0.8, 0.7]}\n"
                              "  c: {model: mirror}\n"
                              "objects: []\n");
-    EXPECT_EQ(material(arena, 0).model, ARHOST_SPECULAR);
+    EXPECT_EQ(material(arena, 0).model, ARHOST_MATERIAL_SPECULAR);
     EXPECT_THAT(material(arena, 0).specular, testing::Each(0.3f));
     EXPECT_EQ(material(arena, 0).exponent, 64);
     EXPECT_THAT(material(arena, 0).ambient, testing::Each(0.1f));
-    EXPECT_EQ(material(arena, 1).model, ARHOST_MIRROR);
+    EXPECT_EQ(material(arena, 1).model, ARHOST_MATERIAL_MIRROR);
     EXPECT_THAT(material(arena, 1).reflectivity, ElementsAre(0.9f, 0.8f, 0.7f));
     EXPECT_THAT(material(arena, 2).reflectivity, testing::Each(1.0f));
 }
@@ -157,7 +157,7 @@ TEST(SceneFile, DescribesGlass) {
              "    shadow_attenuation: [0.4, 0.7, 0.4], reflection_depth: 50, refraction_depth: 20,\n"
              "    importance_cutoff: 0.02, reflection: 0.5, refraction: 0.6}\n"
              "  thick: {model: glass, extinction: [0.1, 0, 2]}\nobjects: []\n");
-    EXPECT_EQ(material(arena, 1).model, ARHOST_GLASS);
+    EXPECT_EQ(material(arena, 1).model, ARHOST_MATERIAL_GLASS);
     const arhost_material &plain = material(arena, 0), &dragon = material(arena, 1);
     EXPECT_EQ(plain.index, 1.5f);
     EXPECT_FLOAT_EQ(plain.fresnel_minimum, 0.04f) << "((n − 1)/(n + 1))²";
@@ -182,10 +182,10 @@ TEST(SceneFile, DescribesMetalAndMetallicRoughness) {
              "  a: {model: metal, diffuse: [0.6, 0.9, 0.6], specular: 0.9, exponent: 256, reflectivity: [0.5, 0.6, "
              "0.5]}\n"
              "  b: {model: metallic-roughness, colour: '#ff0000', roughness: 0.3, emission: 12}\nobjects: []\n");
-    EXPECT_EQ(material(arena, 0).model, ARHOST_METAL);
+    EXPECT_EQ(material(arena, 0).model, ARHOST_MATERIAL_METAL);
     EXPECT_THAT(material(arena, 0).reflectivity, ElementsAre(0.5f, 0.6f, 0.5f));
     EXPECT_EQ(material(arena, 0).exponent, 256);
-    EXPECT_EQ(material(arena, 1).model, ARHOST_METALLIC_ROUGHNESS);
+    EXPECT_EQ(material(arena, 1).model, ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     EXPECT_THAT(material(arena, 1).diffuse, ElementsAre(1, 0, 0));
     EXPECT_EQ(material(arena, 1).metallic, 1);
     EXPECT_EQ(material(arena, 1).roughness, 0.3f);
@@ -201,7 +201,7 @@ TEST(SceneFile, DescribesLightsOfEveryType) {
                                      "intensity: 1}\n"
                                      "  - {type: sphere, position: [0, 0, 9], radius: 3, intensity: 1}\n"
                                      "objects: []\n");
-    EXPECT_EQ(light(arena, 0).type, ARHOST_DIRECTIONAL_LIGHT);
+    EXPECT_EQ(light(arena, 0).type, ARHOST_LIGHT_DIRECTIONAL);
     EXPECT_THAT(light(arena, 0).direction, ElementsAre(0, 0, -1));
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_outer, 0.5f);
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_inner, std::sqrt(0.75f));
@@ -220,7 +220,7 @@ TEST(SceneFile, DescribesLights) {
     const Arena arena = load(start + "lights:\n  - {position: [1, 2, 3], intensity: 0.8}\n"
                                      "  - {position: [0, 0, 9], intensity: [1e4, 2e4, 0], falloff: inverse-square}\n"
                                      "objects: []\n");
-    EXPECT_EQ(light(arena, 0).type, ARHOST_POINT_LIGHT);
+    EXPECT_EQ(light(arena, 0).type, ARHOST_LIGHT_POINT);
     EXPECT_EQ(light(arena, 0).falloff, ARHOST_FALLOFF_NONE);
     EXPECT_THAT(light(arena, 0).position, ElementsAre(1, 2, 3));
     EXPECT_THAT(light(arena, 0).intensity, testing::Each(0.8f));
@@ -235,9 +235,9 @@ TEST(SceneFile, GivesObjectsTheirNameRoleAndMaterial) {
                              "  - {cuboid: {size: 1}, material: b}\n");
     EXPECT_STREQ(name(arena, 0), "sphere 0");
     EXPECT_STREQ(name(arena, 1), "the “ball”");
-    EXPECT_EQ(object(arena, 0).role, ARHOST_CATCHER);
-    EXPECT_EQ(object(arena, 1).role, ARHOST_OCCLUDER);
-    EXPECT_EQ(object(arena, 2).role, ARHOST_VIRTUAL);
+    EXPECT_EQ(object(arena, 0).role, ARHOST_ROLE_CATCHER);
+    EXPECT_EQ(object(arena, 1).role, ARHOST_ROLE_OCCLUDER);
+    EXPECT_EQ(object(arena, 2).role, ARHOST_ROLE_VIRTUAL);
     EXPECT_EQ(object(arena, 0).material, 1u);
     EXPECT_EQ(object(arena, 1).material, 0u);
 }
@@ -245,7 +245,7 @@ TEST(SceneFile, GivesObjectsTheirNameRoleAndMaterial) {
 TEST(Shapes, CuboidsFaceOutwards) {
     for (const std::string transform : {"", ", transform: [{scale: [-1, 1, 2]}]"}) {
         const Arena arena = load_object("cuboid: {size: [2, 4, 6], centre: [1, 1, 1]}", transform);
-        EXPECT_EQ(geometry(arena).type, ARHOST_TRIANGLES);
+        EXPECT_EQ(geometry(arena).type, ARHOST_GEOMETRY_TRIANGLES);
         ASSERT_EQ(geometry(arena).indices.count, 12u);
         EXPECT_EQ(geometry(arena).normals.count, 0u);
         const glm::vec3 centre = transform.empty() ? glm::vec3(1, 1, 1) : glm::vec3(-1, 1, 2);
@@ -353,7 +353,7 @@ TEST(Transforms, ScaleASpheresRadius) {
                                     "{rotate: {axis: [1, 2, 3], degrees: -33}}, {translate: [0, 0, 7]}]");
     expect_near(glm::vec3(sphere(arena)), {-3, 0, 7});
     EXPECT_FLOAT_EQ(sphere(arena).w, 6);
-    EXPECT_EQ(geometry(arena).type, ARHOST_SPHERES);
+    EXPECT_EQ(geometry(arena).type, ARHOST_GEOMETRY_SPHERES);
 }
 
 TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {

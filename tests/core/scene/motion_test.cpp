@@ -26,7 +26,7 @@ Arena ball_with(Channel channel, float duration_s = 2) {
     node.animated = true;
     builder.add_node(node);
     builder.add_channel(std::move(channel));
-    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_VIRTUAL,
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, false, 0, ARHOST_NONE});
     Arena arena = std::move(builder).build();
     EXPECT_EQ(validate(arena.bytes()), "");
@@ -62,7 +62,7 @@ Arena bend(const std::vector<Channel> &channels, const glm::mat4x3 &root = glm::
     TriangleMesh mesh = bending_square();
     if (!morphs)
         mesh.morph_positions = mesh.morph_normals = {};
-    builder.add_object("bend", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_VIRTUAL,
+    builder.add_object("bend", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {false, true, morphs ? 3 : ARHOST_NONE, skin});
     Arena arena = std::move(builder).build();
     EXPECT_EQ(validate(arena.bytes()), "");
@@ -154,7 +154,7 @@ TEST(Motion, WhatCanNotBePlacedIsAPointWhateverCameBefore) {
     const std::uint32_t node = builder.add_node(child);
     builder.add_channel(
         {0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 1}, {-9e8f, 0, 0, 9e8f, 0, 0}});
-    builder.add_object("s", builder.add_triangles(square()), builder.add_material(grey()), ARHOST_VIRTUAL,
+    builder.add_object("s", builder.add_triangles(square()), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, false, node, ARHOST_NONE});
     const Arena arena = std::move(builder).build();
     MotionEvaluator fresh(arena.scene()), used(arena.scene());
@@ -175,8 +175,8 @@ TEST(Motion, MixesJointsByWeight) {
     mesh.joints.assign(4, {0, 1, 0, 0});
     mesh.weights.assign(4, {0.75f, 0.25f, 0, 0});
     const std::uint32_t skin = builder.add_skin({{0, 1}, {glm::mat4x3(1), glm::mat4x3(1)}});
-    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_VIRTUAL, glm::mat4x3(1),
-                       {false, true, ARHOST_NONE, skin});
+    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
+                       glm::mat4x3(1), {false, true, ARHOST_NONE, skin});
     const Arena arena = std::move(builder).build();
     ASSERT_EQ(validate(arena.bytes()), "");
     EXPECT_EQ(arena.scene().bounds_max[2], 7) << "5 and a quarter of 8";
@@ -221,8 +221,8 @@ TEST(Motion, MorphsWithoutASkinInTheObjectsOwnSpace) {
     TriangleMesh mesh = square();
     mesh.morph_positions.assign(4, {0, 0, 1});
     mesh.morph_normals.assign(4, {1, 0, 0});
-    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_VIRTUAL, glm::mat4x3(1),
-                       {true, true, 0, ARHOST_NONE});
+    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
+                       glm::mat4x3(1), {true, true, 0, ARHOST_NONE});
     const Arena arena = std::move(builder).build();
     ASSERT_EQ(validate(arena.bytes()), "");
     MotionEvaluator evaluator(arena.scene());
@@ -251,8 +251,8 @@ TEST(Motion, SkinsAHundredThousandVertices) {
         mesh.weights.emplace_back(0.25f);
     }
     mesh.triangles = {{0, 1, 300}};
-    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_VIRTUAL, glm::mat4x3(1),
-                       {false, true, ARHOST_NONE, builder.add_skin(skin)});
+    builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
+                       glm::mat4x3(1), {false, true, ARHOST_NONE, builder.add_skin(skin)});
     const Arena arena = std::move(builder).build();
     MotionEvaluator evaluator(arena.scene());
     double best_ms = 1e9;

@@ -11,14 +11,14 @@
 namespace arhost::scene::test {
 
 inline arhost_material grey() {
-    arhost_material material = make_material(ARHOST_DIFFUSE);
+    arhost_material material = make_material(ARHOST_MATERIAL_DIFFUSE);
     for (float &value : material.diffuse)
         value = 0.5f;
     return material;
 }
 
 inline arhost_light lamp() {
-    arhost_light light = make_light(ARHOST_POINT_LIGHT);
+    arhost_light light = make_light(ARHOST_LIGHT_POINT);
     light.position[2] = 300;
     return light;
 }
@@ -36,7 +36,7 @@ inline ArenaBuilder small_scene() {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
     builder.add_object("square", builder.add_triangles(square()), material);
-    builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), material, ARHOST_CATCHER);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), material, ARHOST_ROLE_CATCHER);
     builder.add_light(lamp());
     return builder;
 }
@@ -71,7 +71,7 @@ inline TriangleMesh bending_square() {
 inline ArenaBuilder full_scene() {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
-    arhost_material textured = make_material(ARHOST_METALLIC_ROUGHNESS);
+    arhost_material textured = make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     textured.colour_texture = builder.add_texture("wood.png", plain_texture(ARHOST_TEXEL_SRGB8, 2, 3));
     builder.environment.texture = builder.add_texture("sky.hdr", plain_texture(ARHOST_TEXEL_RGBA32F, 2, 2));
     builder.environment.rows = {0.5f, 1};
@@ -91,9 +91,9 @@ inline ArenaBuilder full_scene() {
     builder.add_channel({2, ARHOST_CHANNEL_MORPH_WEIGHTS, ARHOST_INTERPOLATION_CUBIC, {0, 2}, {0, 0, 0, 0, 1, 0}});
     const std::uint32_t skin = builder.add_skin({{0, 1}, {glm::mat4x3(1), glm::mat4x3(1)}});
     builder.add_object("square", builder.add_triangles(square()), material);
-    builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), plain, ARHOST_CATCHER, glm::mat4x3(1),
+    builder.add_object("ball", builder.add_spheres({{0, 0, 20, 7}}), plain, ARHOST_ROLE_CATCHER, glm::mat4x3(1),
                        {true, false, 0, ARHOST_NONE});
-    builder.add_object("bend", builder.add_triangles(bending_square()), plain, ARHOST_VIRTUAL, glm::mat4x3(1),
+    builder.add_object("bend", builder.add_triangles(bending_square()), plain, ARHOST_ROLE_VIRTUAL, glm::mat4x3(1),
                        {false, true, 2, skin});
     builder.add_light(lamp());
     return builder;

@@ -62,8 +62,8 @@ std::size_t check(const fs::path &file, std::size_t *warnings) {
     const Arena arena = load_scene(file, callbacks).build();
     EXPECT_EQ(validate(arena.bytes()), "");
     const arhost_scene &scene = arena.scene();
-    EXPECT_EQ(scene.axes, file.stem().string().starts_with("vkray") ? ARHOST_Y_UP : ARHOST_Z_UP);
-    EXPECT_NEAR(scene.bounds_min[scene.axes == ARHOST_Z_UP ? 2 : 1], 0, 1e-6)
+    EXPECT_EQ(scene.axes, file.stem().string().starts_with("vkray") ? ARHOST_AXES_Y_UP : ARHOST_AXES_Z_UP);
+    EXPECT_NEAR(scene.bounds_min[scene.axes == ARHOST_AXES_Z_UP ? 2 : 1], 0, 1e-6)
         << "the scene doesn't stand on the marker";
     EXPECT_EQ(scene.lights.count, 1u);
     std::size_t most = 0;

@@ -8,7 +8,7 @@
 #include <csignal>
 
 using namespace arhost::supervise;
-using namespace arhost::ring;
+using namespace arhost::ipc;
 using namespace std::chrono_literals;
 
 namespace {
@@ -47,7 +47,7 @@ struct Bench {
         hooks.running = [this] { events.push_back("running"); };
         hooks.result = [this](const Command &command, const Result &result) {
             events.push_back("result " + std::to_string(command.sequence) +
-                             (result.status == ARHOST_OK ? "" : " failed"));
+                             (result.status == ARHOST_STATUS_OK ? "" : " failed"));
         };
         hooks.lost = [this](const std::vector<Command> &unanswered) {
             events.push_back("lost " + std::to_string(unanswered.size()));

@@ -3,14 +3,14 @@
 // A real worker with a real plugin, spoken to by hand.
 #include "supervise/process.hpp"
 
+#include "ipc/json_abi.hpp"
 #include "plugin_under_test.hpp"
-#include "ring/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <gtest/gtest.h>
 
 using namespace arhost;
-using namespace arhost::ring;
+using namespace arhost::ipc;
 
 namespace {
 
@@ -71,7 +71,7 @@ TEST(Worker, GoesOnAfterDevicesThatCantBeListed) {
         worker.process.send({{"type", "devices"}});
         const Json failed = worker.next();
         EXPECT_EQ(failed["type"], "failed");
-        EXPECT_EQ(failed["status"], ARHOST_ERROR_UNSUPPORTED);
+        EXPECT_EQ(failed["status"], ARHOST_STATUS_ERROR_UNSUPPORTED);
         EXPECT_EQ(failed["text"], "the driver is of another age");
     }
 }

@@ -68,7 +68,7 @@ TEST(Texture, RepeatsClampsAndMirrors) {
 TEST(Texture, TimesTheEmissionGlowsInTheDark) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
-    arhost_material material = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(material.emission, 0.5f, 1, 1);
     material.emission_texture = builder.add_texture("two", texture_of(2, 1, {{255, 0, 0, 255}, {0, 255, 0, 255}}));
     scene::TriangleMesh mesh = square(60);
@@ -91,10 +91,10 @@ TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
         const auto mesh = builder.add_triangles(textured_square(60, 0));
         // The same mesh twice: one object has holes, the other has none.
         const glm::mat4x3 lower(1, 0, 0, 0, 1, 0, 0, 0, 1, instanced ? 30 : 0, 0, -50);
-        builder.add_object("holed", mesh, material, ARHOST_VIRTUAL,
+        builder.add_object("holed", mesh, material, ARHOST_ROLE_VIRTUAL,
                            instanced ? glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 0) : glm::mat4x3(1));
         if (instanced)
-            builder.add_object("whole", mesh, whole, ARHOST_VIRTUAL, lower);
+            builder.add_object("whole", mesh, whole, ARHOST_ROLE_VIRTUAL, lower);
         const Picture picture = Tracer(std::move(builder)).render(from_above());
         EXPECT_EQ(picture.alpha(70, 74), 255);
         EXPECT_EQ(picture.alpha(130, 74), instanced ? 255 : 0) << "the whole one lies behind the hole";
@@ -112,7 +112,7 @@ TEST(Holes, LetLightThrough) {
     const auto material = builder.add_material(half_a_hole(builder, 0.5f));
     builder.add_object("holed", builder.add_triangles(textured_square(60, 100)), material);
     builder.add_object("floor", builder.add_triangles(square(300)), builder.add_material(flat(1, 1, 1)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     const Picture picture = Tracer(std::move(builder)).render(camera({0, -40, 60}, {0, 0, 0}, {0, 1, 0}));
     EXPECT_EQ(picture.alpha(60, 60), 153) << "shadow of the solid half";
     EXPECT_EQ(picture.alpha(140, 60), 0) << "light through the hole";
@@ -123,7 +123,7 @@ TEST(Holes, OfACatcherTakeNoShadow) {
     builder.add_light(light(0, 0, 1000, 1));
     builder.add_object("roof", builder.add_triangles(square(20, 300)), builder.add_material(flat(1, 1, 1)));
     builder.add_object("floor", builder.add_triangles(textured_square(60, 0)),
-                       builder.add_material(half_a_hole(builder, 0.5f)), ARHOST_CATCHER);
+                       builder.add_material(half_a_hole(builder, 0.5f)), ARHOST_ROLE_CATCHER);
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     EXPECT_EQ(picture.alpha(90, 74), 153);
     EXPECT_EQ(picture.alpha(110, 74), 0);
@@ -166,10 +166,10 @@ struct Tilt {
 Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
-    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
     set3(sun.direction, -0.6f, 0, -0.8f);
     builder.add_light(sun);
-    arhost_material material = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(material.diffuse, 0.6f, 0.6f, 0.6f);
     material.metallic = 0;
     material.roughness = 0.7f;
@@ -193,7 +193,7 @@ Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
     if (turned) // a quarter about z, and flattened: tangents and normals go different ways
         place = glm::mat4x3(0, 2, 0, -2, 0, 0, 0, 0, 0.5f, 0, 0, 0);
     builder.add_object("square", builder.add_triangles(std::move(mesh)), builder.add_material(material),
-                       ARHOST_VIRTUAL, place);
+                       ARHOST_ROLE_VIRTUAL, place);
     return Tracer(std::move(builder)).render(from_above());
 }
 
@@ -257,7 +257,7 @@ TEST(Environment, CastsSoftShadowsOnCatchers) {
     ArenaBuilder builder;
     add_environment(builder, [](std::uint32_t) { return glm::vec3(1); });
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("ball", builder.add_spheres({{0, 0, 12, 12}}), builder.add_material(diffuse(1, 0, 0)));
     const Picture picture = Tracer(std::move(builder), {{"light_samples", "64"}}).render(from_the_side());
     int faint = 0;

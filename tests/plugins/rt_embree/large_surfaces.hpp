@@ -86,8 +86,8 @@ inline scene::ArenaBuilder scene_with(const LargeSurface &surface) {
     }
     glm::mat4x3 world_from_object(surface.grown == Grown::SCALED ? scale : 1.0f);
     world_from_object[3] = glm::vec3(away);
-    builder.add_object("surface", geometry, builder.add_material(diffuse(1, 1, 1)), ARHOST_VIRTUAL, world_from_object,
-                       motion);
+    builder.add_object("surface", geometry, builder.add_material(diffuse(1, 1, 1)), ARHOST_ROLE_VIRTUAL,
+                       world_from_object, motion);
     const glm::dvec3 lamp = axes * glm::dvec3(200, 60, 300);
     builder.add_light(light(static_cast<float>(lamp.x), static_cast<float>(lamp.y), static_cast<float>(lamp.z), 1));
     return builder;
@@ -125,12 +125,12 @@ inline arhost_camera camera_over_plate() {
 inline int pixels_out_of_light(const LargeSurface &surface, const std::string &plugin, const Options &options = {}) {
     Tracer tracer(scene_with(surface), options, plugin);
     const arhost_camera camera = camera_at_surface();
-    EXPECT_EQ(tracer.start(camera.intrinsics), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(camera.intrinsics), ARHOST_STATUS_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(camera.intrinsics);
     for (const double time_s : {0, 1}) {
         const arhost_motion motion = evaluator.at(time_s);
-        EXPECT_EQ(tracer.try_render(camera, picture, &motion), ARHOST_OK) << tracer.plugin().log();
+        EXPECT_EQ(tracer.try_render(camera, picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
     }
     int out_of_light = 0;
     for (const Pixel &pixel : picture.pixels())

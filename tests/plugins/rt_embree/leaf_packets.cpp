@@ -10,12 +10,12 @@ namespace {
 #include "leaf_calls.inl"
 }
 
-void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]) {
-    Float from[most_arguments], to[most_results]{};
-    for (int i = 0; i < most_arguments; ++i)
+void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]) {
+    Float from[max_arguments], to[max_results]{};
+    for (int i = 0; i < max_arguments; ++i)
         from[i] = load(arguments[i].lane);
     leaf_functions[number].call(from, to);
-    for (int i = 0; i < most_results; ++i)
+    for (int i = 0; i < max_results; ++i)
         store(results[i].lane, to[i]);
 }
 

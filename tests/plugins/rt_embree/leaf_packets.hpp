@@ -5,22 +5,22 @@
 
 namespace rt_embree {
 
-constexpr int packet_lanes = 16, most_arguments = 16, most_results = 3;
+constexpr int packet_lanes = 16, max_arguments = 16, max_results = 3;
 struct alignas(64) Packet {
     float lane[packet_lanes];
 };
 
 // Calls the function of this place in leaf_calls.inl.
-using CallLeaf = void (*)(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+using CallLeaf = void (*)(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 
 namespace base {
-void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 }
 namespace avx2 {
-void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 }
 namespace avx512 {
-void call_leaf(int number, const Packet (&arguments)[most_arguments], Packet (&results)[most_results]);
+void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 }
 
 } // namespace rt_embree

@@ -50,10 +50,10 @@ std::vector<InstructionSet> instruction_sets() {
 class LeafPackets : public testing::TestWithParam<InstructionSet> {};
 
 // Numbers between 0 and 1, vectors of length 1.
-void fill(Packet (&arguments)[most_arguments], unsigned vectors, std::mt19937 &random) {
+void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &random) {
     std::uniform_real_distribution<float> number(0.05f, 0.95f);
     for (int lane = 0; lane < packet_lanes; ++lane)
-        for (int i = 0; i < most_arguments; ++i) {
+        for (int i = 0; i < max_arguments; ++i) {
             if (!(vectors >> i & 1)) {
                 arguments[i].lane[lane] = number(random);
                 continue;
@@ -75,18 +75,18 @@ TEST_P(LeafPackets, GiveTheScalarsResults) {
     std::mt19937 random(1);
     for (int number = 0; number < static_cast<int>(std::size(leaf_functions)); ++number)
         for (int round = 0; round < 100; ++round) {
-            Packet arguments[most_arguments], results[most_results];
+            Packet arguments[max_arguments], results[max_results];
             fill(arguments, leaf_functions[number].vectors, random);
             GetParam().call(number, arguments, results);
             for (int lane = 0; lane < packet_lanes; ++lane) {
-                double from[most_arguments], to[most_results]{};
-                for (int i = 0; i < most_arguments; ++i)
+                double from[max_arguments], to[max_results]{};
+                for (int i = 0; i < max_arguments; ++i)
                     from[i] = arguments[i].lane[lane];
                 leaf_functions[number].call(from, to);
                 const double size = std::hypot(to[0], to[1], to[2]);
                 // Nothing is subtracted in it, and it is far below 1.
                 const double whole = leaf_functions[number].name == std::string_view("offset_from_surface") ? 0 : 1;
-                for (int i = 0; i < most_results; ++i)
+                for (int i = 0; i < max_results; ++i)
                     ASSERT_NEAR(results[i].lane[lane], to[i], tolerance * (whole + size))
                         << leaf_functions[number].name;
             }

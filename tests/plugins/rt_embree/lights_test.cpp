@@ -40,7 +40,7 @@ arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity)
 std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("ball", builder.add_spheres({{0, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
     builder.add_light(lamp);
     return Tracer(std::move(builder), {{"light_samples", "64"}}).render(from_the_side()).alphas();
@@ -49,19 +49,19 @@ std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
 } // namespace
 
 TEST(DirectionalLight, IsTheSameEverywhere) {
-    arhost_light sun = placed(ARHOST_DIRECTIONAL_LIGHT, {0, 0, 0}, 0.8f);
+    arhost_light sun = placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 0.8f);
     set3(sun.direction, 0.6f, 0, -0.8f);
     expect_irradiance(over_a_plane(sun), [](glm::dvec3) { return 0.8 * 0.8; });
 }
 
 TEST(DirectionalLight, CastsShadowsOfOneSize) {
-    const auto near = shadow_of_a_ball(placed(ARHOST_DIRECTIONAL_LIGHT, {0, 0, 0}, 1));
+    const auto near = shadow_of_a_ball(placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 1));
     EXPECT_EQ(near.size(), 3u);
     EXPECT_GT(near.at(153), 100);
 }
 
 TEST(SpotLight, ShinesInItsConeOnly) {
-    arhost_light spot = placed(ARHOST_SPOT_LIGHT, {30, -20, 90}, 5000);
+    arhost_light spot = placed(ARHOST_LIGHT_SPOT, {30, -20, 90}, 5000);
     spot.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
     const glm::dvec3 axis = glm::normalize(glm::dvec3(-0.3, 0.2, -0.9));
     set3(spot.direction, static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z));
@@ -79,7 +79,7 @@ TEST(SpotLight, ShinesInItsConeOnly) {
 }
 
 TEST(RectangleLight, IsTheMeanOverItsPoints) {
-    arhost_light panel = placed(ARHOST_RECTANGLE_LIGHT, {10, 0, 80}, 4000);
+    arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
     panel.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
     set3(panel.axis_u, 40, 0, 0);
     set3(panel.axis_v, 0, 25, 0);
@@ -99,13 +99,13 @@ TEST(RectangleLight, IsTheMeanOverItsPoints) {
 }
 
 TEST(RectangleLight, ShinesToOneSide) {
-    arhost_light panel = placed(ARHOST_RECTANGLE_LIGHT, {10, 0, 80}, 4000);
+    arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
     set3(panel.direction, 0, 0, 1);
     expect_irradiance(over_a_plane(panel), [](glm::dvec3) { return 0; });
 }
 
 TEST(SphereLight, OfNoSizeIsAPointLight) {
-    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {30, -20, 90}, 0.7f);
+    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {30, -20, 90}, 0.7f);
     bulb.radius = 1e-3f;
     expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {
         const glm::dvec3 way = glm::dvec3(30, -20, 90) - p;
@@ -114,7 +114,7 @@ TEST(SphereLight, OfNoSizeIsAPointLight) {
 }
 
 TEST(SphereLight, CastsSoftShadowsWithAFullCoreAndNoOthersThanThat) {
-    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {0, -20, 200}, 1);
+    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 20;
     const auto alphas = shadow_of_a_ball(bulb);
     EXPECT_GT(alphas.at(153), 50);
@@ -127,7 +127,7 @@ TEST(SphereLight, CastsSoftShadowsWithAFullCoreAndNoOthersThanThat) {
 }
 
 TEST(ExtendedLights, AreTheSameOnEachRunAndThreadCount) {
-    arhost_light bulb = placed(ARHOST_SPHERE_LIGHT, {0, -20, 200}, 1);
+    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 30;
     const auto pixels = [&](const char *threads) { return over_a_plane(bulb, {{"threads", threads}}).pixels(); };
     EXPECT_EQ(pixels("1"), pixels("3"));

@@ -20,7 +20,7 @@ namespace {
 using scene::ArenaBuilder;
 
 arhost_material clear_glass(float index = 1.5f) {
-    arhost_material glass = scene::make_material(ARHOST_GLASS);
+    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
     glass.index = index;
     glass.importance_cutoff = 0;
     return glass;
@@ -62,7 +62,7 @@ std::optional<double> cosine_on_ball(int x, int y) {
 } // namespace
 
 TEST(Metal, ReflectsBySchlicksTerm) {
-    arhost_material metal = scene::make_material(ARHOST_METAL);
+    arhost_material metal = scene::make_material(ARHOST_MATERIAL_METAL);
     set3(metal.reflectivity, 0.5f, 0.3f, 0.1f);
     ArenaBuilder builder = in_a_room_of_light(0.6f);
     add_ball(builder, metal);
@@ -237,7 +237,7 @@ TEST(Glass, TheChosenPathsMeanIsTheTree) {
 TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("glass", builder.add_spheres({{-20, 0, 25, 12}}), builder.add_material(clear_glass()));
     builder.add_object("ball", builder.add_spheres({{20, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
     builder.add_object("over both", builder.add_triangles(box({-40, -3, 60}, {40, 3, 62})),
@@ -253,7 +253,7 @@ TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
     const auto under_glass = [] {
         ArenaBuilder builder;
         builder.add_object("floor", builder.add_triangles(square(400)),
-                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_CATCHER);
+                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_ROLE_CATCHER);
         builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
                            builder.add_material(clear_glass()));
         builder.add_light(light(0, -20, 500, 1));
@@ -261,10 +261,10 @@ TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
     };
     for (const char *samples : {"1", "2", "8", "11", "12", "13", "64"}) {
         Tracer tracer(under_glass(), {{"samples", samples}, {"accumulate", "true"}});
-        ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+        ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
         for (int frame = 0; frame < 5; ++frame) {
             Picture picture(pinhole());
-            ASSERT_EQ(tracer.try_render(from_above(), picture), ARHOST_OK);
+            ASSERT_EQ(tracer.try_render(from_above(), picture), ARHOST_STATUS_OK);
             EXPECT_EQ(picture.alphas(), (std::map<int, int>{{77, 200 * 150}})) << samples << ", frame " << frame;
         }
     }
@@ -273,7 +273,7 @@ TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
 TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
                        builder.add_material(clear_glass()));
     for (const float x : {-70.0f, 13.0f, 90.0f})
@@ -289,7 +289,7 @@ TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
         arhost_material glass = clear_glass();
         set3(glass.shadow_attenuation, 0.4f, 0.8f, 0.4f);
         builder.add_object("floor", builder.add_triangles(square(80)),
-                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_CATCHER);
+                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_ROLE_CATCHER);
         builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})),
                            builder.add_material(glass));
         builder.add_light(light(0, 150, 300, 1));
@@ -309,7 +309,7 @@ TEST(Glass, ItsShadowTintsTheLightOnObjects) {
     set3(glass.shadow_attenuation, 0.5f, 0.8f, 0.2f);
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)));
     builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
-    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
     builder.add_light(sun);
     const Pixel pixel = Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
     for (int i = 0; i < 3; ++i)
@@ -318,7 +318,7 @@ TEST(Glass, ItsShadowTintsTheLightOnObjects) {
 
 TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
     for (const float roughness : {0.0f, 0.3f, 0.6f, 1.0f}) {
-        arhost_material metal = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+        arhost_material metal = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
         set3(metal.diffuse, 1, 1, 1);
         metal.roughness = roughness;
         ArenaBuilder builder = in_a_room_of_light(0.5f);
@@ -342,7 +342,7 @@ TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
 }
 
 TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
-    arhost_material plastic = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
     plastic.metallic = 0.25f;
     plastic.roughness = 0.5f;

@@ -22,7 +22,7 @@ ArenaBuilder with_floor_and_light() {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.3f);
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_light(light(60, -20, 200, 0.7f));
     return builder;
 }
@@ -46,13 +46,13 @@ scene::TriangleMesh sheet(float height, unsigned n = 40) {
 
 Picture at_time(ArenaBuilder builder, double time_s, const arhost_camera &view = from_the_side()) {
     Tracer tracer(std::move(builder));
-    EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_OK);
+    EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(view.intrinsics);
     for (const double t : {0.0, 0.9, time_s}) { // not straight from the start
         const arhost_motion motion = evaluator.at(t);
         picture = Picture(view.intrinsics);
-        EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_STATUS_OK);
     }
     return picture;
 }
@@ -75,7 +75,7 @@ ArenaBuilder under_the_sun() {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     builder.settings.duration_s = 2;
-    arhost_light sun = scene::make_light(ARHOST_DIRECTIONAL_LIGHT);
+    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
     set3(sun.direction, 0, 0, -1);
     set3(sun.intensity, 1, 1, 1);
     builder.add_light(sun);
@@ -105,7 +105,7 @@ TEST(Moving, CatchersCatchWhereverTheyLie) {
         scene::TriangleMesh shelf = square(15);
         for (glm::vec3 &p : shelf.positions)
             p += glm::vec3(30, 10, raised);
-        builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_CATCHER,
+        builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_ROLE_CATCHER,
                            place, moves ? Motion{.moves = true, .node = node} : Motion{});
         // So many triangles that the catchers' tree is worth it.
         builder.add_object("sheet", builder.add_triangles(sheet(10)), builder.add_material(shiny(0.5f, 0.4f, 30)));
@@ -127,7 +127,7 @@ TEST(Moving, AnObjectIsWhereItsNodeIs) {
     const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
     moving.add_channel({.node = node, .times = {0, 1}, .values = {-40, 0, 0, 40, 20, 0}});
     moving.add_object("box", moving.add_triangles(cube(10)), moving.add_material(shiny(0.5f, 0.4f, 30)),
-                      ARHOST_VIRTUAL, glm::mat4x3(1), {.moves = true, .node = node});
+                      ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.moves = true, .node = node});
     ArenaBuilder still = with_floor_and_light();
     scene::TriangleMesh box = cube(10);
     for (glm::vec3 &p : box.positions)
@@ -146,7 +146,7 @@ TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
     for (std::size_t i = 0; i < mesh.positions.size(); ++i)
         mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
     deforming.add_object("sheet", deforming.add_triangles(mesh), deforming.add_material(diffuse(0.2f, 0.4f, 0.8f)),
-                         ARHOST_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
+                         ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
     ArenaBuilder still = with_floor_and_light();
     still.add_object("sheet", still.add_triangles(sheet(8)), still.add_material(diffuse(0.2f, 0.4f, 0.8f)));
     expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
@@ -166,7 +166,7 @@ TEST(Moving, ASkinTurnsItsNormals) {
         mesh.joints.assign(4, glm::u16vec4(0));
         mesh.weights.assign(4, glm::vec4(1, 0, 0, 0));
         const std::uint32_t skin = builder.add_skin({{joint}, {glm::mat4x3(1)}});
-        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_VIRTUAL,
+        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_ROLE_VIRTUAL,
                            glm::mat4x3(1), {.deforms = true, .skin = skin});
         return builder;
     };
@@ -187,7 +187,7 @@ TEST(Moving, AMorphTargetLeansItsNormals) {
         scene::TriangleMesh mesh = square_with_normals();
         mesh.morph_positions.assign(4, glm::vec3(0));
         mesh.morph_normals.assign(4, {0, 2 * std::tan(glm::radians(60.0f)), 0});
-        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_VIRTUAL,
+        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_ROLE_VIRTUAL,
                            glm::mat4x3(1), {.deforms = true, .node = node});
         return builder;
     };
@@ -221,7 +221,7 @@ TEST(Moving, AMeshMayMoveAndDeform) {
         there.positions[i].x += 20;
     }
     const arhost_material blue = diffuse(0.2f, 0.4f, 0.8f);
-    both.add_object("sheet", both.add_triangles(mesh), both.add_material(blue), ARHOST_VIRTUAL, glm::mat4x3(1),
+    both.add_object("sheet", both.add_triangles(mesh), both.add_material(blue), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1),
                     {.moves = true, .deforms = true, .node = node});
     ArenaBuilder still = with_floor_and_light();
     still.add_object("sheet", still.add_triangles(there), still.add_material(blue));
@@ -240,8 +240,8 @@ TEST(Moving, AMeshIsSeenWhereItsShapeGoes) {
         there.positions[i].x += right;
     }
     mesh.morph_positions.assign(mesh.positions.size(), {2 * (right - left), 0, 0});
-    deforming.add_object("square", deforming.add_triangles(mesh), deforming.add_material(white()), ARHOST_VIRTUAL,
-                         glm::mat4x3(1), {.deforms = true, .node = node});
+    deforming.add_object("square", deforming.add_triangles(mesh), deforming.add_material(white()),
+                         ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
     still.add_object("square", still.add_triangles(there), still.add_material(white()));
     expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
 }
@@ -273,7 +273,7 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
     const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
     builder.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
     mesh.morph_positions.resize(mesh.positions.size());
-    builder.add_object("sheet", builder.add_triangles(mesh), builder.add_material(flat(1, 1, 1)), ARHOST_VIRTUAL,
+    builder.add_object("sheet", builder.add_triangles(mesh), builder.add_material(flat(1, 1, 1)), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {.deforms = true, .node = node});
     const scene::Arena arena = std::move(builder).build();
     const arhost_host host = {sizeof host,

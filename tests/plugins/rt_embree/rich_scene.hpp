@@ -80,19 +80,19 @@ inline ArenaBuilder rich_scene() {
     add_environment(builder, [](std::uint32_t column) {
         return glm::vec3(0.1f * static_cast<float>(column), 0.3f, 0.8f - 0.1f * static_cast<float>(column));
     });
-    arhost_light bulb = scene::make_light(ARHOST_SPHERE_LIGHT);
+    arhost_light bulb = scene::make_light(ARHOST_LIGHT_SPHERE);
     set3(bulb.position, -60, -20, 200);
     set3(bulb.intensity, 0.6f, 0.5f, 0.4f);
     bulb.radius = 30;
     builder.add_light(bulb);
     builder.add_object("desk", builder.add_triangles(square(90)), builder.add_material(flat(0.7f, 0.6f, 0.5f)),
-                       ARHOST_CATCHER);
-    arhost_material glass = scene::make_material(ARHOST_GLASS);
+                       ARHOST_ROLE_CATCHER);
+    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
     glass.index = 1.5f;
     set3(glass.extinction, 0.02f, 0.005f, 0.01f);
     set3(glass.shadow_attenuation, 0.4f, 0.7f, 0.4f);
     builder.add_object("glass", builder.add_spheres({{-25, 0, 25, 20}}), builder.add_material(glass));
-    arhost_material rough = scene::make_material(ARHOST_METALLIC_ROUGHNESS);
+    arhost_material rough = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(rough.diffuse, 0.9f, 0.7f, 0.4f);
     rough.metallic = 0.8f;
     rough.roughness = 0.35f;
@@ -101,7 +101,8 @@ inline ArenaBuilder rich_scene() {
         texture_of(2, 2, {{128, 128, 255, 255}, {160, 128, 250, 255}, {128, 160, 250, 255}, {100, 110, 240, 255}}));
     scene::TriangleMesh sheet = textured_square(25, 0);
     const glm::mat4x3 upright(1, 0, 0, 0, 0.3f, 1, 0, -1, 0.3f, 30, 20, 26);
-    builder.add_object("rough", builder.add_triangles(sheet), builder.add_material(rough), ARHOST_VIRTUAL, upright);
+    builder.add_object("rough", builder.add_triangles(sheet), builder.add_material(rough), ARHOST_ROLE_VIRTUAL,
+                       upright);
     builder.add_object("holed", builder.add_triangles(textured_square(15, 60)),
                        builder.add_material(half_a_hole(builder, 0.5f)));
     return builder;

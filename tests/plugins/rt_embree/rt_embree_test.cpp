@@ -131,7 +131,7 @@ TEST(Silhouette, ASphereBehindAFisheyeCameraIsSeen) {
 
 // ---- Alpha classes ---------------------------------------------------------------------------------
 
-ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_CATCHER) {
+ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_ROLE_CATCHER) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.3f);
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
@@ -179,7 +179,7 @@ TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
     for (auto &triangle : room.triangles)
         std::swap(triangle[1], triangle[2]);
     builder.add_object("room", builder.add_triangles(room), builder.add_material(flat(0.5f, 0.25f, 0)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 30}}), builder.add_material(mirror(1)));
     Tracer tracer(std::move(builder));
     for (const double distance : {350.0, 90.0}) { // outside, inside
@@ -200,8 +200,8 @@ TEST(Alpha, OfShadowsIsTheScenes) {
     builder.settings.shadow_alpha_opaque = 0.8f;
     builder.settings.shadow_alpha_translucent = 0.1f;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(flat(1, 1, 1)),
-                       ARHOST_CATCHER);
-    arhost_material glass = scene::make_material(ARHOST_GLASS);
+                       ARHOST_ROLE_CATCHER);
+    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
     glass.index = 1.5f;
     builder.add_object("glass", builder.add_spheres({{-20, 0, 25, 12}}), builder.add_material(glass));
     builder.add_object("ball", builder.add_spheres({{20, 0, 25, 12}}), builder.add_material(flat(1, 0, 0)));
@@ -219,7 +219,7 @@ TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
     const double with_top_only = Tracer(std::move(builder)).render(from_the_side()).alphas().at(153);
     builder = sphere_over_catcher();
     builder.add_object("lower floor", builder.add_triangles(square(300, -60)), builder.add_material(diffuse(1, 1, 1)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     EXPECT_EQ(Tracer(std::move(builder)).render(from_the_side()).alphas().at(153), with_top_only);
 }
 
@@ -254,7 +254,7 @@ TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
 TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
-                       ARHOST_CATCHER);
+                       ARHOST_ROLE_CATCHER);
     builder.add_object("ball", builder.add_spheres({{0, 0, -40, 20}}), builder.add_material(diffuse(1, 0, 0)));
     builder.add_light(light(0, 0, -200, 1));
     const auto counts = Tracer(std::move(builder)).render(from_the_side()).alphas();
@@ -269,7 +269,7 @@ TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
         "screen",
         builder.add_triangles(
             {{{-50, -140, 0}, {0, -140, 0}, {0, -140, 200}, {-50, -140, 200}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}}),
-        builder.add_material(diffuse(1, 1, 1)), ARHOST_OCCLUDER);
+        builder.add_material(diffuse(1, 1, 1)), ARHOST_ROLE_OCCLUDER);
     const Picture with = Tracer(std::move(builder)).render(view);
     const Picture without = Tracer(sphere_over_catcher()).render(view);
     int hidden = 0;
@@ -288,7 +288,7 @@ TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
 TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
     ArenaBuilder builder = one_sphere({0, 0, 200, 40});
     builder.add_object("wall", builder.add_triangles(square(500, 300)), builder.add_material(flat(1, 1, 1)),
-                       ARHOST_OCCLUDER);
+                       ARHOST_ROLE_OCCLUDER);
     EXPECT_EQ(Tracer(std::move(builder)).render(opencv_axes(pinhole())).pixels(),
               Tracer(one_sphere({0, 0, 200, 40})).render(opencv_axes(pinhole())).pixels());
 }
@@ -342,7 +342,7 @@ TEST(Light, ASpecularPlaneAddsPhongsLobe) {
 }
 
 TEST(Light, CatchersAndOccludersDarkenObjectsBehindThem) {
-    for (const arhost_role role : {ARHOST_CATCHER, ARHOST_OCCLUDER}) {
+    for (const arhost_role role : {ARHOST_ROLE_CATCHER, ARHOST_ROLE_OCCLUDER}) {
         ArenaBuilder builder = one_sphere({0, 0, 20, 20}, diffuse(0.5f, 0.5f, 0.5f));
         builder.settings.ambient = glm::vec3(0.2f);
         builder.add_light(light(0, 0, 300, 0.8f));
@@ -361,7 +361,8 @@ TEST(Light, SurfacesDoNotShadowThemselves) {
     // Far from the origin, where floats are coarse, and light that grazes.
     ArenaBuilder builder;
     builder.add_object("plane", builder.add_triangles(square(2000)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_VIRTUAL, glm::mat4x3(glm::translate(glm::mat4(1), glm::vec3(30000, -20000, 10000))));
+                       ARHOST_ROLE_VIRTUAL,
+                       glm::mat4x3(glm::translate(glm::mat4(1), glm::vec3(30000, -20000, 10000))));
     builder.add_light(light(31000, -20000, 10100, 1));
     const Picture picture =
         Tracer(std::move(builder)).render(camera({30000, -20000, 10200}, {30000, -20000, 10000}, {0, 1, 0}));
@@ -496,10 +497,10 @@ double over(const Pixel &pixel, int channel, double background) {
 TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
     Tracer tracer(one_sphere({10, 5, 200, 40}), {{"samples", "4"}});
     const arhost_camera view = opencv_axes(pinhole());
-    ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_OK);
+    ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
     const auto render = [&] {
         Picture picture(view.intrinsics);
-        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK);
         return picture.pixels();
     };
     const auto first = render();
@@ -510,7 +511,7 @@ TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
 TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
     const auto scene = [] {
         ArenaBuilder builder = sphere_over_catcher();
-        arhost_light bulb = arhost::scene::make_light(ARHOST_SPHERE_LIGHT);
+        arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
         set3(bulb.position, -60, -20, 200);
         bulb.radius = 40;
         builder.add_light(bulb);
@@ -518,10 +519,10 @@ TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
     };
     Tracer tracer(scene(), {{"accumulate", "true"}});
     const arhost_camera still = from_the_side(), other = camera({0, -150, 112}, {0, 0, 0}, {0, 0, 1});
-    ASSERT_EQ(tracer.start(still.intrinsics), ARHOST_OK);
+    ASSERT_EQ(tracer.start(still.intrinsics), ARHOST_STATUS_OK);
     const auto render = [&](const arhost_camera &view) {
         Picture picture(view.intrinsics);
-        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK);
         return picture.pixels();
     };
     const auto first = render(still);
@@ -543,7 +544,7 @@ TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
 
 TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
     ArenaBuilder builder = sphere_over_catcher();
-    arhost_light bulb = arhost::scene::make_light(ARHOST_SPHERE_LIGHT);
+    arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
     set3(bulb.position, -60, -20, 200);
     bulb.radius = 40;
     builder.add_light(bulb);
@@ -553,11 +554,11 @@ TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
     tiny.width = tiny.height = 8;
     tiny.cx = tiny.cy = 3.5;
     const arhost_camera still = from_the_side(tiny);
-    ASSERT_EQ(tracer.start(tiny), ARHOST_OK);
+    ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK);
     const auto after = [&](int frames) {
         Picture picture(tiny);
         for (int i = 0; i < frames; ++i)
-            EXPECT_EQ(tracer.try_render(still, picture), ARHOST_OK);
+            EXPECT_EQ(tracer.try_render(still, picture), ARHOST_STATUS_OK);
         return picture.pixels();
     };
     const auto first = after(1), enough = after(65536 / 64 - 1);
@@ -604,12 +605,12 @@ ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     const std::uint32_t grey = builder.add_material(diffuse(0.7f, 0.7f, 0.7f));
     const std::uint32_t glossy = builder.add_material(shiny(0.4f, 0.7f, 40));
     const std::uint32_t glass = builder.add_material(mirror(0.9f));
-    builder.add_object("floor", builder.add_triangles(square(100)), grey, ARHOST_CATCHER,
+    builder.add_object("floor", builder.add_triangles(square(100)), grey, ARHOST_ROLE_CATCHER,
                        place({0, 0, 0}, 0, {1, 1, 1}));
-    builder.add_object("box", box, glossy, ARHOST_VIRTUAL, place({-30, 10, 20}, 30, {12, 15, 20}));
-    builder.add_object("ball", ball, glass, ARHOST_VIRTUAL, place({20, 0, 22}, 0, {20, 20, 20}));
-    builder.add_object("egg", ball, grey, ARHOST_VIRTUAL, place({10, -45, 12}, 50, {6, 9, 12}));
-    builder.add_object("post", box, grey, ARHOST_OCCLUDER, place({60, -20, 30}, 10, {4, 4, 30}));
+    builder.add_object("box", box, glossy, ARHOST_ROLE_VIRTUAL, place({-30, 10, 20}, 30, {12, 15, 20}));
+    builder.add_object("ball", ball, glass, ARHOST_ROLE_VIRTUAL, place({20, 0, 22}, 0, {20, 20, 20}));
+    builder.add_object("egg", ball, grey, ARHOST_ROLE_VIRTUAL, place({10, -45, 12}, 50, {6, 9, 12}));
+    builder.add_object("post", box, grey, ARHOST_ROLE_OCCLUDER, place({60, -20, 30}, 10, {4, 4, 30}));
     const glm::vec4 at = moved * glm::vec4(40, -80, 160, 1);
     builder.add_light(light(at.x, at.y, at.z, 0.8f));
     return builder;
@@ -633,7 +634,7 @@ TEST(Sameness, AgainAndAgainTheSameBytes) {
     const auto first = tracer.render(from_the_side()).pixels();
     Picture again(pinhole());
     for (int i = 0; i < 20; ++i) {
-        ASSERT_EQ(tracer.try_render(from_the_side(), again), ARHOST_OK);
+        ASSERT_EQ(tracer.try_render(from_the_side(), again), ARHOST_STATUS_OK);
         ASSERT_EQ(again.pixels(), first);
     }
 }
@@ -700,7 +701,7 @@ TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
                 mesh.normals[i] = glm::normalize(glm::transpose(glm::inverse(glm::mat3(m))) * mesh.normals[i]);
             }
         builder.add_object("box", builder.add_triangles(mesh), builder.add_material(diffuse(0.8f, 0.6f, 0.4f)),
-                           ARHOST_VIRTUAL, baked ? glm::mat4x3(1) : glm::mat4x3(m));
+                           ARHOST_ROLE_VIRTUAL, baked ? glm::mat4x3(1) : glm::mat4x3(m));
         builder.add_light(light(100, -100, 200, 0.8f));
         return Tracer(std::move(builder)).render(from_the_side());
     };
@@ -833,24 +834,24 @@ TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
         for (const bool glass : {false, true}) {
             ArenaBuilder builder;
             builder.settings.background = glm::vec3(0.5f);
-            arhost_material material = scene::make_material(glass ? ARHOST_GLASS : ARHOST_MIRROR);
+            arhost_material material = scene::make_material(glass ? ARHOST_MATERIAL_GLASS : ARHOST_MATERIAL_MIRROR);
             set3(material.reflectivity, 1, 1, 1);
             builder.add_object("speck", builder.add_triangles(square(side)), builder.add_material(material));
             builder.add_light(light(0, 0, 150, 0.5f));
             const arhost_camera near = camera({0, 0, 4.0 * side}, {0, 0, 0}, {0, 1, 0});
             Tracer tracer(std::move(builder));
-            ASSERT_EQ(tracer.start(near.intrinsics), ARHOST_OK);
+            ASSERT_EQ(tracer.start(near.intrinsics), ARHOST_STATUS_OK);
             Picture picture(near.intrinsics);
-            EXPECT_EQ(tracer.try_render(near, picture), ARHOST_OK) << side;
+            EXPECT_EQ(tracer.try_render(near, picture), ARHOST_STATUS_OK) << side;
         }
 }
 
 TEST(OddScenes, ACameraBeyondAllRaysIsRefused) {
     Tracer tracer(one_sphere({0, 0, 200, 30}));
     const arhost_camera far = camera({0, -1e19, 0}, {0, 0, 0}, {0, 0, 1});
-    ASSERT_EQ(tracer.start(far.intrinsics), ARHOST_OK);
+    ASSERT_EQ(tracer.start(far.intrinsics), ARHOST_STATUS_OK);
     Picture picture(far.intrinsics);
-    EXPECT_EQ(tracer.try_render(far, picture), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.try_render(far, picture), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
@@ -881,7 +882,7 @@ TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
         ArenaBuilder builder;
         builder.settings.background = glm::vec3(0.5f);
         builder.settings.max_depth = 40;
-        arhost_material glass = scene::make_material(ARHOST_GLASS);
+        arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
         glass.index = 1.5f;
         set3(glass.reflectivity, 1, 1, 1);
         set3(glass.refraction, 1, 1, 1);
@@ -901,7 +902,7 @@ TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
 class Refusal : public testing::Test {
 protected:
     arhost_status render(const arhost_camera &camera) {
-        EXPECT_EQ(tracer.start(pinhole()), ARHOST_OK);
+        EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
         Picture picture(pinhole());
         return tracer.try_render(camera, picture);
     }
@@ -909,67 +910,67 @@ protected:
 };
 
 TEST_F(Refusal, OfAnUpThatIsParallelToTheView) {
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("up is parallel"));
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, OfALookAtThatIsTheEye) {
-    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, OfNumbersThatAreNotFinite) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, nan, 0})), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, nan, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("not finite"));
 }
 
 TEST_F(Refusal, OfOtherIntrinsicsThanThoseOfTheStart) {
     arhost_camera other = opencv_axes(pinhole());
     other.intrinsics.cx += 1;
-    EXPECT_EQ(render(other), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, OfAnImageOfAnotherSize) {
-    ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     Picture small(pinhole(100, 150));
-    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
     arhost_intrinsics in = pinhole();
     in.fx = 0;
-    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     in = pinhole();
     in.cy = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     in = pinhole();
     in.distortion = ARHOST_DISTORTION_BROWN;
     in.coefficient_count = 3;
-    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     in = pinhole(0, 10);
-    EXPECT_EQ(tracer.start(in), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, ToGoOnOnceCancelled) {
     tracer.plugin().cancel();
-    EXPECT_EQ(tracer.start(pinhole()), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
 TEST_F(Refusal, ToFinishAnImageOnceCancelled) {
-    ASSERT_EQ(tracer.start(pinhole()), ARHOST_OK);
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     tracer.plugin().cancel();
     Picture picture(pinhole());
-    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), picture), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), picture), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
 TEST(Plugin, DeclaresThatItTracesTheLens) {
     const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
     EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
     EXPECT_STREQ(descriptor.id, "rt_embree");
-    EXPECT_TRUE(descriptor.capabilities & ARHOST_TRACES_LENS);
+    EXPECT_TRUE(descriptor.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
 }
 
 TEST(Plugin, CanBeStartedAgainAfterAStop) {

@@ -97,7 +97,7 @@ public:
         std::move(builder).write({static_cast<std::byte *>(memory_), size_});
         EXPECT_EQ(scene::validate({static_cast<std::byte *>(memory_), size_}), "");
         mprotect(memory_, size_, PROT_READ);
-        EXPECT_EQ(plugin_.create(options), ARHOST_OK) << plugin_.log();
+        EXPECT_EQ(plugin_.create(options), ARHOST_STATUS_OK) << plugin_.log();
     }
     ~Tracer() {
         stop();
@@ -111,7 +111,7 @@ public:
         stop();
         const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &scene(), &in};
         const arhost_status status = functions().start(plugin_.instance(), &setup);
-        started_ = status == ARHOST_OK;
+        started_ = status == ARHOST_STATUS_OK;
         return status;
     }
     arhost_status try_render(const arhost_camera &camera, Picture &picture, const arhost_motion *motion = nullptr) {
@@ -120,9 +120,9 @@ public:
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }
     Picture render(const arhost_camera &camera) {
-        EXPECT_EQ(start(camera.intrinsics), ARHOST_OK) << plugin_.log();
+        EXPECT_EQ(start(camera.intrinsics), ARHOST_STATUS_OK) << plugin_.log();
         Picture picture(camera.intrinsics);
-        EXPECT_EQ(try_render(camera, picture), ARHOST_OK) << plugin_.log();
+        EXPECT_EQ(try_render(camera, picture), ARHOST_STATUS_OK) << plugin_.log();
         EXPECT_TRUE(picture.only_pixels_written());
         return picture;
     }
@@ -151,7 +151,7 @@ inline void set3(float (&to)[3], float x, float y, float z) {
     to[2] = z;
 }
 inline arhost_material flat(float r, float g, float b) { // its colour without any light; needs ambient 1
-    arhost_material material = scene::make_material(ARHOST_DIFFUSE);
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_DIFFUSE);
     set3(material.ambient, r, g, b);
     return material;
 }
@@ -161,19 +161,19 @@ inline arhost_material diffuse(float r, float g, float b) {
     return material;
 }
 inline arhost_material shiny(float diffuse_grey, float specular, float exponent) {
-    arhost_material material = scene::make_material(ARHOST_SPECULAR);
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_SPECULAR);
     set3(material.diffuse, diffuse_grey, diffuse_grey, diffuse_grey);
     set3(material.specular, specular, specular, specular);
     material.exponent = exponent;
     return material;
 }
 inline arhost_material mirror(float reflectivity) {
-    arhost_material material = scene::make_material(ARHOST_MIRROR);
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_MIRROR);
     set3(material.reflectivity, reflectivity, reflectivity, reflectivity);
     return material;
 }
 inline arhost_light light(float x, float y, float z, float intensity, arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
-    arhost_light light = scene::make_light(ARHOST_POINT_LIGHT);
+    arhost_light light = scene::make_light(ARHOST_LIGHT_POINT);
     light.falloff = falloff;
     set3(light.position, x, y, z);
     set3(light.intensity, intensity, intensity, intensity);

@@ -33,11 +33,11 @@ bool holds(const Node &node, const Box &box) {
 }
 
 // Looks at a whole tree, and returns its depth.
-int walk(const Tree &tree, std::span<const Box> boxes, std::uint32_t most_in_leaf, std::set<std::uint32_t> &found,
+int walk(const Tree &tree, std::span<const Box> boxes, std::uint32_t max_leaf_size, std::set<std::uint32_t> &found,
          std::uint32_t at = 0) {
     const Node &node = tree.nodes[at];
     if (node.count) {
-        EXPECT_LE(node.count, most_in_leaf);
+        EXPECT_LE(node.count, max_leaf_size);
         for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
             EXPECT_TRUE(found.insert(tree.order[i]).second) << "twice";
             EXPECT_TRUE(holds(node, boxes[tree.order[i]]));
@@ -51,14 +51,14 @@ int walk(const Tree &tree, std::span<const Box> boxes, std::uint32_t most_in_lea
         std::copy_n(tree.nodes[child].low, 3, box.low);
         std::copy_n(tree.nodes[child].high, 3, box.high);
         EXPECT_TRUE(holds(node, box));
-        depth = std::max(depth, walk(tree, boxes, most_in_leaf, found, child));
+        depth = std::max(depth, walk(tree, boxes, max_leaf_size, found, child));
     }
     return depth + 1;
 }
 
-void expect_sound(const Tree &tree, std::span<const Box> boxes, std::uint32_t most_in_leaf, int most_depth) {
+void expect_sound(const Tree &tree, std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth) {
     std::set<std::uint32_t> found;
-    EXPECT_LE(walk(tree, boxes, most_in_leaf, found), most_depth);
+    EXPECT_LE(walk(tree, boxes, max_leaf_size, found), max_depth);
     EXPECT_EQ(found.size(), boxes.size());
     EXPECT_LE(tree.nodes.size(), 2 * boxes.size());
 }

@@ -79,8 +79,8 @@ protected:
     // Nothing is left of it: once the device is sound again it starts, and traces what it should.
     void expect_to_be_mended() {
         let_fail("");
-        ASSERT_EQ(start(), ARHOST_OK) << tracer_->plugin().log();
-        ASSERT_EQ(render(), ARHOST_OK) << tracer_->plugin().log();
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+        ASSERT_EQ(render(), ARHOST_STATUS_OK) << tracer_->plugin().log();
         EXPECT_GT(picture_->alphas().rbegin()->first, 0);
     }
 
@@ -101,20 +101,20 @@ TEST_P(FailingDevice, ThatCannotWhatItAnnouncesIsTakenByThePathBefore) {
     ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", GetParam().c_str(), 1);
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
     ::unsetenv("ARHOST_TEST_VULKAN_IS_A_GPU");
-    ASSERT_EQ(tracer.start(small_), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.plugin().log();
     const std::string next = GetParam() == "query" ? "plain" : "query";
     EXPECT_THAT(tracer.plugin().log(), AllOf(HasSubstr("path '" + GetParam() + "' is left for '" + next + "'"),
                                              HasSubstr("path " + next + ", ")));
     EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
     // The one that was asked for by name is not left.
     tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
-    EXPECT_THAT(told(ARHOST_ERROR_UNSUPPORTED, [&] { return start(); }), HasSubstr("that it can't"));
+    EXPECT_THAT(told(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }), HasSubstr("that it can't"));
 }
 
 TEST_P(FailingDevice, LostAtStartIsToldOf) {
     for (const char *when : {"submit:1", "submit:4", "wait:1", "wait:4"}) {
         let_fail(when);
-        EXPECT_THAT(told(ARHOST_ERROR_DEVICE_LOST, [&] { return start(); }), HasSubstr(lost)) << when;
+        EXPECT_THAT(told(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return start(); }), HasSubstr(lost)) << when;
     }
     expect_to_be_mended();
 }
@@ -122,19 +122,20 @@ TEST_P(FailingDevice, LostAtStartIsToldOf) {
 TEST_P(FailingDevice, LostInMidRunIsToldOf) {
     for (const char *when : {"submit:1", "wait:1"}) {
         let_fail("");
-        ASSERT_EQ(start(), ARHOST_OK) << tracer_->plugin().log();
-        ASSERT_EQ(render(), ARHOST_OK);
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+        ASSERT_EQ(render(), ARHOST_STATUS_OK);
         let_fail(when);
-        EXPECT_THAT(told(ARHOST_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost)) << when;
-        EXPECT_THAT(told(ARHOST_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost)) << "and stays so";
+        EXPECT_THAT(told(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost)) << when;
+        EXPECT_THAT(told(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost))
+            << "and stays so";
     }
     expect_to_be_mended();
 }
 
 TEST_P(FailingDevice, LostAtTheFirstImageEndsWell) {
-    ASSERT_EQ(start(), ARHOST_OK) << tracer_->plugin().log();
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
     let_fail("wait:1");
-    EXPECT_EQ(render(), ARHOST_ERROR_DEVICE_LOST);
+    EXPECT_EQ(render(), ARHOST_STATUS_ERROR_DEVICE_LOST);
     tracer_.reset();
 }
 
@@ -145,9 +146,9 @@ TEST_P(FailingDevice, WithoutMemoryAtStartIsToldOf) {
         let_fail("allocate:" + std::to_string(nth));
         const std::size_t before = tracer_->plugin().log().size();
         const arhost_status status = start();
-        if (status == ARHOST_OK)
+        if (status == ARHOST_STATUS_OK)
             break;
-        ASSERT_EQ(status, ARHOST_ERROR_OUT_OF_MEMORY) << nth;
+        ASSERT_EQ(status, ARHOST_STATUS_ERROR_OUT_OF_MEMORY) << nth;
         EXPECT_THAT(tracer_->plugin().log().substr(before), HasSubstr(out_of_memory)) << nth;
     }
     EXPECT_GT(nth, 10);
@@ -156,13 +157,14 @@ TEST_P(FailingDevice, WithoutMemoryAtStartIsToldOf) {
 
 // What the first image needs: a place to go to.
 TEST_P(FailingDevice, WithoutMemoryInMidRunIsToldOf) {
-    ASSERT_EQ(start(), ARHOST_OK) << tracer_->plugin().log();
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
     let_fail("allocate:1");
-    EXPECT_THAT(told(ARHOST_ERROR_OUT_OF_MEMORY, [&] { return render(); }), HasSubstr(out_of_memory));
+    EXPECT_THAT(told(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, [&] { return render(); }), HasSubstr(out_of_memory));
     let_fail("");
-    EXPECT_EQ(render(), ARHOST_OK) << "there is memory again";
+    EXPECT_EQ(render(), ARHOST_STATUS_OK) << "there is memory again";
     let_fail("allocate:1");
-    EXPECT_EQ(tracer_->try_render(from_the_side(small_), *picture_), ARHOST_OK) << "nothing is allocated per frame";
+    EXPECT_EQ(tracer_->try_render(from_the_side(small_), *picture_), ARHOST_STATUS_OK)
+        << "nothing is allocated per frame";
     expect_to_be_mended();
 }
 
@@ -180,7 +182,7 @@ TEST_F(OldDevice, IsRefusedIfAskedFor) {
     const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "all");
     std::ofstream(folder_.path() / "scene.yaml") << small_scene;
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {{"device", "0"}}, "rt_vulkan");
-    EXPECT_EQ(tracer.start(pinhole(48, 36, 48)), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_EQ(tracer.start(pinhole(48, 36, 48)), ARHOST_STATUS_ERROR_UNSUPPORTED);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("knows Vulkan 1.0 only, and 1.1 is needed; choose another with "
                                                  "option 'device'"));
 }
@@ -192,7 +194,7 @@ TEST_F(OldDevice, IsLeftOutForAnotherWithAReason) {
     const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "first"),
         drivers("VK_DRIVER_FILES", once + ":" + again), by_old_name("VK_ICD_FILENAMES", once + ":" + again);
     PluginUnderTest plugin("rt_vulkan");
-    EXPECT_EQ(plugin.create({}), ARHOST_OK) << plugin.log();
+    EXPECT_EQ(plugin.create({}), ARHOST_STATUS_OK) << plugin.log();
     EXPECT_THAT(plugin.log(), HasSubstr("' is left out: it knows Vulkan 1.0 only, and 1.1 is needed"));
 }
 

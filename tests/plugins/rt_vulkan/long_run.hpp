@@ -51,7 +51,7 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
                         const Options &options) {
     PluginUnderTest plugin("rt_vulkan");
     const auto require = [&](arhost_status status) {
-        if (status != ARHOST_OK)
+        if (status != ARHOST_STATUS_OK)
             throw std::runtime_error(plugin.log());
     };
     require(plugin.create(options));
@@ -73,7 +73,7 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
         scene::MotionEvaluator evaluator(scene);
         for (int i = 0; i < images; ++i) {
             const double side = 30.0 * i / images;
-            const arhost_camera view = scene.axes == ARHOST_Z_UP
+            const arhost_camera view = scene.axes == ARHOST_AXES_Z_UP
                                            ? camera({side, -330, 150}, {0, 0, 50}, {0, 0, 1}, intrinsics)
                                            : camera({side, 150, 330}, {0, 50, 0}, {0, 1, 0}, intrinsics);
             const arhost_motion motion = evaluator.at(0.04 * i);

@@ -25,7 +25,7 @@ TEST(LongRun, LeavesNothingBehind) {
 TEST(LongRun, LetsTheValidationLayersBeSilent) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
-    if (plugin.create({{"validate", "true"}}) != ARHOST_OK)
+    if (plugin.create({{"validate", "true"}}) != ARHOST_STATUS_OK)
         GTEST_SKIP() << plugin.log();
     const LongRun run = long_run(scenes, changes, images, {{"validate", "true"}});
     EXPECT_EQ(run.messages(), 0u) << run.log;

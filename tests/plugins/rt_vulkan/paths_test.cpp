@@ -13,16 +13,16 @@ TEST_P(SamePictureByPath, AsThePlainPathGives) {
     const std::filesystem::path file = file_of(view);
     Tracer traced(scene::load_scene(file), {{"samples", view.samples}, {"path", path}}, "rt_vulkan"),
         plain(scene::load_scene(file), {{"samples", view.samples}, {"path", "plain"}}, "rt_vulkan");
-    ASSERT_EQ(traced.start(small), ARHOST_OK) << traced.plugin().log();
-    ASSERT_EQ(plain.start(small), ARHOST_OK) << plain.plugin().log();
+    ASSERT_EQ(traced.start(small), ARHOST_STATUS_OK) << traced.plugin().log();
+    ASSERT_EQ(plain.start(small), ARHOST_STATUS_OK) << plain.plugin().log();
     scene::MotionEvaluator motion(traced.scene());
     int shown = 0;
     for (const double nearness : nearnesses) {
         const arhost_camera camera = camera_for(traced.scene(), nearness, small);
         const arhost_motion then = motion.at(view.time_s);
         Picture got(small), expected(small);
-        ASSERT_EQ(traced.try_render(camera, got, &then), ARHOST_OK) << traced.plugin().log();
-        ASSERT_EQ(plain.try_render(camera, expected, &then), ARHOST_OK) << plain.plugin().log();
+        ASSERT_EQ(traced.try_render(camera, got, &then), ARHOST_STATUS_OK) << traced.plugin().log();
+        ASSERT_EQ(plain.try_render(camera, expected, &then), ARHOST_STATUS_OK) << plain.plugin().log();
         const std::string name = view.name + (nearness < 1 ? "-near-" : "-far-") + path;
         keep(got, name);
         const Likeness like = likeness(got, expected);

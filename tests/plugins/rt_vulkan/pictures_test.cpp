@@ -12,12 +12,12 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
     const std::filesystem::path file = file_of(GetParam());
     const Options options{{"samples", GetParam().samples}};
     Tracer vulkan(scene::load_scene(file), options, "rt_vulkan"), embree(scene::load_scene(file), options);
-    ASSERT_EQ(vulkan.start(small), ARHOST_OK) << vulkan.plugin().log();
-    ASSERT_EQ(embree.start(small), ARHOST_OK);
+    ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK) << vulkan.plugin().log();
+    ASSERT_EQ(embree.start(small), ARHOST_STATUS_OK);
     Tracer robust(scene::load_scene(file), {{"samples", GetParam().samples}, {"robust", "true"}});
     const bool glass = has_glass(vulkan.scene());
     if (glass) {
-        ASSERT_EQ(robust.start(small), ARHOST_OK);
+        ASSERT_EQ(robust.start(small), ARHOST_STATUS_OK);
     }
     scene::MotionEvaluator motion(vulkan.scene());
     int shown = 0;
@@ -25,8 +25,8 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
         const arhost_camera view = camera_for(vulkan.scene(), nearness, small);
         const arhost_motion then = motion.at(GetParam().time_s);
         Picture got(small), expected(small);
-        ASSERT_EQ(vulkan.try_render(view, got, &then), ARHOST_OK) << vulkan.plugin().log();
-        ASSERT_EQ(embree.try_render(view, expected, &then), ARHOST_OK);
+        ASSERT_EQ(vulkan.try_render(view, got, &then), ARHOST_STATUS_OK) << vulkan.plugin().log();
+        ASSERT_EQ(embree.try_render(view, expected, &then), ARHOST_STATUS_OK);
         const std::string name = GetParam().name + (nearness < 1 ? "-near" : "-far");
         keep(got, name + "-vulkan");
         keep(expected, name + "-embree");
@@ -37,7 +37,7 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
         EXPECT_GE(like.psnr(), glass ? 40 : 45) << like;
         if (glass) { // see below
             Picture by_robust(small);
-            ASSERT_EQ(robust.try_render(view, by_robust, &then), ARHOST_OK);
+            ASSERT_EQ(robust.try_render(view, by_robust, &then), ARHOST_STATUS_OK);
             const int most = likeness(by_robust, expected).colours_off;
             EXPECT_LE(like.colours_off, most + 3 * std::sqrt(most) + 1) << like; // but for the luck of a count
         }
@@ -61,14 +61,14 @@ TEST_P(BehindGlass, RtVulkanIsNoFartherFromRtEmbreeThanThatFromItself) {
         robust(scene::load_scene(file), {{"robust", "true"}});
     const arhost_intrinsics size = pinhole(256, 192, 256);
     for (Tracer *tracer : {&vulkan, &embree, &robust})
-        ASSERT_EQ(tracer->start(size), ARHOST_OK) << tracer->plugin().log();
+        ASSERT_EQ(tracer->start(size), ARHOST_STATUS_OK) << tracer->plugin().log();
     Likeness of_vulkan, of_robust;
     for (double nearness = 1.3; nearness > 0.4; nearness -= 0.06) {
         const arhost_camera view = camera_for(vulkan.scene(), nearness, size);
         Picture by_vulkan(size), by_embree(size), by_robust(size);
-        ASSERT_EQ(vulkan.try_render(view, by_vulkan), ARHOST_OK) << vulkan.plugin().log();
-        ASSERT_EQ(embree.try_render(view, by_embree), ARHOST_OK);
-        ASSERT_EQ(robust.try_render(view, by_robust), ARHOST_OK);
+        ASSERT_EQ(vulkan.try_render(view, by_vulkan), ARHOST_STATUS_OK) << vulkan.plugin().log();
+        ASSERT_EQ(embree.try_render(view, by_embree), ARHOST_STATUS_OK);
+        ASSERT_EQ(robust.try_render(view, by_robust), ARHOST_STATUS_OK);
         of_vulkan += likeness(by_vulkan, by_embree);
         of_robust += likeness(by_robust, by_embree);
     }

@@ -106,14 +106,14 @@ TEST_F(RichScene, ThroughALensIsRtEmbrees) {
 TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     const Options options{{"accumulate", "true"}, {"samples", "2"}};
     Tracer vulkan(rich_scene(), options, "rt_vulkan"), embree(rich_scene(), options);
-    ASSERT_EQ(vulkan.start(small), ARHOST_OK);
-    ASSERT_EQ(embree.start(small), ARHOST_OK);
+    ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
+    ASSERT_EQ(embree.start(small), ARHOST_STATUS_OK);
     Picture got(small), expected(small);
     std::vector<Pixel> first;
     for (int frame = 0; frame < 3; ++frame) {
         got = Picture(small);
-        ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
-        ASSERT_EQ(embree.try_render(from_the_side(small), expected), ARHOST_OK);
+        ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
+        ASSERT_EQ(embree.try_render(from_the_side(small), expected), ARHOST_STATUS_OK);
         if (frame == 0)
             first = got.pixels();
     }
@@ -121,16 +121,16 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     EXPECT_EQ(like.alphas_off, 0) << like;
     EXPECT_GE(like.psnr(), 45) << like;
     // Another camera begins anew, and back again is the first picture.
-    ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_OK);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+    ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_STATUS_OK);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
     // So does the one after an image that was cancelled half-way: the second still is in bands.
-    ASSERT_EQ(vulkan.start(small), ARHOST_OK);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+    ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     vulkan.plugin().cancel(1);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_ERROR_CANCELLED);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_ERROR_CANCELLED);
     vulkan.plugin().go_on();
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_OK);
+    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
 }
 TEST_F(RichScene, AgainAndAgainIsTheSameBytes) {
@@ -197,7 +197,7 @@ TEST_P(EachPath, KeepsTheShadowsOfWhatIsFlatOnALargeFloor) {
 TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     const auto scene = [] { return scene::load_scene(moving_scene); };
     Tracer tracer(scene(), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(small);
     const std::vector<Pixel> untouched = picture.pixels();
@@ -206,14 +206,14 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
         return tracer.try_render(of_moving(), picture, &motion);
     };
     tracer.plugin().cancel(1); // once the first band is done
-    EXPECT_EQ(rendered(0.7), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(rendered(0.7), ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while an image was traced"));
     EXPECT_EQ(picture.pixels(), untouched);
     tracer.plugin().go_on();
-    ASSERT_EQ(rendered(0.3), ARHOST_OK);
+    ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
     const std::vector<Pixel> after = picture.pixels();
-    ASSERT_EQ(tracer.start(small), ARHOST_OK);
-    ASSERT_EQ(rendered(0.3), ARHOST_OK);
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);
+    ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
     EXPECT_EQ(after, picture.pixels());
 }
 
@@ -245,7 +245,7 @@ TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
 
 TEST_P(EachPath, IsToldOf) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK);
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
 }
 
@@ -257,14 +257,14 @@ TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
     const auto devices = instance.devices();
     const bool has_clock = rt_vulkan::choose_device(devices, "auto").timestamp_bits > 0;
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(small);
     for (const double time_s : {0.0, 0.5, 1.0}) {
         const arhost_motion motion = evaluator.at(time_s);
         picture.info = {sizeof picture.info, 0, 0, 0, 0, 0, 0};
         const auto begin = std::chrono::steady_clock::now();
-        ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
         const std::chrono::nanoseconds took = std::chrono::steady_clock::now() - begin;
         EXPECT_EQ(picture.info.device_time_ns > 0, has_clock);
         EXPECT_LE(picture.info.device_time_ns, static_cast<std::uint64_t>(took.count()));
@@ -272,7 +272,7 @@ TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
     constexpr std::uint64_t untouched = 7;
     picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched};
     const arhost_motion motion = evaluator.at(1.5);
-    ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK);
+    ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK);
     EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct ends before it";
     EXPECT_TRUE(picture.info.has_region);
 }
@@ -282,17 +282,17 @@ TEST_P(EachPath, FollowsWhatMoves) {
     const arhost_intrinsics tiny = pinhole(48, 36, 48);
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan"),
         embree(scene::load_scene(moving_scene));
-    ASSERT_EQ(tracer.start(tiny), ARHOST_OK) << tracer.plugin().log();
-    ASSERT_EQ(embree.start(tiny), ARHOST_OK);
+    ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.plugin().log();
+    ASSERT_EQ(embree.start(tiny), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
     constexpr int frames = 130; // more than two times as many refits as there are between buildings
     for (int frame = 0; frame < frames; ++frame) {
         const arhost_motion motion = evaluator.at(0.1 * frame);
         Picture got(tiny), expected(tiny);
-        ASSERT_EQ(tracer.try_render(of_moving(tiny), got, &motion), ARHOST_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.try_render(of_moving(tiny), got, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
         if (frame % 13)
             continue;
-        ASSERT_EQ(embree.try_render(of_moving(tiny), expected, &motion), ARHOST_OK);
+        ASSERT_EQ(embree.try_render(of_moving(tiny), expected, &motion), ARHOST_STATUS_OK);
         const Likeness like = likeness(got, expected);
         EXPECT_LE(like.alphas_off, like.pixels / 500) << "frame " << frame << ": " << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << "frame " << frame << ": " << like;
@@ -382,19 +382,19 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
 TEST(Loader, ThatIsMissingIsToldOf) {
     LoggingHost logging;
     EXPECT_THAT(
-        refusal(ARHOST_ERROR_UNSUPPORTED,
+        refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
                 [&] { rt_vulkan::Instance(Host(&logging.host), false, "libvulkan-none.so.1"); }),
         testing::AllOf(HasSubstr("no Vulkan loader"), HasSubstr("libvulkan-none.so.1"), HasSubstr("libvulkan1")));
-    EXPECT_THAT(
-        refusal(ARHOST_ERROR_UNSUPPORTED, [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
-        HasSubstr("libm.so.6 is no Vulkan loader"));
+    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                        [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
+                HasSubstr("libm.so.6 is no Vulkan loader"));
 }
 
 TEST(Device, ThatIsMissingIsToldOf) {
     const EnvironmentVariable drivers("VK_DRIVER_FILES", "/nonexistent/none.json"),
         old_name("VK_ICD_FILENAMES", "/nonexistent/none.json");
     PluginUnderTest plugin("rt_vulkan");
-    EXPECT_EQ(plugin.create(), ARHOST_ERROR_UNSUPPORTED);
+    EXPECT_EQ(plugin.create(), ARHOST_STATUS_ERROR_UNSUPPORTED);
     EXPECT_TRUE(plugin.log().find("no Vulkan loader") != std::string::npos ||
                 plugin.log().find("VK_DRIVER_FILES is '/nonexistent/none.json'") != std::string::npos)
         << plugin.log();
@@ -429,11 +429,11 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     devices[2].name = "Little GPU";
     EXPECT_EQ(chosen("0F112233-4455-6677-8899-aabbccddeeff"), "Little GPU");
     for (const char *none : {"3", "radeon", "", "0011"})
-        EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen(none); }),
+        EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen(none); }),
                     testing::AllOf(HasSubstr("option 'device': no device is"), HasSubstr("1 'Big GPU'"),
                                    HasSubstr("6d657361")))
             << none;
-    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
+    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
     devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 13;
     EXPECT_EQ(chosen("auto"), "Little GPU") << "as the big one lacks buffers";
     EXPECT_EQ(chosen("big"), "Big GPU") << "which is refused when it starts";
@@ -451,13 +451,14 @@ TEST(Path, IsChosenByWhatTheDeviceHas) {
     device.properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU;
     const auto chosen = [&](const char *wanted) { return rt_vulkan::choose_paths(device, wanted); };
     EXPECT_EQ(chosen("auto"), Paths{Path::plain});
-    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("query"); }),
+    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("query"); }),
                 testing::AllOf(HasSubstr("option 'path'"), HasSubstr("'Little GPU' has no 'query'"),
                                HasSubstr("it has plain")));
     device.paths = {Path::plain, Path::query};
     EXPECT_EQ(chosen("auto"), (Paths{Path::query, Path::plain}));
     EXPECT_EQ(chosen("plain"), Paths{Path::plain});
-    EXPECT_THAT(refusal(ARHOST_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }), HasSubstr("it has plain, query"));
+    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }),
+                HasSubstr("it has plain, query"));
     device.paths = {Path::plain, Path::query, Path::pipeline};
     EXPECT_EQ(chosen("auto"), (Paths{Path::pipeline, Path::query, Path::plain}));
     EXPECT_EQ(chosen("query"), Paths{Path::query});
@@ -469,9 +470,9 @@ TEST(Path, IsChosenByWhatTheDeviceHas) {
 TEST(Device, OptionThatNamesNoneIsRefused) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
-    EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(plugin.log(), HasSubstr("there are: 0 '"));
-    EXPECT_EQ(plugin.create({{"device", "0"}}), ARHOST_OK);
+    EXPECT_EQ(plugin.create({{"device", "0"}}), ARHOST_STATUS_OK);
 }
 
 TEST(Device, IsListedByTheHost) {
@@ -505,7 +506,7 @@ TEST(Device, WithoutWhatIsNeededIsRefused) {
     const auto complaint = [&](auto spoil) {
         rt_vulkan::PhysicalDevice device = sound;
         spoil(device);
-        return refusal(ARHOST_ERROR_UNSUPPORTED,
+        return refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
                        [&] { rt_vulkan::Renderer(setup, {}, host, instance, device, shaders); });
     };
     EXPECT_THAT(complaint([](auto &device) { device.properties.apiVersion = VK_API_VERSION_1_0; }),
@@ -525,7 +526,7 @@ TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
     const auto relative = std::filesystem::relative(folder.path() / "rt_vulkan", ARHOST_PLUGIN_DIRECTORY).string();
     const auto complaint = [&] {
         PluginUnderTest plugin(relative);
-        EXPECT_EQ(plugin.create({{"path", "plain"}}), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(plugin.create({{"path", "plain"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
         return plugin.log();
     };
     EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is missing")));
@@ -559,7 +560,7 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
                 files.push_back(entry);
         return files;
     };
-    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     ASSERT_THAT(files(), testing::SizeIs(1));
     const auto file = files()[0];
     EXPECT_THAT(file.filename(), testing::ResultOf([](const auto &name) { return name.string(); },
@@ -567,14 +568,14 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
         << "a device's own";
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
-    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "written anew";
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // can't be replaced
-    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(files(), std::vector{file}) << "nothing unfinished is left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
-    EXPECT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
 }
 
@@ -636,10 +637,10 @@ INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
 
 TEST_P(ValidationOfPath, HasNothingToSay) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     for (int frame = 0; frame < 5; ++frame) { // in bands, and from the third on, if not before, at once
         Picture picture(small);
-        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
     }
     tracer.render(from_the_side(pinhole(65, 47, 65))); // stops, which leaves nothing behind, and starts
     EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
@@ -648,13 +649,13 @@ TEST_P(ValidationOfPath, HasNothingToSay) {
 
 TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
     Tracer tracer(scene::load_scene(moving_scene), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
     std::vector<std::vector<Pixel>> pictures;
     for (const double time_s : {0.0, 0.7, 0.0, 0.3}) {
         const arhost_motion motion = evaluator.at(time_s);
         Picture picture(small);
-        EXPECT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_OK);
+        EXPECT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK);
         pictures.push_back(picture.pixels());
     }
     EXPECT_NE(pictures[0], pictures[1]);
@@ -671,7 +672,7 @@ protected:
         tracer.emplace(rich_scene(), Options{}, "rt_vulkan");
     }
     arhost_status render(const arhost_camera &view) {
-        EXPECT_EQ(tracer->start(small), ARHOST_OK);
+        EXPECT_EQ(tracer->start(small), ARHOST_STATUS_OK);
         Picture picture(small);
         return tracer->try_render(view, picture);
     }
@@ -680,35 +681,35 @@ protected:
 
 TEST_F(Refusal, OfCamerasThatCannotBe) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
-    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({1e13, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_ERROR_INVALID_ARGUMENT) << "other intrinsics";
+    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(camera({1e13, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_STATUS_ERROR_INVALID_ARGUMENT) << "other intrinsics";
     Picture other(pinhole(72, 96));
-    EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
     arhost_intrinsics in = small;
     in.fx = 0;
-    EXPECT_EQ(tracer->start(in), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(tracer->start(with_lens(ARHOST_DISTORTION_BROWN, {1, 2, 3})), ARHOST_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(tracer->start(pinhole(0, 10)), ARHOST_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->start(with_lens(ARHOST_DISTORTION_BROWN, {1, 2, 3})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(tracer->start(pinhole(0, 10)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(Refusal, ToGoOnOnceCancelled) {
-    ASSERT_EQ(tracer->start(small), ARHOST_OK);
+    ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK);
     tracer->plugin().cancel();
     Picture picture(small);
-    EXPECT_EQ(tracer->try_render(from_the_side(small), picture), ARHOST_ERROR_CANCELLED);
-    EXPECT_EQ(tracer->start(small), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(tracer->try_render(from_the_side(small), picture), ARHOST_STATUS_ERROR_CANCELLED);
+    EXPECT_EQ(tracer->start(small), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
 TEST(Plugin, DeclaresTheLensAndTheGpu) {
     const PluginUnderTest plugin("rt_vulkan");
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_TRACES_LENS);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
     ASSERT_NE(plugin.descriptor().needs, nullptr);
     EXPECT_STREQ(plugin.descriptor().needs[0], "gpu");
 }

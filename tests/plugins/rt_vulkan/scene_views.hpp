@@ -33,8 +33,8 @@ inline const arhost_intrinsics small = pinhole(128, 96, 128);
 // Where the dissertation's marker lies, as its camera sees it; `nearness` 1 is from afar.
 inline arhost_camera camera_for(const arhost_scene &scene, double nearness, const arhost_intrinsics &size) {
     const double away = -330 * nearness, up = 150 * nearness;
-    return scene.axes == ARHOST_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, size)
-                                     : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, size);
+    return scene.axes == ARHOST_AXES_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, size)
+                                          : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, size);
 }
 
 inline const double nearnesses[] = {1.0, 0.45};
@@ -63,7 +63,7 @@ inline bool has_glass(const arhost_scene &scene) {
     const auto *materials =
         reinterpret_cast<const arhost_material *>(reinterpret_cast<const char *>(&scene) + scene.materials.offset);
     return std::any_of(materials, materials + scene.materials.count,
-                       [](const arhost_material &material) { return material.model == ARHOST_GLASS; });
+                       [](const arhost_material &material) { return material.model == ARHOST_MATERIAL_GLASS; });
 }
 
 inline const std::vector<View> every_view = {View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},

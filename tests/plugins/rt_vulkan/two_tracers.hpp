@@ -20,7 +20,7 @@ inline const bool compiles_quickly =
 // What rt_vulkan says against making it here, "" where there is a device that has the path.
 inline std::string no_vulkan(const std::string &path = "auto") {
     PluginUnderTest plugin("rt_vulkan");
-    return plugin.create({{"path", path}}) == ARHOST_OK ? "" : plugin.log();
+    return plugin.create({{"path", path}}) == ARHOST_STATUS_OK ? "" : plugin.log();
 }
 #define ARHOST_REQUIRE_VULKAN(...)                                                                                   \
     if (const std::string missing = ::arhost::test::no_vulkan(__VA_ARGS__); !missing.empty())                        \

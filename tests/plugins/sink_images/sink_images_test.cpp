@@ -39,15 +39,15 @@ protected:
     }
     // A whole run over frames [first, end) after a restart at `first`.
     void run(SinkUnderTest &&s, std::uint64_t first, std::uint64_t end) const {
-        ASSERT_EQ(s.start(width, height, first), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.write(first, end), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.stop(), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(first, end), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
         EXPECT_EQ(s.log(), "");
     }
     // Frames [0, end) and then a kill.
     void run_and_die(SinkUnderTest &&s, std::uint64_t end) const {
-        ASSERT_EQ(s.start(width, height), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.write(0, end), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(0, end), ARHOST_STATUS_OK) << s.log();
     }
     std::vector<std::string> names() const { return names_in(folder_.path()); }
 
@@ -72,9 +72,9 @@ TEST_F(SinkImages, EveryNthFrameIsWritten) {
 
 TEST_F(SinkImages, AnImageIsWholeOnceItsFrameIsAcknowledged) {
     SinkUnderTest s = sink("%d.png");
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 4; ++i) {
-        ASSERT_EQ(s.write(i), ARHOST_OK);
+        ASSERT_EQ(s.write(i), ARHOST_STATUS_OK);
         EXPECT_TRUE(shows(path(std::to_string(i) + ".png"), i));
     }
 }
@@ -102,7 +102,7 @@ TEST_F(SinkImages, SurvivesTheDeathOfItsProcessAtAnyMoment) {
 TEST_F(SinkImages, ImagesOfAnEarlierRunAreNamedAndStay) {
     run(sink("%d.png"), 0, 4);
     SinkUnderTest s = sink("%d.png");
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("holds 4 images of an earlier run"));
     EXPECT_EQ(names().size(), 4u);
 }
@@ -128,8 +128,8 @@ TEST_F(SinkImages, TakesOddSizesAndPaddedRowsWithoutTouchingOtherBytes) {
         const Picture picture(w, h, 1, 3 * w + 64);
         for (const std::string name : {"odd_%d.png", "odd_%d.jpg"}) {
             SinkUnderTest s = sink(name);
-            ASSERT_EQ(s.start(w, h), ARHOST_OK);
-            ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_OK) << s.log();
+            ASSERT_EQ(s.start(w, h), ARHOST_STATUS_OK);
+            ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_STATUS_OK) << s.log();
         }
         EXPECT_EQ(cv::norm(read_image(path("odd_0.png")), as_mat(picture), cv::NORM_INF), 0) << w << "×" << h;
         EXPECT_GT(cv::PSNR(read_image(path("odd_0.jpg")), as_mat(picture)), 25) << w << "×" << h;
@@ -181,9 +181,9 @@ TEST_F(SinkImages, TheChosenFrameIsWrittenAndNoOther) {
 
 TEST_F(SinkImages, WhereTheChosenFrameWasDroppedTheNextOneStandsIn) {
     SinkUnderTest s = sink("demo.png", {{"frame", "2"}});
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (const std::uint64_t i : {0, 1, 4, 5})
-        ASSERT_EQ(s.write(i), ARHOST_OK);
+        ASSERT_EQ(s.write(i), ARHOST_STATUS_OK);
     EXPECT_TRUE(shows(path("demo.png"), 4));
 }
 
@@ -199,15 +199,15 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsNotTakenForThisOnesButStaysUntilAFrame
     for (const char *frame : {"-1", "9"}) {
         std::ofstream(path("demo.png")) << "old";
         SinkUnderTest s = sink("demo.png", {{"frame", frame}});
-        ASSERT_EQ(s.start(width, height), ARHOST_OK);
+        ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
         EXPECT_EQ(read_text(path("demo.png")), "old") << "the run may yet be refused";
-        ASSERT_EQ(s.write(0, 1), ARHOST_OK);
+        ASSERT_EQ(s.write(0, 1), ARHOST_STATUS_OK);
         if (frame == std::string("-1")) {
-            ASSERT_EQ(s.stop(), ARHOST_OK);
+            ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
             EXPECT_NE(read_text(path("demo.png")), "old");
             continue;
         }
-        EXPECT_EQ(s.stop(), ARHOST_OK);
+        EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_THAT(names(), IsEmpty());
         EXPECT_THAT(s.log(), HasSubstr("3 '" + path("demo.png").string() + "' was not written"));
     }
@@ -225,36 +225,36 @@ TEST_F(SinkImages, OptionsThatDoNotGoTogetherAreRefused) {
                           Case{"%s.png", {}, "%05d"}, Case{"%d.png", {{"frame", "3"}}, "frame: picks one"},
                           Case{"a.png", {{"every", "2"}}, "every: needs"}}) {
         SinkUnderTest s = sink(c.path, c.options);
-        EXPECT_EQ(s.created(), ARHOST_ERROR_CONFIGURATION) << c.path;
+        EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << c.path;
         EXPECT_THAT(s.log(), HasSubstr(c.message));
     }
 }
 
 TEST_F(SinkImages, AFullDiskLeavesNoHalfOfAnImage) {
     SinkUnderTest s = sink("%d.png");
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
-    ASSERT_EQ(s.write(0), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(0), ARHOST_STATUS_OK);
     {
         const FileSizeLimit limit(1000);
-        EXPECT_EQ(s.write(1), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.write(1), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_THAT(names(), ElementsAre("0.png"));
     EXPECT_THAT(s.log(), HasSubstr("File too large"));
-    EXPECT_EQ(s.write(1), ARHOST_OK);
+    EXPECT_EQ(s.write(1), ARHOST_STATUS_OK);
     EXPECT_TRUE(shows(path("1.png"), 1));
 }
 
 TEST_F(SinkImages, AFullDiskFailsTheKeepingOfTheLastFrame) {
     SinkUnderTest s = sink("demo.png");
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     {
         const FileSizeLimit limit(1000);
-        EXPECT_EQ(s.write(0), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.write(0), ARHOST_STATUS_ERROR_IO);
     }
-    ASSERT_EQ(s.write(0), ARHOST_OK);
+    ASSERT_EQ(s.write(0), ARHOST_STATUS_OK);
     {
         const FileSizeLimit limit(1000);
-        EXPECT_EQ(s.stop(), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_FALSE(std::filesystem::exists(path("demo.png")));
     run(sink("demo.png"), 1, 1); // with room again, a restart finishes it
@@ -266,7 +266,7 @@ TEST_F(SinkImages, AnUnwritableFolderFailsAtTheStart) {
     const UnwritableFolder locked(path("locked"));
     for (const std::string name : {"locked/%d.png", "locked/demo.png"}) {
         SinkUnderTest s = sink(name);
-        EXPECT_EQ(s.start(width, height), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
         EXPECT_THAT(s.log(), HasSubstr("Permission denied"));
     }
 }
@@ -279,6 +279,6 @@ TEST_F(SinkImages, MissingFoldersAreMade) {
 TEST_F(SinkImages, AFolderAsPathIsRefused) {
     std::filesystem::create_directory(path("sub.png"));
     SinkUnderTest s = sink("sub.png");
-    EXPECT_EQ(s.start(width, height), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("is a folder"));
 }

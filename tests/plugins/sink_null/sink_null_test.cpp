@@ -10,9 +10,9 @@ using namespace std::chrono_literals;
 
 TEST(SinkNull, TakesEveryFrameAtOnce) {
     SinkUnderTest sink("sink_null", {});
-    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
-    EXPECT_EQ(sink.write(0, 100), ARHOST_OK);
-    EXPECT_EQ(sink.stop(), ARHOST_OK);
+    ASSERT_EQ(sink.start(64, 48), ARHOST_STATUS_OK);
+    EXPECT_EQ(sink.write(0, 100), ARHOST_STATUS_OK);
+    EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(sink.log(), "");
     EXPECT_EQ(sink.descriptor().capabilities, 0u);
     EXPECT_EQ(sink.functions().idle, nullptr);
@@ -20,18 +20,18 @@ TEST(SinkNull, TakesEveryFrameAtOnce) {
 
 TEST(SinkNull, TakesAsLongAsItsDelay) {
     SinkUnderTest sink("sink_null", {{"delay_ms", "25"}});
-    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
+    ASSERT_EQ(sink.start(64, 48), ARHOST_STATUS_OK);
     const auto begin = Clock::now();
-    EXPECT_EQ(sink.write(0, 4), ARHOST_OK);
+    EXPECT_EQ(sink.write(0, 4), ARHOST_STATUS_OK);
     EXPECT_GE(Clock::now() - begin, 100ms);
 }
 
 TEST(SinkNull, EndsADelayWhenItIsCancelled) {
     SinkUnderTest sink("sink_null", {{"delay_ms", "600000"}});
-    ASSERT_EQ(sink.start(64, 48), ARHOST_OK);
+    ASSERT_EQ(sink.start(64, 48), ARHOST_STATUS_OK);
     std::jthread canceller([&] {
         std::this_thread::sleep_for(20ms);
         sink.cancel();
     });
-    EXPECT_EQ(sink.write(0), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(sink.write(0), ARHOST_STATUS_ERROR_CANCELLED);
 }

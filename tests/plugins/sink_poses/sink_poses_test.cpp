@@ -90,22 +90,22 @@ protected:
     std::string uninterrupted(std::uint64_t end) const {
         const auto path = folder_.path() / "whole.jsonl";
         SinkUnderTest whole("sink_poses", {{"path", path.string()}});
-        EXPECT_EQ(whole.start(8, 8), ARHOST_OK);
+        EXPECT_EQ(whole.start(8, 8), ARHOST_STATUS_OK);
         write(whole, 0, end);
-        EXPECT_EQ(whole.stop(), ARHOST_OK);
+        EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
         return read_text(path);
     }
     static void write(SinkUnderTest &sink, std::uint64_t first, std::uint64_t end) {
         const Picture picture(8, 8, 0);
         for (; first < end; ++first)
-            ASSERT_EQ(sink.write(picture, full_record(first)), ARHOST_OK) << sink.log();
+            ASSERT_EQ(sink.write(picture, full_record(first)), ARHOST_STATUS_OK) << sink.log();
     }
     // The one line that a record makes.
     std::string line_of(const arhost_record &record) const {
         SinkUnderTest s = sink();
-        EXPECT_EQ(s.start(8, 8), ARHOST_OK);
-        EXPECT_EQ(s.write(Picture(8, 8, 0), record), ARHOST_OK);
-        EXPECT_EQ(s.stop(), ARHOST_OK);
+        EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
+        EXPECT_EQ(s.write(Picture(8, 8, 0), record), ARHOST_STATUS_OK);
+        EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
         const auto lines = lines_of(log());
         EXPECT_EQ(lines.size(), 1u);
         return lines.at(0);
@@ -205,7 +205,7 @@ TEST_F(SinkPoses, AsManyMarkersAsThereCanBeAreAllWritten) {
 
 TEST_F(SinkPoses, TheLogIsWholeAfterEveryFrame) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 20; ++i) {
         write(s, i, i + 1);
         const std::string text = read_text(log());
@@ -219,10 +219,10 @@ TEST_F(SinkPoses, TheLogIsWholeAfterEveryFrame) {
 TEST_F(SinkPoses, AFreshRunReplacesAnOlderLogAtItsFirstFrame) {
     std::ofstream(log()) << "something else\n";
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(log()), "something else\n") << "the run may yet be refused";
     write(s, 0, 2);
-    EXPECT_EQ(s.stop(), ARHOST_OK);
+    EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(log()), uninterrupted(2));
     EXPECT_EQ(s.log(), "");
 }
@@ -231,13 +231,13 @@ TEST_F(SinkPoses, ARestartKeepsWhatCameBeforeAndReplacesTheRest) {
     for (const std::uint64_t restart : {1, 5, 9, 10}) {
         {
             SinkUnderTest killed = sink();
-            ASSERT_EQ(killed.start(8, 8), ARHOST_OK);
+            ASSERT_EQ(killed.start(8, 8), ARHOST_STATUS_OK);
             write(killed, 0, 10);
         }
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, restart), ARHOST_OK);
+        ASSERT_EQ(s.start(8, 8, restart), ARHOST_STATUS_OK);
         write(s, restart, 12);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_EQ(read_text(log()), uninterrupted(12)) << "restarted at " << restart;
         EXPECT_EQ(s.log(), "");
     }
@@ -249,7 +249,7 @@ TEST_F(SinkPoses, ALineThatAKillCutShortIsDropped) {
     for (std::size_t size = third + 1; size < whole.size(); size += 7) {
         std::ofstream(log(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, 3), ARHOST_OK); // even where the host takes the frame for written
+        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // even where the host takes the frame for written
         EXPECT_EQ(read_text(log()), whole.substr(0, third)) << "cut at " << size;
     }
 }
@@ -258,13 +258,13 @@ TEST_F(SinkPoses, FramesThatTheLiveModeLeftOutStayLeftOutAfterARestart) {
     const Picture picture(8, 8, 0);
     {
         SinkUnderTest killed = sink();
-        ASSERT_EQ(killed.start(8, 8), ARHOST_OK);
+        ASSERT_EQ(killed.start(8, 8), ARHOST_STATUS_OK);
         for (const std::uint64_t i : {3, 8, 20})
-            ASSERT_EQ(killed.write(picture, full_record(i)), ARHOST_OK);
+            ASSERT_EQ(killed.write(picture, full_record(i)), ARHOST_STATUS_OK);
     }
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8, 15), ARHOST_OK);
-    ASSERT_EQ(s.write(picture, full_record(15)), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8, 15), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(picture, full_record(15)), ARHOST_STATUS_OK);
     const auto lines = lines_of(log());
     ASSERT_EQ(lines.size(), 3u);
     EXPECT_EQ(Json::parse(lines[0])["frame"], 3);
@@ -278,21 +278,21 @@ TEST_F(SinkPoses, SurvivesTheDeathOfItsProcessAtAnyMoment) {
     for (const std::uint64_t frames : {1, 40, 3, 200})
         next = write_until_killed("sink_poses", options, 8, 8, next, frames, full_record);
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8, next), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8, next), ARHOST_STATUS_OK);
     write(s, next, next + 5);
-    ASSERT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(log()), uninterrupted(next + 5));
 }
 
 TEST_F(SinkPoses, ARestartWithoutItsOldLogSaysSo) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8, 5), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("3 '" + log().string() + "' holds no frame before 5"));
 }
 
 TEST_F(SinkPoses, MakesMissingFolders) {
     SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "a/b/log.jsonl").string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_OK);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl")) << "no frame came yet";
     write(s, 0, 1);
     EXPECT_TRUE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"));
@@ -300,12 +300,12 @@ TEST_F(SinkPoses, MakesMissingFolders) {
 
 TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     write(s, 0, 2);
     const std::string before = read_text(log());
     {
         const FileSizeLimit limit(before.size() + 100); // takes a part of the next line
-        EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(log()), before);
     EXPECT_THAT(s.log(), HasSubstr("4 can't write '" + log().string() + "': File too large"));
@@ -316,13 +316,13 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
 TEST_F(SinkPoses, AnUnwritableFolderIsAnIoErrorThatNamesThePath) {
     const UnwritableFolder locked(folder_.path() / "locked");
     SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "locked/log.jsonl").string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(s.log(), HasSubstr("locked/log.jsonl"));
 }
 
 TEST_F(SinkPoses, AFolderAsPathIsRefused) {
     SinkUnderTest s("sink_poses", {{"path", folder_.path().string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(s.log(), HasSubstr("add a file's name"));
 }
 

@@ -42,24 +42,24 @@ protected:
     static void write(SinkUnderTest &sink, std::uint64_t first, std::uint64_t end) {
         const Picture picture(8, 8, 0);
         for (; first < end; ++first)
-            ASSERT_EQ(sink.write(picture, camera_record(first)), ARHOST_OK) << sink.log();
+            ASSERT_EQ(sink.write(picture, camera_record(first)), ARHOST_STATUS_OK) << sink.log();
     }
     // What one uninterrupted run writes for frames [0, end).
     std::string uninterrupted(const std::string &format, std::uint64_t end) const {
         const auto path = folder_.path() / "whole.trajectory";
         SinkUnderTest whole = sink(format, path);
-        EXPECT_EQ(whole.start(8, 8), ARHOST_OK);
+        EXPECT_EQ(whole.start(8, 8), ARHOST_STATUS_OK);
         write(whole, 0, end);
-        EXPECT_EQ(whole.stop(), ARHOST_OK);
+        EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
         return read_text(path);
     }
     // Writes just these frames.
     void write_frames(const std::string &format, const std::vector<std::uint64_t> &frames) const {
         SinkUnderTest s = sink(format);
-        ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+        ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
         for (const std::uint64_t frame : frames)
             write(s, frame, frame + 1);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     }
 
     ScratchFolder folder_;
@@ -83,9 +83,9 @@ TEST_F(SinkTrajectory, WritesAHeaderAndALineAFrame) {
     record.camera.look_at[2] = 499;
     record.camera.up[1] = 1;
     SinkUnderTest s = sink("arhost");
-    ASSERT_EQ(s.start(8, 6), ARHOST_OK);
-    ASSERT_EQ(s.write(Picture(8, 6, 0), record), ARHOST_OK);
-    ASSERT_EQ(s.write(Picture(8, 6, 0), make_record(1)), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 6), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(Picture(8, 6, 0), record), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(Picture(8, 6, 0), make_record(1)), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(file()),
               R"({"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 30, )"
               R"("camera": {"width": 8, "height": 6, "fx": 333.3333333333333, "fy": 142.85714285714286, )"
@@ -129,9 +129,9 @@ TEST_F(SinkTrajectory, WritesTheDissertationsNineNumbersOfSixDigits) {
     std::ranges::copy(look_at, record.camera.look_at);
     std::ranges::copy(up, record.camera.up);
     SinkUnderTest s = sink("dissertation");
-    ASSERT_EQ(s.start(8, 6), ARHOST_OK);
-    ASSERT_EQ(s.write(Picture(8, 6, 0), record), ARHOST_OK);
-    ASSERT_EQ(s.write(Picture(8, 6, 0), make_record(1)), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 6), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(Picture(8, 6, 0), record), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(Picture(8, 6, 0), make_record(1)), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(file()), "7.39486 -721.148 500.637 1e-07 1.23457e+06 0 0 1 0.333333 \n\n");
 }
 
@@ -154,8 +154,8 @@ TEST_F(SinkTrajectory, ACameraThatIsNotFiniteIsNone) {
     record.camera.up[1] = std::numeric_limits<double>::quiet_NaN();
     for (const char *format : {"arhost", "dissertation"}) {
         SinkUnderTest s = sink(format);
-        ASSERT_EQ(s.start(8, 8), ARHOST_OK);
-        ASSERT_EQ(s.write(Picture(8, 8, 0), record), ARHOST_OK);
+        ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.write(Picture(8, 8, 0), record), ARHOST_STATUS_OK);
         EXPECT_FALSE(read_trajectory(file()).frames.at(0).view);
     }
 }
@@ -163,14 +163,14 @@ TEST_F(SinkTrajectory, ACameraThatIsNotFiniteIsNone) {
 TEST_F(SinkTrajectory, ARunWithoutACameraIsRefused) {
     SinkUnderTest s = sink("arhost");
     s.knows_camera = false;
-    EXPECT_EQ(s.start(8, 8), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("there is no camera to record: add a tracker"));
     EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
 TEST_P(SinkTrajectoryInEachFormat, IsWholeAfterEveryFrame) {
     SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 10; ++i) {
         write(s, i, i + 1);
         EXPECT_EQ(read_trajectory(file()).end(), i + 1);
@@ -181,7 +181,7 @@ TEST_P(SinkTrajectoryInEachFormat, IsWholeAfterEveryFrame) {
 TEST_P(SinkTrajectoryInEachFormat, AFreshRunReplacesAnOlderFileAtItsFirstFrame) {
     std::ofstream(file()) << "something else\n";
     SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(file()), "something else\n") << "the run may yet be refused";
     write(s, 0, 2);
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 2));
@@ -191,13 +191,13 @@ TEST_P(SinkTrajectoryInEachFormat, ARestartKeepsWhatCameBeforeAndReplacesTheRest
     for (const std::uint64_t restart : {1, 4, 5, 10}) {
         {
             SinkUnderTest killed = sink(GetParam());
-            ASSERT_EQ(killed.start(8, 8), ARHOST_OK);
+            ASSERT_EQ(killed.start(8, 8), ARHOST_STATUS_OK);
             write(killed, 0, 10);
         }
         SinkUnderTest s = sink(GetParam());
-        ASSERT_EQ(s.start(8, 8, restart), ARHOST_OK);
+        ASSERT_EQ(s.start(8, 8, restart), ARHOST_STATUS_OK);
         write(s, restart, 12);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 12)) << "restarted at " << restart;
         EXPECT_EQ(s.log(), "");
     }
@@ -208,7 +208,7 @@ TEST_P(SinkTrajectoryInEachFormat, ALineThatAKillCutShortIsDropped) {
     for (std::size_t size = two.size(); size < whole.size(); size += 7) {
         std::ofstream(file(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
         SinkUnderTest s = sink(GetParam());
-        ASSERT_EQ(s.start(8, 8, 2), ARHOST_OK);
+        ASSERT_EQ(s.start(8, 8, 2), ARHOST_STATUS_OK);
         EXPECT_EQ(read_text(file()), two) << "cut at " << size;
         write(s, 2, 3);
         EXPECT_EQ(read_text(file()), whole) << "cut at " << size;
@@ -221,15 +221,15 @@ TEST_P(SinkTrajectoryInEachFormat, SurvivesTheDeathOfItsProcessAtAnyMoment) {
     for (const std::uint64_t frames : {1, 40, 3, 200})
         next = write_until_killed("sink_trajectory", options, 8, 8, next, frames, camera_record);
     SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8, next), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8, next), ARHOST_STATUS_OK);
     write(s, next, next + 5);
-    ASSERT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), next + 5));
 }
 
 TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutItsOldFileSaysSoAndStillWritesWhatCanBeRead) {
     SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8, 5), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("holds no frame before 5"));
     write(s, 5, 7);
     EXPECT_THAT(numbers_of(read_trajectory(file())), testing::ElementsAre(5, 6));
@@ -237,12 +237,12 @@ TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutItsOldFileSaysSoAndStillWrites
 
 TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
     SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_OK);
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     write(s, 0, 2);
     const std::string before = read_text(file());
     {
         const FileSizeLimit limit(before.size() + 20); // takes a part of the next line
-        EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(file()), before);
     EXPECT_THAT(s.log(), HasSubstr("can't write '" + file().string() + "': File too large"));
@@ -256,6 +256,6 @@ INSTANTIATE_TEST_SUITE_P(Formats, SinkTrajectoryInEachFormat, testing::Values("a
 TEST_F(SinkTrajectory, AnUnwritableFolderIsAnIoErrorThatNamesThePath) {
     const UnwritableFolder locked(folder_.path() / "locked");
     SinkUnderTest s = sink("arhost", folder_.path() / "locked/run.trajectory");
-    EXPECT_EQ(s.start(8, 8), ARHOST_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(s.log(), HasSubstr("locked/run.trajectory"));
 }

@@ -52,16 +52,16 @@ protected:
     }
     // A whole run over frames [first, end) after a restart at `first`.
     void run(SinkUnderTest &&s, std::uint64_t first, std::uint64_t end, double fps = 30) const {
-        ASSERT_EQ(s.start(width, height, first, fps), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.write(first, end), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.stop(), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.start(width, height, first, fps), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(first, end), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
         EXPECT_EQ(s.log(), "");
     }
     // Frames [first, end) and then a kill.
     void run_and_die(std::uint64_t first, std::uint64_t end) const {
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(width, height, first), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.write(first, end), ARHOST_OK) << s.log();
+        ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(first, end), ARHOST_STATUS_OK) << s.log();
     }
     std::vector<std::string> names() const { return names_in(folder_.path()); }
 
@@ -96,9 +96,9 @@ TEST_F(SinkVideo, IsTaggedAsBt709OfLimitedRange) {
 TEST_F(SinkVideo, ColoursAreRight) {
     for (const std::string codec : {"h264", "mpeg4"}) {
         SinkUnderTest s = sink({{"codec", codec}});
-        ASSERT_EQ(s.start(320, 240), ARHOST_OK);
-        ASSERT_EQ(s.write(0, 3), ARHOST_OK);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.start(320, 240), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.write(0, 3), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         const Film film = read_film(path());
         ASSERT_EQ(film.frames.size(), 3u);
         for (std::uint64_t i = 0; i < 3; ++i) {
@@ -114,9 +114,9 @@ TEST_F(SinkVideo, OddSizesArePaddedByRepeatingTheEdge) {
     for (const auto &[w, h] : {std::pair{131, 97}, {130, 97}, {131, 96}}) {
         const Picture picture(w, h, 5, 3 * w + 61);
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(w, h), ARHOST_OK) << s.log();
-        ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_OK);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.start(w, h), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         const Film film = read_film(path());
         ASSERT_EQ(film.frames.size(), 1u);
         const FilmFrame &frame = film.frames[0];
@@ -136,8 +136,8 @@ TEST_F(SinkVideo, ReadsNoByteOutsideTheFrame) { // Picture faults there
     for (const int w : {64, 128, 336, 1024})
         for (const int h : {16, 64}) {
             SinkUnderTest s = sink({{"preset", "ultrafast"}});
-            ASSERT_EQ(s.start(w, h), ARHOST_OK);
-            ASSERT_EQ(s.write(0, 2), ARHOST_OK);
+            ASSERT_EQ(s.start(w, h), ARHOST_STATUS_OK);
+            ASSERT_EQ(s.write(0, 2), ARHOST_STATUS_OK);
         }
 }
 
@@ -157,9 +157,9 @@ TEST_F(SinkVideo, KeepsTheFrameRate) {
 TEST_F(SinkVideo, EveryFrameIsFoundAgainAtHighAndLowFrameRates) {
     for (const double fps : {500.0, 499.7, 240.0, 0.5}) {
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(width, height, 0, fps), ARHOST_OK);
-        ASSERT_EQ(s.write(0, 50), ARHOST_OK);
-        ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.write(0, 50), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_EQ(read_film(path()).numbers(), numbers(0, 50)) << fps;
         EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3) << fps; // MP4 has it in whole ms
     }
@@ -168,17 +168,17 @@ TEST_F(SinkVideo, EveryFrameIsFoundAgainAtHighAndLowFrameRates) {
 TEST_F(SinkVideo, AFrameRateThatNoFilmHasIsRefused) {
     for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
         SinkUnderTest s = sink();
-        EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_ERROR_CONFIGURATION) << fps;
+        EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_ERROR_CONFIGURATION) << fps;
         EXPECT_THAT(s.log(), HasSubstr("set the source's fps"));
     }
 }
 
 TEST_F(SinkVideo, FramesThatTheLiveModeLeftOutLeaveTheirTime) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (const std::uint64_t i : {3, 4, 9, 10, 20})
-        ASSERT_EQ(s.write(i), ARHOST_OK);
-    ASSERT_EQ(s.stop(), ARHOST_OK);
+        ASSERT_EQ(s.write(i), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     const Film film = read_film(path());
     EXPECT_THAT(film.numbers(), ElementsAre(3, 4, 9, 10, 20));
     EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // begins with the first frame
@@ -250,8 +250,8 @@ TEST_F(SinkVideo, RestartsWorkForEveryCodecAndContainer) {
             const std::map<std::string, std::string> options{{"path", path(name).string()}, {"codec", codec}};
             {
                 SinkUnderTest s = sink(options);
-                ASSERT_EQ(s.start(width, height), ARHOST_OK);
-                ASSERT_EQ(s.write(0, 5), ARHOST_OK);
+                ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+                ASSERT_EQ(s.write(0, 5), ARHOST_STATUS_OK);
             }
             run(sink(options), 4, 8);
             EXPECT_EQ(read_film(path(name)).numbers(), numbers(0, 8)) << name << " " << codec;
@@ -285,9 +285,9 @@ TEST_F(SinkVideo, ASegmentThatDiedBeforeItsFirstByteHoldsNothing) {
     run_and_die(0, 3);
     std::ofstream(path(".demo.mp4.from3.mkv")) << "";
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height, 4), ARHOST_OK);
-    ASSERT_EQ(s.write(4, 6), ARHOST_OK);
-    ASSERT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height, 4), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(4, 6), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("3 no frame can be read from '" + path(".demo.mp4.from3.mkv").string()));
     EXPECT_THAT(read_film(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
 }
@@ -329,8 +329,8 @@ TEST_F(SinkVideo, AFreshStartRemovesWhatAnEarlierRunLeft) {
 TEST_F(SinkVideo, ARunThatIsRefusedLeavesWhatAnEarlierOneCouldNotFinish) {
     run_and_die(0, 5);
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
-    EXPECT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+    EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
@@ -345,27 +345,27 @@ TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsWhole) {
 
 TEST_F(SinkVideo, ARestartWhoseFirstPartIsGoneSaysSoAndKeepsTheRest) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height, 5), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height, 5), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("3 the film's part before frame 5 is gone"));
-    ASSERT_EQ(s.write(5, 8), ARHOST_OK);
-    ASSERT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.write(5, 8), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_film(path()).numbers(), numbers(5, 8));
 }
 
 TEST_F(SinkVideo, SegmentsOfOtherOptionsAreNotJoined) {
     run_and_die(0, 3);
     SinkUnderTest s = sink({{"preset", "ultrafast"}});
-    ASSERT_EQ(s.start(width, height, 3), ARHOST_OK);
-    ASSERT_EQ(s.write(3, 5), ARHOST_OK);
-    EXPECT_EQ(s.stop(), ARHOST_ERROR_CONFIGURATION);
+    ASSERT_EQ(s.start(width, height, 3), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(3, 5), ARHOST_STATUS_OK);
+    EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("encoded with other options"));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // nothing is lost
 }
 
 TEST_F(SinkVideo, NoFrameMakesNoFilmAndAWarning) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
-    EXPECT_EQ(s.stop(), ARHOST_OK);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+    EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(names(), IsEmpty());
     EXPECT_THAT(s.log(), HasSubstr("3 no frame came: '" + path().string() + "' was not written"));
 }
@@ -375,7 +375,7 @@ TEST_F(SinkVideo, NoFrameMakesNoFilmAndAWarning) {
 TEST_F(SinkVideo, AnUnknownEndingIsRefused) {
     for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
         SinkUnderTest s = sink({{"path", path(name).string()}});
-        EXPECT_EQ(s.created(), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
         EXPECT_THAT(s.log(), HasSubstr(".mp4, .mkv and .mov"));
     }
 }
@@ -383,10 +383,10 @@ TEST_F(SinkVideo, AnUnknownEndingIsRefused) {
 TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndWhatWasWrittenBeforeStays) {
     {
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(width, height), ARHOST_OK);
-        ASSERT_EQ(s.write(0, 3), ARHOST_OK);
+        ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.write(0, 3), ARHOST_STATUS_OK);
         const FileSizeLimit limit(std::filesystem::file_size(path(".demo.mp4.from0.mkv")) + 50);
-        EXPECT_EQ(s.write(3), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.write(3), ARHOST_STATUS_ERROR_IO);
         EXPECT_THAT(s.log(), HasSubstr("File too large"));
         EXPECT_THAT(s.log(), HasSubstr(".demo.mp4.from0.mkv"));
     }
@@ -399,10 +399,10 @@ TEST_F(SinkVideo, ADiskThatIsFullAtTheEndKeepsTheFramesAndTheOlderFilm) {
     const std::string old = read_text(path());
     {
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(width, height), ARHOST_OK);
-        ASSERT_EQ(s.write(0, 8), ARHOST_OK);
+        ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+        ASSERT_EQ(s.write(0, 8), ARHOST_STATUS_OK);
         const FileSizeLimit limit(1500);
-        EXPECT_EQ(s.stop(), ARHOST_ERROR_IO);
+        EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_IO);
         EXPECT_THAT(s.log(), HasSubstr("the film's frames are kept in"));
     }
     EXPECT_EQ(read_text(path()), old);
@@ -414,7 +414,7 @@ TEST_F(SinkVideo, ADiskThatIsFullAtTheEndKeepsTheFramesAndTheOlderFilm) {
 TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
     const UnwritableFolder locked(path("locked"));
     SinkUnderTest s = sink({{"path", path("locked/demo.mp4").string()}});
-    EXPECT_EQ(s.start(width, height), ARHOST_ERROR_IO);
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.partial': Permission denied"));
 }
 
@@ -433,12 +433,12 @@ TEST_F(SinkVideo, MissingFoldersAreMade) {
 TEST_F(SinkVideo, AFolderAsPathIsRefused) {
     std::filesystem::create_directory(path());
     SinkUnderTest s = sink();
-    EXPECT_EQ(s.start(width, height), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("is a folder"));
 }
 
 TEST_F(SinkVideo, AFrameOfAnotherSizeIsRefused) {
     SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(width, height), ARHOST_OK);
-    EXPECT_EQ(s.write(Picture(width - 2, height, 0), make_record(0)), ARHOST_ERROR_INVALID_ARGUMENT);
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
+    EXPECT_EQ(s.write(Picture(width - 2, height, 0), make_record(0)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }

@@ -85,7 +85,7 @@ protected:
     }
     SinkUnderTest &start(int width, int height, const std::map<std::string, std::string> &options = {}) {
         sink_.emplace("sink_window", options);
-        EXPECT_EQ(sink_->start(width, height), ARHOST_OK) << sink_->log();
+        EXPECT_EQ(sink_->start(width, height), ARHOST_STATUS_OK) << sink_->log();
         keep_libraries();
         return *sink_;
     }
@@ -120,7 +120,7 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
     EXPECT_EQ(observer_->title(), "a title");
     for (const std::uint64_t i : {0, 300}) {
         const Picture picture(320, 200, i);
-        ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_OK) << sink.log();
+        ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_STATUS_OK) << sink.log();
         EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
     }
     const Screenshot shot = observer_->screen(); // and it is on the screen, not in the window's memory alone
@@ -128,14 +128,14 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
     const Picture picture(320, 200, 300);
     for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(shot.pixel(where.x + 160, where.y + 100)[c], picture.pixel(160, 100)[c], 2);
-    EXPECT_EQ(sink.stop(), ARHOST_OK);
+    EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
 }
 
 TEST_F(SinkWindow, TakesOddSizesAndPaddedRows) {
     for (const auto &[width, height] : {std::pair{131, 97}, {130, 33}}) {
         SinkUnderTest &sink = start(width, height);
         const Picture picture(width, height, 9, 3 * width + 61);
-        ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+        ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
         EXPECT_LE(difference(picture, 0, 0, width, height), 2);
     }
 }
@@ -151,7 +151,7 @@ TEST_F(SinkWindow, IsBlackUntilTheFirstFrame) {
 TEST_F(SinkWindow, KeepsTheAspectWhenTheWindowIsResized) {
     SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
     observer_->resize(400, 240); // wider: bars at the sides
     EXPECT_LE(difference(picture, 40, 0, 320, 240), 2);
     observer_->resize(160, 400); // higher: bars above and below
@@ -161,7 +161,7 @@ TEST_F(SinkWindow, KeepsTheAspectWhenTheWindowIsResized) {
 TEST_F(SinkWindow, BeginsAtTheScaleThatIsAskedFor) {
     SinkUnderTest &sink = start(160, 120, {{"scale", "2.5"}});
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
     const XWindowAttributes window = observer_->attributes();
     EXPECT_EQ(window.width, 400);
     EXPECT_EQ(window.height, 300);
@@ -178,27 +178,27 @@ TEST_F(SinkWindow, IsNeverLargerThanTheScreen) {
 TEST_F(SinkWindow, EscapeAndQEndTheRun) {
     for (const KeySym key : {XK_Escape, XK_q}) {
         SinkUnderTest &sink = start(160, 120);
-        EXPECT_EQ(sink.idle(), ARHOST_OK);
+        EXPECT_EQ(sink.idle(), ARHOST_STATUS_OK);
         observer_->press(XK_a);
-        EXPECT_EQ(sink.idle(), ARHOST_OK);
+        EXPECT_EQ(sink.idle(), ARHOST_STATUS_OK);
         observer_->press(key);
-        EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_END; }));
-        EXPECT_EQ(sink.write(Picture(160, 120, 0), make_record(0)), ARHOST_END);
-        EXPECT_EQ(sink.stop(), ARHOST_OK);
+        EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_STATUS_END; }));
+        EXPECT_EQ(sink.write(Picture(160, 120, 0), make_record(0)), ARHOST_STATUS_END);
+        EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
     }
 }
 
 TEST_F(SinkWindow, ClosingTheWindowEndsTheRun) {
     SinkUnderTest &sink = start(160, 120);
-    EXPECT_EQ(sink.write(0), ARHOST_OK);
+    EXPECT_EQ(sink.write(0), ARHOST_STATUS_OK);
     observer_->close_window();
-    EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_END; }));
+    EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_STATUS_END; }));
 }
 
 TEST_F(SinkWindow, FGoesToFullScreenAndBack) {
     SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_OK);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
     const auto has_size = [&](int width, int height) {
         return [this, width, height] {
             const XWindowAttributes window = observer_->attributes();
@@ -216,8 +216,8 @@ TEST_F(SinkWindow, FGoesToFullScreenAndBack) {
 TEST_F(SinkWindow, CanBeOpenedAgain) {
     for (int i = 0; i < 2; ++i) {
         SinkUnderTest &sink = start(160, 120);
-        EXPECT_EQ(sink.write(0), ARHOST_OK);
-        EXPECT_EQ(sink.stop(), ARHOST_OK);
+        EXPECT_EQ(sink.write(0), ARHOST_STATUS_OK);
+        EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
     }
 }
 
@@ -225,7 +225,7 @@ TEST(SinkWindowWithoutScreen, SaysWhatIsMissingAndWhatToTry) {
     for (const char *display : {"", ":54321"}) {
         setenv("DISPLAY", display, 1);
         SinkUnderTest sink("sink_window", {});
-        EXPECT_EQ(sink.start(160, 120), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(sink.start(160, 120), ARHOST_STATUS_ERROR_CONFIGURATION);
         EXPECT_THAT(sink.log(), AllOf(HasSubstr("4 can't open a window: X11:"), HasSubstr("DISPLAY"),
                                       HasSubstr("xvfb-run -a"), HasSubstr("sink_video")));
     }
@@ -233,6 +233,6 @@ TEST(SinkWindowWithoutScreen, SaysWhatIsMissingAndWhatToTry) {
 
 TEST(SinkWindowWithoutScreen, DeclaresThatItNeedsADisplayAndWantsTheNewestFrame) {
     const SinkUnderTest sink("sink_window", {});
-    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_IS_REALTIME_SINK});
+    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_CAPABILITY_REALTIME_SINK});
     EXPECT_NE(sink.functions().idle, nullptr);
 }

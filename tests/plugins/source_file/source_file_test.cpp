@@ -133,33 +133,33 @@ TEST(ImageSequence, GivesARealSequenceByteForByteAsOpenCvReadsIt) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
     SourceUnderTest source("source_file");
     const fs::path folder = shared_data("markers/rbt_sequence");
-    ASSERT_EQ(source.start({{"path", (folder / "color_image_%04d.png").string()}}), ARHOST_OK) << source.log();
-    EXPECT_EQ(source.format().pixel_format, ARHOST_BGR8);
+    ASSERT_EQ(source.start({{"path", (folder / "color_image_%04d.png").string()}}), ARHOST_STATUS_OK) << source.log();
+    EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
     EXPECT_EQ(source.format().width, 640u);
     EXPECT_EQ(source.format().height, 480u);
     EXPECT_EQ(source.format().fps, 30.0);
     EXPECT_EQ(source.properties().frame_count, 40u);
     for (std::uint64_t n = 0; n < 40; ++n) {
         const SourceFrame frame = source.read(n);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         std::string digits = std::to_string(n);
         digits.insert(0, 4 - digits.size(), '0');
         ASSERT_EQ(frame.bytes, bytes_of(cv::imread((folder / ("color_image_" + digits + ".png")).string())));
         EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MEDIA);
         EXPECT_EQ(frame.info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
     }
-    EXPECT_EQ(source.read(40).status, ARHOST_END);
-    EXPECT_EQ(source.read(40).status, ARHOST_END);
+    EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
+    EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
 }
 
 TEST(ImageSequence, StartsAtTheLowestNumberOrWhereItIsTold) {
     ScratchFolder folder;
     write_images(folder.path(), {1, 2, 3, 4});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.properties().frame_count, 4u);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 1)));
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"start", "3"}}), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"start", "3"}}), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 3)));
 }
@@ -168,7 +168,7 @@ TEST(ImageSequence, EndsBeforeAMissingFileAndSaysSo) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 5});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("image_0003.png' is missing"));
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to number 5"));
@@ -180,7 +180,7 @@ TEST(ImageSequence, TakesTheRateAskedFor) {
     SourceUnderTest source("source_file");
     arhost_source_setup setup{};
     setup.fps = 8;
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, setup), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, setup), ARHOST_STATUS_OK);
     EXPECT_EQ(source.format().fps, 8.0);
     EXPECT_EQ(source.read(2).info.capture_ns, 250'000'000);
 }
@@ -190,9 +190,9 @@ TEST(ImageSequence, RefusesASizeThatChangesAndNamesTheFile) {
     write_images(folder.path(), {0, 1});
     write_images(folder.path(), {2}, 50, 32);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
-    EXPECT_EQ(source.read(1).status, ARHOST_OK);
-    EXPECT_EQ(source.read(2).status, ARHOST_ERROR_CONFIGURATION);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' is 50×32"));
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0000.png' is 48×32"));
 }
@@ -203,8 +203,8 @@ TEST(ImageSequence, KeepsTheFirstImagesChoiceOfGreyOrColour) {
     cv::imwrite((folder.path() / "image_0000.png").string(), grey);
     write_images(folder.path(), {1});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
-    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     EXPECT_EQ(source.read(0).bytes, bytes_of(grey));
     EXPECT_EQ(source.read(1).bytes,
               bytes_of(cv::imread((folder.path() / "image_0001.png").string(), cv::IMREAD_GRAYSCALE)));
@@ -218,10 +218,10 @@ TEST(ImageSequence, NamesAnImageThatIsDamaged) {
     write_bytes(folder.path() / "image_0001.png", half);
     write_bytes(folder.path() / "image_0002.png", {});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_OK);
-    EXPECT_EQ(source.read(1).status, ARHOST_ERROR_IO);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' can't be read: it is damaged"));
-    EXPECT_EQ(source.read(2).status, ARHOST_ERROR_IO);
+    EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' can't be read: it is empty"));
 }
 
@@ -229,29 +229,29 @@ TEST(ImageSequence, GivesAnyFrameAfterARestart) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(3)), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(3)), ARHOST_STATUS_OK);
     EXPECT_EQ(source.read(3).bytes, bytes_of(colourful(48, 32, 3)));
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(48, 32, 1)));
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(5)), ARHOST_OK);
-    EXPECT_EQ(source.read(5).status, ARHOST_END);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(5)), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(5).status, ARHOST_STATUS_END);
 }
 
 TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}, {"frames", "7"}}), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}, {"frames", "7"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 7u);
     const auto frames = source.read_all();
     ASSERT_EQ(frames.size(), 8u);
-    EXPECT_EQ(frames[7].status, ARHOST_END);
+    EXPECT_EQ(frames[7].status, ARHOST_STATUS_END);
     for (std::size_t n = 0; n < 7; ++n) {
         EXPECT_EQ(frames[n].bytes, bytes_of(colourful(48, 32, static_cast<int>(n % 3))));
         EXPECT_EQ(frames[n].info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
     }
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}}), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 0u) << "endless";
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"frames", "2"}}), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"frames", "2"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read_all().size(), 3u);
 }
@@ -261,17 +261,17 @@ TEST(SingleImage, IsGivenOnceOrAsOftenAsAskedFor) {
     const fs::path file = folder.path() / "100%.png"; // an existing file is no pattern
     cv::imwrite(file.string(), colourful(33, 21));
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.properties().frame_count, 1u);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(33, 21)));
-    EXPECT_EQ(source.read(1).status, ARHOST_END);
-    ASSERT_EQ(source.start({{"path", file.string()}, {"frames", "3"}}), ARHOST_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_END);
+    ASSERT_EQ(source.start({{"path", file.string()}, {"frames", "3"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 3u);
     EXPECT_EQ(source.read(2).bytes, bytes_of(colourful(33, 21)));
-    EXPECT_EQ(source.read(3).status, ARHOST_END);
-    ASSERT_EQ(source.start({{"path", file.string()}, {"loop", "true"}}), ARHOST_OK);
+    EXPECT_EQ(source.read(3).status, ARHOST_STATUS_END);
+    ASSERT_EQ(source.start({{"path", file.string()}, {"loop", "true"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 0u);
-    EXPECT_EQ(source.read(100'000).status, ARHOST_OK);
+    EXPECT_EQ(source.read(100'000).status, ARHOST_STATUS_OK);
 }
 
 TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
@@ -282,8 +282,8 @@ TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
     for (int i = 0; i < 24; ++i)
         deep.at<std::uint16_t>(i / 6, i % 6) = static_cast<std::uint16_t>(i * 2849);
     cv::imwrite((folder.path() / "deep.png").string(), deep);
-    ASSERT_EQ(source.start({{"path", (folder.path() / "deep.png").string()}}), ARHOST_OK);
-    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    ASSERT_EQ(source.start({{"path", (folder.path() / "deep.png").string()}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const Bytes grey = source.read(0).bytes;
     for (std::size_t i = 0; i < 24; ++i)
         EXPECT_NEAR(grey.at(i), static_cast<double>(i) * 2849 / 257, 1);
@@ -296,8 +296,8 @@ TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
             with_alpha.at<cv::Vec4b>(y, x) = cv::Vec4b(c[0], c[1], c[2], static_cast<uchar>(20 * x));
         }
     cv::imwrite((folder.path() / "alpha.png").string(), with_alpha);
-    ASSERT_EQ(source.start({{"path", (folder.path() / "alpha.png").string()}}), ARHOST_OK);
-    EXPECT_EQ(source.format().pixel_format, ARHOST_BGR8);
+    ASSERT_EQ(source.start({{"path", (folder.path() / "alpha.png").string()}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colour));
 }
 
@@ -306,35 +306,35 @@ TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
 TEST(Refusal, NamesAFileThatIsNotThereAndWhatIs) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
-    expect_refusal({{"path", (folder.path() / "film.mp4").string()}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", (folder.path() / "film.mp4").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"film.mp4' can't be opened", "image_0000.png"});
-    expect_refusal({{"path", "/nowhere/film.mp4"}}, ARHOST_ERROR_CONFIGURATION, {"'/nowhere/film.mp4'"});
+    expect_refusal({{"path", "/nowhere/film.mp4"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"'/nowhere/film.mp4'"});
 }
 
 TEST(Refusal, TellsWhatAPatternLookedForAndWhatTheFolderHas) {
     ScratchFolder folder;
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"no file matches", "looked for", "image_0000.png' first", "is empty"});
     write_bytes(folder.path() / "image_1.png", {});    // too few digits for %04d
     write_bytes(folder.path() / "image_-001.png", {}); // no sign is allowed
     write_bytes(folder.path() / "notes.txt", {});
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"has 3 entries", "image_1.png", "notes.txt"});
     write_images(folder.path(), {3, 4});
-    expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"image_0000.png' first", "2 from number 3 to 4", "'start'"});
-    expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"/nowhere/image_0.png", "can't be listed"});
 }
 
 TEST(Refusal, AllowsNothingInAPatternButOneDecimalNumber) {
     for (const char *name : {"a_%s.png", "a_%n.png", "a_%4d.png", "a_%04x.png", "a_%00d.png", "a_%099d.png",
                              "a_%-4d.png", "a_%*d.png", "a_%ld.png", "a_%", "a_%04", "a_%1$d.png"})
-        expect_refusal({{"path", std::string("/frames/") + name}}, ARHOST_ERROR_CONFIGURATION,
+        expect_refusal({{"path", std::string("/frames/") + name}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                        {name, "is not allowed", "%04d"});
-    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_ERROR_CONFIGURATION, {"a second '%d'"});
-    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_ERROR_CONFIGURATION, {"no %d in its name"});
-    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_ERROR_CONFIGURATION, {"no %d in its name"});
+    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"a second '%d'"});
+    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"no %d in its name"});
+    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"no %d in its name"});
 }
 
 TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
@@ -342,7 +342,7 @@ TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
     cv::imwrite((folder.path() / "50%_9.png").string(), colourful(8, 8, 9));
     cv::imwrite((folder.path() / "50%_10.png").string(), colourful(8, 8, 10));
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", (folder.path() / "50%%_%d.png").string()}}), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start({{"path", (folder.path() / "50%%_%d.png").string()}}), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(8, 8, 10)));
 }
@@ -350,9 +350,9 @@ TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
 TEST(Refusal, TellsThatAFolderIsNone) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
-    expect_refusal({{"path", folder.path().string()}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"is a folder", "image_%04d.png", "image_0000.png"});
-    expect_refusal({{"path", "/dev/null"}}, ARHOST_ERROR_CONFIGURATION, {"is no file"});
+    expect_refusal({{"path", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"is no file"});
 }
 
 TEST(Refusal, EmptyAndGarbageFilesAreOneMessageEach) {
@@ -363,14 +363,15 @@ TEST(Refusal, EmptyAndGarbageFilesAreOneMessageEach) {
         byte = static_cast<std::uint8_t>((random = random * 1664525u + 1013904223u) >> 24);
     for (const char *name : {"film.mp4", "film.avi", "film"}) {
         write_bytes(folder.path() / name, {});
-        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_ERROR_CONFIGURATION,
+        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                        {name, "can't be read"});
         write_bytes(folder.path() / name, garbage);
-        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_ERROR_CONFIGURATION,
+        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                        {name, "can't be read"});
     }
     write_bytes(folder.path() / "image.png", garbage);
-    expect_refusal({{"path", (folder.path() / "image.png").string()}}, ARHOST_ERROR_IO, {"image.png' can't be read"});
+    expect_refusal({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_IO,
+                   {"image.png' can't be read"});
 }
 
 TEST(Refusal, NoPermissionIsToldAsSuch) {
@@ -381,7 +382,7 @@ TEST(Refusal, NoPermissionIsToldAsSuch) {
     fs::permissions(folder.path(), fs::perms::all);
     const bool root = geteuid() == 0;
     ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // root may read everything
-    expect_refusal({{"path", file.string()}}, ARHOST_ERROR_CONFIGURATION, {"film.mp4", "Permission denied"});
+    expect_refusal({{"path", file.string()}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "Permission denied"});
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
 }
 
@@ -389,7 +390,7 @@ TEST(Refusal, AFileWithoutVideoIsTold) {
     ARHOST_REQUIRE_FFMPEG();
     ScratchFolder folder;
     ffmpeg(folder.path(), "-f lavfi -i sine=duration=0.2 tone.wav");
-    expect_refusal({{"path", (folder.path() / "tone.wav").string()}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", (folder.path() / "tone.wav").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"tone.wav", "no video stream"});
 }
 
@@ -401,7 +402,7 @@ TEST(Refusal, AnUnknownCodecIsTold) {
     for (auto at = bytes.begin(); (at = std::search(at, bytes.end(), fourcc.begin(), fourcc.end())) != bytes.end();)
         at = std::copy(unknown.begin(), unknown.end(), at);
     write_bytes(video.file(), bytes);
-    expect_refusal(video.options(), ARHOST_ERROR_CONFIGURATION, {"film.avi", "no decoder"});
+    expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.avi", "no decoder"});
 }
 
 TEST(Refusal, ACameraOfAnotherSizeIsTold) {
@@ -413,7 +414,7 @@ TEST(Refusal, ACameraOfAnotherSizeIsTold) {
     camera.height = 480;
     arhost_source_setup setup{};
     setup.intrinsics = &camera;
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_ERROR_CONFIGURATION,
+    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"48×32", "calibration is for 640×480"}, setup);
 }
 
@@ -427,21 +428,22 @@ TEST(Video, GivesPlanarYuvAsTheDecoderMadeIt) {
         arhost_yuv_matrix matrix;
     };
     const std::string tagged = std::string(h264) + " -colorspace bt709 -color_primaries bt709 -color_trc bt709";
-    for (const Case &c : {Case{"a.mp4", h264, ARHOST_LIMITED_RANGE, ARHOST_BT601},
-                          Case{"b.mp4", tagged.c_str(), ARHOST_LIMITED_RANGE, ARHOST_BT709},
-                          Case{"c.mp4", "-c:v mpeg4 -q:v 3", ARHOST_LIMITED_RANGE, ARHOST_BT601},
-                          Case{"d.avi", "-c:v mjpeg -q:v 3 -pix_fmt yuvj420p", ARHOST_FULL_RANGE, ARHOST_BT601}}) {
+    for (const Case &c :
+         {Case{"a.mp4", h264, ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_MATRIX_BT601},
+          Case{"b.mp4", tagged.c_str(), ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_MATRIX_BT709},
+          Case{"c.mp4", "-c:v mpeg4 -q:v 3", ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_MATRIX_BT601},
+          Case{"d.avi", "-c:v mjpeg -q:v 3 -pix_fmt yuvj420p", ARHOST_YUV_RANGE_FULL, ARHOST_YUV_MATRIX_BT601}}) {
         SCOPED_TRACE(c.name);
         const VideoFile video(c.name, c.codec);
         SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
-        EXPECT_EQ(source.format().pixel_format, ARHOST_I420);
+        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+        EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_I420);
         EXPECT_EQ(source.format().yuv_matrix, c.matrix);
         EXPECT_EQ(source.format().yuv_range, c.range);
         EXPECT_EQ(source.format().fps, 25.0);
         EXPECT_EQ(source.properties().frame_count, 40u);
-        const auto expected =
-            reference_frames(video.file(), c.range == ARHOST_FULL_RANGE ? "yuvj420p" : "yuv420p", 96 * 64 * 3 / 2);
+        const auto expected = reference_frames(
+            video.file(), c.range == ARHOST_YUV_RANGE_FULL ? "yuvj420p" : "yuv420p", 96 * 64 * 3 / 2);
         const auto frames = source.read_all();
         ASSERT_EQ(frames.size(), 41u);
         ASSERT_EQ(expected.size(), 40u);
@@ -450,8 +452,8 @@ TEST(Video, GivesPlanarYuvAsTheDecoderMadeIt) {
             EXPECT_EQ(frames[n].info.capture_ns, static_cast<std::int64_t>(n) * 40'000'000);
             EXPECT_EQ(frames[n].info.clock, ARHOST_CLOCK_MEDIA);
         }
-        EXPECT_EQ(frames[40].status, ARHOST_END);
-        EXPECT_EQ(source.read(40).status, ARHOST_END);
+        EXPECT_EQ(frames[40].status, ARHOST_STATUS_END);
+        EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
         EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
         EXPECT_EQ(source.log(ARHOST_SEVERITY_ERROR), "");
     }
@@ -461,16 +463,16 @@ TEST(Video, GuessesBt709ForUntaggedHighDefinition) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("hd.mp4", h264, "1280x720", 2);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
-    EXPECT_EQ(source.format().yuv_matrix, ARHOST_BT709);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    EXPECT_EQ(source.format().yuv_matrix, ARHOST_YUV_MATRIX_BT709);
 }
 
 TEST(Video, GreyStaysGrey) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("grey.mkv", "-vf scale=33:21 -c:v ffv1 -pix_fmt gray", "96x64", 5);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
-    EXPECT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const auto expected = reference_frames(video.file(), "gray", 33 * 21);
     ASSERT_EQ(expected.size(), 5u);
     for (std::size_t n = 0; n < 5; ++n)
@@ -481,8 +483,8 @@ TEST(Video, GreyOfLimitedRangeIsWidened) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("grey.mkv", "-c:v ffv1 -pix_fmt gray -color_range tv", "64x48", 1);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
-    ASSERT_EQ(source.format().pixel_format, ARHOST_GREY8);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const Bytes stored = reference_frames(video.file(), "gray", 64 * 48).at(0);
     const Bytes given = source.read(0).bytes;
     for (std::size_t i = 0; i < given.size(); ++i)
@@ -505,8 +507,8 @@ TEST(Video, OddSizesAndOtherFormatsBecomeBgrOfTheRightColours) {
         // One colour, so that neither the scaler's filter nor chroma siting matters.
         const VideoFile video(c.name, c.codec, c.size, 1, "color=c=0xC86432");
         SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
-        ASSERT_EQ(source.format().pixel_format, ARHOST_BGR8);
+        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+        ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
         EXPECT_EQ(source.format().width, static_cast<unsigned>(c.w));
         EXPECT_EQ(source.format().height, static_cast<unsigned>(c.h));
         const Bytes frame = source.read(0).bytes;
@@ -523,7 +525,7 @@ TEST(Video, RgbIsLossless) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("rgb.mkv", "-c:v ffv1 -pix_fmt bgr0", "50x30", 3);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
     const auto expected = reference_frames(video.file(), "bgr24", 50 * 30 * 3);
     for (std::size_t n = 0; n < 3; ++n)
         EXPECT_EQ(source.read(n).bytes, expected.at(n));
@@ -539,11 +541,12 @@ TEST(Video, IsTurnedAsItsMetadataAsks) {
             ffmpeg(video.folder(),
                    "-i film.mp4 -c copy -metadata:s:v rotate=" + std::string(degrees) + " turned.mp4");
             SourceUnderTest source("source_file");
-            ASSERT_EQ(source.start({{"path", (video.folder() / "turned.mp4").string()}}), ARHOST_OK) << source.log();
+            ASSERT_EQ(source.start({{"path", (video.folder() / "turned.mp4").string()}}), ARHOST_STATUS_OK)
+                << source.log();
             const bool upright = std::string(degrees) == "180";
             EXPECT_EQ(source.format().width, upright ? 96u : 64u);
             EXPECT_EQ(source.format().height, upright ? 64u : 96u);
-            const bool rgb = source.format().pixel_format == ARHOST_BGR8;
+            const bool rgb = source.format().pixel_format == ARHOST_PIXEL_FORMAT_BGR8;
             ffmpeg(video.folder(),
                    std::string("-i turned.mp4 -f rawvideo -pix_fmt ") + (rgb ? "bgr24" : "yuv420p") + " turned.raw");
             const Bytes expected = bytes_of(video.folder() / "turned.raw");
@@ -563,19 +566,19 @@ TEST(Video, EveryFrameIsTheSameAfterARestartThere) {
         SCOPED_TRACE(codec);
         const VideoFile video("film.mp4", codec);
         SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
         const auto whole = source.read_all();
         ASSERT_EQ(whole.size(), 41u);
         for (const std::size_t n : {0u, 1u, 9u, 10u, 11u, 25u, 39u}) {
-            ASSERT_EQ(source.start(video.options(), from(n)), ARHOST_OK);
+            ASSERT_EQ(source.start(video.options(), from(n)), ARHOST_STATUS_OK);
             for (std::size_t i = n; i < std::min<std::size_t>(n + 3, 40); ++i) {
                 const SourceFrame frame = source.read(i);
                 ASSERT_EQ(frame.bytes, whole[i].bytes) << "frame " << i << " after a restart at " << n;
                 EXPECT_EQ(frame.info.capture_ns, whole[i].info.capture_ns);
             }
         }
-        ASSERT_EQ(source.start(video.options(), from(40)), ARHOST_OK);
-        EXPECT_EQ(source.read(40).status, ARHOST_END);
+        ASSERT_EQ(source.start(video.options(), from(40)), ARHOST_STATUS_OK);
+        EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
         EXPECT_EQ(source.read(39).bytes, whole[39].bytes) << "also back from the end";
         EXPECT_EQ(source.read(2).bytes, whole[2].bytes);
     }
@@ -588,7 +591,7 @@ TEST(Video, LoopsWithTimeThatGoesOn) {
     auto options = video.options();
     options["loop"] = "true";
     options["frames"] = "15";
-    ASSERT_EQ(source.start(options), ARHOST_OK);
+    ASSERT_EQ(source.start(options), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 15u);
     const auto frames = source.read_all();
     ASSERT_EQ(frames.size(), 16u);
@@ -597,7 +600,7 @@ TEST(Video, LoopsWithTimeThatGoesOn) {
         EXPECT_EQ(frames[n].info.capture_ns, static_cast<std::int64_t>(n) * 40'000'000);
     }
     for (const std::size_t n : {6u, 13u}) {
-        ASSERT_EQ(source.start(options, from(n)), ARHOST_OK);
+        ASSERT_EQ(source.start(options, from(n)), ARHOST_STATUS_OK);
         EXPECT_EQ(source.read(n).bytes, frames[n].bytes);
         EXPECT_EQ(source.read(n + 1).info.capture_ns, frames[n + 1].info.capture_ns);
     }
@@ -607,12 +610,12 @@ TEST(Video, KeepsTimesOfAVariableRateUnlessARateIsAskedFor) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     for (std::uint64_t n = 0; n < 5; ++n)
         EXPECT_NEAR(static_cast<double>(source.read(n).info.capture_ns), static_cast<double>(n * n) * 4e7, 1e6);
     arhost_source_setup setup{};
     setup.fps = 10;
-    ASSERT_EQ(source.start(video.options(), setup), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options(), setup), ARHOST_STATUS_OK);
     EXPECT_EQ(source.format().fps, 10.0);
     EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
 }
@@ -621,10 +624,10 @@ TEST(Video, OfOneFrameHasOneFrame) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("one.mp4", h264, "96x64", 1);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 1u);
-    EXPECT_EQ(source.read(0).status, ARHOST_OK);
-    EXPECT_EQ(source.read(1).status, ARHOST_END);
+    EXPECT_EQ(source.read(0).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_END);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
@@ -638,16 +641,16 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
         SCOPED_TRACE(c.name);
         const VideoFile video(c.name, c.codec, "160x120", 40);
         SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
         const auto whole = source.read_all();
         Bytes half = bytes_of(video.file());
         half.resize(half.size() * 6 / 10);
         write_bytes(video.file(), half);
-        ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
         const auto frames = source.read_all();
         ASSERT_GT(frames.size(), 10u);
         ASSERT_LT(frames.size(), 38u);
-        EXPECT_EQ(frames.back().status, ARHOST_END_CUT_SHORT);
+        EXPECT_EQ(frames.back().status, ARHOST_STATUS_END_TRUNCATED);
         const std::size_t good = frames.size() - 1;
         // The last few may have gaps between them: pictures that were stored after the cut.
         for (std::size_t n = 0, same = 0; n < good; ++n, ++same) {
@@ -658,7 +661,7 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
         EXPECT_THAT(
             source.log(ARHOST_SEVERITY_WARNING),
             HasSubstr(std::string(c.name) + "' is cut short: it ends after frame " + std::to_string(good - 1)));
-        EXPECT_EQ(source.read(good).status, ARHOST_END_CUT_SHORT);
+        EXPECT_EQ(source.read(good).status, ARHOST_STATUS_END_TRUNCATED);
     }
 }
 
@@ -667,10 +670,10 @@ TEST(Video, InAviMayHaveFewerFramesThanItsHeaderHasSlots) {
     const VideoFile video("film.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
     ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // its header says 80
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_STATUS_OK) << source.log();
     const auto frames = source.read_all();
     EXPECT_EQ(frames.size(), 41u);
-    EXPECT_EQ(frames.back().status, ARHOST_END);
+    EXPECT_EQ(frames.back().status, ARHOST_STATUS_END);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
@@ -680,7 +683,7 @@ TEST(Video, WithoutItsIndexSaysWhatIsMissing) {
     Bytes half = bytes_of(video.file());
     half.resize(half.size() / 2);
     write_bytes(video.file(), half);
-    expect_refusal(video.options(), ARHOST_ERROR_CONFIGURATION, {"film.mp4", "moov atom not found"});
+    expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "moov atom not found"});
 }
 
 TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
@@ -691,11 +694,11 @@ TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
         bytes[i] = static_cast<std::uint8_t>(i * 37);
     write_bytes(video.file(), bytes);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
     const auto whole = source.read_all();
     EXPECT_GT(whole.size(), 30u);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("is damaged near frame"));
-    ASSERT_EQ(source.start(video.options(), from(25)), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options(), from(25)), ARHOST_STATUS_OK);
     EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
 }
 
@@ -707,8 +710,8 @@ TEST(Video, RefusesASizeThatChanges) {
     both.insert(both.end(), second.begin(), second.end());
     write_bytes(small.file(), both);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(small.options()), ARHOST_OK) << source.log();
-    EXPECT_EQ(source.read_all().back().status, ARHOST_ERROR_CONFIGURATION);
+    ASSERT_EQ(source.start(small.options()), ARHOST_STATUS_OK) << source.log();
+    EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, those before it 96×64"));
 }
 
@@ -721,7 +724,7 @@ TEST(Video, NoisyDecodersReachTheLogAsDebugAndNotStderr) {
     write_bytes(video.file(), bytes);
     testing::internal::CaptureStderr();
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     source.read_all();
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     EXPECT_THAT(source.log(ARHOST_SEVERITY_DEBUG), HasSubstr("libav: "));
@@ -731,11 +734,11 @@ TEST(Video, StopsDecodingWhenCancelled) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     source.plugin().cancel();
-    EXPECT_EQ(source.read(39).status, ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(source.read(39).status, ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_ERROR), "");
-    EXPECT_EQ(source.start(video.options(), from(39)), ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(source.start(video.options(), from(39)), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
 // ---- in real time ----
@@ -759,14 +762,14 @@ TEST(Paced, GivesNoFrameBeforeItsTime) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(20)), ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(20)), ARHOST_STATUS_OK);
     std::chrono::steady_clock::time_point first;
     std::uint64_t skipped = 0;
     for (std::uint64_t n = 0; n < 6; ++n) {
         const SourceFrame frame = source.read(n + skipped);
         if (n == 0)
             first = std::chrono::steady_clock::now();
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         skipped += frame.info.skipped;
         EXPECT_EQ(frame.info.capture_ns, static_cast<std::int64_t>((n + skipped) * 50'000'000));
         EXPECT_GT(seconds_since(first), static_cast<double>(n + skipped) * 0.05 - 0.005);
@@ -777,9 +780,9 @@ TEST(Paced, SkipsWhatIsLateAndCountsIt) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264);
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     const auto whole = source.read_all();
-    ASSERT_EQ(source.start(video.options(), paced()), ARHOST_OK);
+    ASSERT_EQ(source.start(video.options(), paced()), ARHOST_STATUS_OK);
     ASSERT_EQ(source.read(0).info.skipped, 0u);
     std::this_thread::sleep_for(std::chrono::milliseconds(330));
     const SourceFrame late = source.read(1); // frame 8 is due at 320 ms
@@ -796,12 +799,12 @@ TEST(Paced, StopsWaitingWhenCancelled) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
     SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(0.05)), ARHOST_OK);
-    ASSERT_EQ(source.read(0).status, ARHOST_OK);
+    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(0.05)), ARHOST_STATUS_OK);
+    ASSERT_EQ(source.read(0).status, ARHOST_STATUS_OK);
     std::thread canceller([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         source.plugin().cancel();
     });
-    EXPECT_EQ(source.read(1).status, ARHOST_ERROR_CANCELLED); // would be due after 20 s
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // would be due after 20 s
     canceller.join();
 }

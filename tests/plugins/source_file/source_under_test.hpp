@@ -28,7 +28,7 @@ public:
     // Creates and starts; the status of whichever failed first.
     arhost_status start(const std::map<std::string, std::string> &options, arhost_source_setup setup = {}) {
         stop();
-        if (const arhost_status status = plugin_.create(options); status != ARHOST_OK)
+        if (const arhost_status status = plugin_.create(options); status != ARHOST_STATUS_OK)
             return status;
         setup.struct_size = sizeof setup;
         properties_ = {};
@@ -36,7 +36,7 @@ public:
         properties_.format.struct_size = sizeof properties_.format;
         properties_.intrinsics.struct_size = sizeof properties_.intrinsics;
         const arhost_status status = source_.start(plugin_.instance(), &setup, &properties_);
-        running_ = status == ARHOST_OK;
+        running_ = status == ARHOST_STATUS_OK;
         if (running_) {
             arhost_frame_format again = properties_.format;
             EXPECT_TRUE(arhost_frame_layout(&again));
@@ -55,7 +55,7 @@ public:
         frame.info.struct_size = sizeof frame.info;
         frame.status = source_.read(plugin_.instance(), &buffer, &frame.info);
         EXPECT_TRUE(buffer_->intact()) << "wrote past the slot at frame " << sequence;
-        if (frame.status != ARHOST_OK)
+        if (frame.status != ARHOST_STATUS_OK)
             return frame;
         for (std::uint32_t p = 0; p < format.plane_count; ++p) {
             const std::size_t rows = p == 0 ? format.height : format.height / 2;
@@ -67,12 +67,12 @@ public:
         return frame;
     }
 
-    // Up to the first that is no ARHOST_OK, which is the last in the list.
+    // Up to the first that is no ARHOST_STATUS_OK, which is the last in the list.
     std::vector<SourceFrame> read_all(std::uint64_t from = 0, std::size_t at_most = 1000) {
         std::vector<SourceFrame> frames;
         do
             frames.push_back(read(from + frames.size()));
-        while (frames.back().status == ARHOST_OK && frames.size() < at_most);
+        while (frames.back().status == ARHOST_STATUS_OK && frames.size() < at_most);
         return frames;
     }
 
@@ -106,12 +106,12 @@ private:
     std::size_t row_bytes(std::uint32_t plane) const {
         const std::size_t w = properties_.format.width;
         switch (properties_.format.pixel_format) {
-        case ARHOST_RGB8:
-        case ARHOST_BGR8:
+        case ARHOST_PIXEL_FORMAT_RGB8:
+        case ARHOST_PIXEL_FORMAT_BGR8:
             return 3 * w;
-        case ARHOST_YUYV:
+        case ARHOST_PIXEL_FORMAT_YUYV:
             return 2 * w;
-        case ARHOST_I420:
+        case ARHOST_PIXEL_FORMAT_I420:
             return plane == 0 ? w : w / 2;
         default: // GREY8, NV12
             return w;

@@ -67,13 +67,13 @@ public:
                     double fps = 0)
         : plugin_("source_synthetic") {
         status_ = plugin_.create(options);
-        if (status_ != ARHOST_OK)
+        if (status_ != ARHOST_STATUS_OK)
             return;
         const arhost_source_setup setup{sizeof setup, 0, 0, fps, paced, camera};
         properties_.struct_size = sizeof properties_;
         properties_.format.struct_size = sizeof properties_.format;
         status_ = functions().start(plugin_.instance(), &setup, &properties_);
-        started_ = status_ == ARHOST_OK;
+        started_ = status_ == ARHOST_STATUS_OK;
     }
     ~Source() {
         if (started_)
@@ -112,7 +112,7 @@ private:
     const arhost_source &functions() const { return plugin_.functions<arhost_source>(); }
     PluginUnderTest plugin_;
     arhost_source_properties properties_{};
-    arhost_status status_ = ARHOST_ERROR_INTERNAL;
+    arhost_status status_ = ARHOST_STATUS_ERROR_INTERNAL;
     bool started_ = false;
 };
 
@@ -289,7 +289,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(EveryLens, puts_the_markers_edges_where_the_true_pose_projects_them) {
     Source source(Options{{"frames", "0"}, {"noise", "0"}}, &GetParam().camera);
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     double sum = 0, distance = 0;
     std::size_t count = 0;
     for (int sequence = 0; sequence < 300; sequence += 23)
@@ -304,7 +304,7 @@ TEST_P(EveryLens, puts_the_markers_edges_where_the_true_pose_projects_them) {
 
 TEST_P(EveryLens, shows_april_tags_library_the_true_corners_upright) {
     Source source(Options{{"frames", "0"}}, &GetParam().camera);
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     Error error;
     for (int sequence = 5; sequence < 300; sequence += 37) {
         const Frame frame = source.read(sequence);
@@ -342,7 +342,7 @@ void PrintTo(const AprilFamily &family, std::ostream *out) {
 
 TEST_P(EveryAprilFamily, is_printed_upright_as_april_tags_library_has_it) {
     Source source(Options{{"family", GetParam().name}, {"id", "7"}, {"path", "still"}});
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     const Frame frame = source.read(0);
     const std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)> family(GetParam().create(),
                                                                                    GetParam().destroy);
@@ -365,7 +365,7 @@ INSTANTIATE_TEST_SUITE_P(Dictionaries, EveryDictionary,
 
 TEST_P(EveryDictionary, is_printed_upright_as_opencv_draws_it) {
     Source source(Options{{"family", GetParam().first}, {"id", "23"}, {"path", "still"}});
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     const Frame frame = source.read(0);
     const auto found = find_aruco(frame.picture, GetParam().second, 23);
     ASSERT_TRUE(found);
@@ -428,7 +428,7 @@ TEST(SourceSynthetic, gives_the_same_bytes_for_the_same_number_in_any_order_and_
     std::vector<cv::Mat> pictures;
     for (int sequence = 0; sequence < 4; ++sequence) {
         const Frame frame = forwards.read(sequence);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         pictures.push_back(frame.picture);
     }
     for (int sequence = 3; sequence >= 0; --sequence)
@@ -497,10 +497,10 @@ TEST(SourceSynthetic, covers_the_marker_with_a_card_in_the_frames_asked_for) {
 TEST(SourceSynthetic, ends_after_its_frames_and_again_when_asked_again) {
     Source source(Options{{"frames", "3"}});
     EXPECT_EQ(source.properties().frame_count, 3u);
-    EXPECT_EQ(source.read(2).status, ARHOST_OK);
-    EXPECT_EQ(source.read(3).status, ARHOST_END);
-    EXPECT_EQ(source.read(3).status, ARHOST_END);
-    EXPECT_EQ(source.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source.read(2).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(source.read(3).status, ARHOST_STATUS_END);
+    EXPECT_EQ(source.read(3).status, ARHOST_STATUS_END);
+    EXPECT_EQ(source.read(0).status, ARHOST_STATUS_OK);
 }
 
 TEST(SourceSynthetic, tells_the_media_time_of_each_frame_exactly) {
@@ -516,12 +516,12 @@ TEST(SourceSynthetic, tells_the_media_time_of_each_frame_exactly) {
 
 TEST(SourceSynthetic, has_a_camera_of_its_own_that_its_frames_agree_with) {
     Source source(Options{{"width", "800"}, {"height", "450"}}, nullptr);
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     const arhost_source_properties &properties = source.properties();
     ASSERT_EQ(properties.has_intrinsics, 1);
     EXPECT_EQ(properties.intrinsics.width, 800u);
     EXPECT_EQ(properties.format.height, 450u);
-    EXPECT_EQ(properties.format.pixel_format, ARHOST_BGR8);
+    EXPECT_EQ(properties.format.pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
     EXPECT_EQ(properties.intrinsics.distortion, ARHOST_DISTORTION_BROWN);
     const Frame frame = source.read(40);
     const auto found = find_tag36h11(frame.picture);
@@ -546,10 +546,10 @@ TEST_P(EverySize, fills_the_frame_and_nothing_beyond_it) {
         const arhost_intrinsics camera = camera_of(width, height, std::max(width, height), (width - 1) / 2.0,
                                                    (height - 1) / 2.0, ARHOST_DISTORTION_BROWN, {-0.05, 0.01, 0, 0});
         Source source(Options{{"blur_px", blur}, {"occlude_from", "0"}, {"occlude_to", "1"}}, &camera);
-        ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+        ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
         for (const int sequence : {0, 12}) {
             const Frame frame = source.read(sequence);
-            ASSERT_EQ(frame.status, ARHOST_OK);
+            ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
             EXPECT_TRUE(frame.intact);
             // Each pixel has been written: 0xa5 in all three channels is a grey that occurs here and there only.
             cv::Mat unwritten;
@@ -564,7 +564,7 @@ TEST(SourceSynthetic, is_black_where_no_light_comes_through_the_lens) {
     const arhost_intrinsics camera =
         camera_of(640, 480, 200, 319.5, 239.5, ARHOST_DISTORTION_FISHEYE, {-0.23, 0, 0, 0});
     Source source(Options{{"noise", "0"}}, &camera);
-    ASSERT_EQ(source.status(), ARHOST_OK) << source.log();
+    ASSERT_EQ(source.status(), ARHOST_STATUS_OK) << source.log();
     const Frame frame = source.read(0);
     EXPECT_LT(cv::mean(frame.picture(cv::Rect(0, 0, 40, 40)))[1], 1);
     EXPECT_TRUE(find_tag36h11(frame.picture));
@@ -573,7 +573,7 @@ TEST(SourceSynthetic, is_black_where_no_light_comes_through_the_lens) {
 TEST(SourceSynthetic, refuses_options_that_cannot_work_and_names_them) {
     const auto refused = [](const Options &options, const std::string &message) {
         PluginUnderTest plugin("source_synthetic");
-        EXPECT_EQ(plugin.create(options), ARHOST_ERROR_CONFIGURATION);
+        EXPECT_EQ(plugin.create(options), ARHOST_STATUS_ERROR_CONFIGURATION);
         EXPECT_EQ(plugin.instance(), nullptr);
         EXPECT_THAT(plugin.log(), HasSubstr(message));
     };
@@ -592,7 +592,7 @@ TEST(SourceSynthetic, refuses_options_that_cannot_work_and_names_them) {
 
 TEST(SourceSynthetic, declares_that_it_can_seek) {
     const PluginUnderTest plugin("source_synthetic");
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAN_SEEK);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_SEEK);
     EXPECT_STREQ(plugin.descriptor().id, "source_synthetic");
 }
 
@@ -604,7 +604,7 @@ TEST(SourceSynthetic, waits_for_each_frame_when_paced) {
     uint64_t ahead = 0;
     for (int sequence = 0; sequence < 5; ++sequence) {
         const Frame frame = source.read(sequence + ahead);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         ahead += frame.info.skipped;
         // A media time, and never earlier in real time than it says.
         EXPECT_EQ(frame.info.capture_ns, std::llround(static_cast<double>(sequence + ahead) * 1e9 / 20));
@@ -614,7 +614,7 @@ TEST(SourceSynthetic, waits_for_each_frame_when_paced) {
 
 TEST(SourceSynthetic, goes_on_to_the_present_when_its_reader_is_late) {
     Source source(Options{{"frames", "0"}}, &tiny_camera, true, 100);
-    ASSERT_EQ(source.read(0).status, ARHOST_OK);
+    ASSERT_EQ(source.read(0).status, ARHOST_STATUS_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(75)); // frames 1 to 6 are past, or more
     const Frame late = source.read(1);
     EXPECT_GE(late.info.skipped, 5u);
@@ -623,12 +623,12 @@ TEST(SourceSynthetic, goes_on_to_the_present_when_its_reader_is_late) {
 
 TEST(SourceSynthetic, stops_waiting_when_cancelled) {
     Source source(Options{{"frames", "0"}}, &tiny_camera, true, 0.01);
-    ASSERT_EQ(source.read(0).status, ARHOST_OK);
+    ASSERT_EQ(source.read(0).status, ARHOST_STATUS_OK);
     std::jthread canceller([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
         source.cancel();
     });
-    EXPECT_EQ(source.read(1).status, ARHOST_ERROR_CANCELLED); // due after 100 s
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // due after 100 s
 }
 
 } // namespace

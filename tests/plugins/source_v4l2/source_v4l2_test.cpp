@@ -101,7 +101,7 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 // ---- messages ----
 
 TEST(V4l2Refusal, NamesADeviceThatIsNotThereAndTheWayOut) {
-    const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_ERROR_CONFIGURATION);
+    const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(text, HasSubstr("device: '/dev/video-none' does not exist"));
     if (fs::exists("/dev/video0")) {
         EXPECT_THAT(text, HasSubstr("/dev/video0"));
@@ -113,13 +113,14 @@ TEST(V4l2Refusal, NamesADeviceThatIsNotThereAndTheWayOut) {
 }
 
 TEST(V4l2Refusal, TellsThatADeviceIsNoVideoDevice) {
-    EXPECT_THAT(refusal({{"device", "/dev/null"}}, ARHOST_ERROR_CONFIGURATION),
+    EXPECT_THAT(refusal({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("'/dev/null' is no video device"));
     ScratchFolder folder;
     std::ofstream(folder.path() / "file") << "text";
-    EXPECT_THAT(refusal({{"device", (folder.path() / "file").string()}}, ARHOST_ERROR_CONFIGURATION),
+    EXPECT_THAT(refusal({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is no video device"));
-    EXPECT_THAT(refusal({{"device", folder.path().string()}}, ARHOST_ERROR_CONFIGURATION), HasSubstr("is a folder"));
+    EXPECT_THAT(refusal({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+                HasSubstr("is a folder"));
 }
 
 TEST(V4l2Refusal, TellsWhichGroupMayOpenACamera) {
@@ -129,20 +130,21 @@ TEST(V4l2Refusal, TellsWhichGroupMayOpenACamera) {
     fs::permissions(folder.path(), fs::perms::all);
     const bool root = geteuid() == 0;
     ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // root may open everything
-    const std::string text = refusal({{"device", (folder.path() / "video0").string()}}, ARHOST_ERROR_CONFIGURATION);
+    const std::string text =
+        refusal({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
     EXPECT_THAT(text, HasSubstr("group 'video'"));
 }
 
 TEST(V4l2Refusal, WantsBothSidesOfASizeOrNeither) {
-    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_ERROR_CONFIGURATION), HasSubstr("give both or neither"));
+    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("give both or neither"));
 }
 
 TEST(V4l2, DeclaresItsDevicesAndThatItIsLive) {
     SourceUnderTest source("source_v4l2");
     const arhost_descriptor &descriptor = source.plugin().descriptor();
     EXPECT_STREQ(descriptor.id, "source_v4l2");
-    EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_IS_LIVE));
+    EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_CAPABILITY_LIVE));
     ASSERT_NE(descriptor.needs, nullptr);
     EXPECT_STREQ(descriptor.needs[0], "video");
     EXPECT_EQ(descriptor.needs[1], nullptr);
@@ -154,9 +156,9 @@ TEST(Jpeg, Of420BecomesI420WithoutAnyConversion) {
     const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
-    ASSERT_EQ(frame.format.pixel_format, ARHOST_I420);
-    EXPECT_EQ(frame.format.yuv_matrix, ARHOST_BT601);
-    EXPECT_EQ(frame.format.yuv_range, ARHOST_FULL_RANGE);
+    ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_I420);
+    EXPECT_EQ(frame.format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
+    EXPECT_EQ(frame.format.yuv_range, ARHOST_YUV_RANGE_FULL);
     // JFIF's formula, of the picture that was put in.
     const Bytes pixels = smooth_bgr(96, 64);
     for (std::size_t y = 0; y < 64; ++y)
@@ -178,7 +180,7 @@ TEST(Jpeg, OfOtherSubsamplingsOrOddSizesBecomesBgr) {
         const Bytes jpeg = make_jpeg(c.width, c.height, c.subsampling);
         const Decoded frame = decode(jpeg, jpeg);
         ASSERT_TRUE(frame.good) << frame.fault;
-        ASSERT_EQ(frame.format.pixel_format, ARHOST_BGR8);
+        ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
         const Bytes pixels = smooth_bgr(c.width, c.height);
         for (std::size_t y = 0; y < static_cast<std::size_t>(c.height); ++y)
             for (std::size_t i = 0; i < static_cast<std::size_t>(3 * c.width); ++i)
@@ -190,7 +192,7 @@ TEST(Jpeg, OfGreyStaysGrey) {
     const Bytes jpeg = make_jpeg(33, 21, TJSAMP_GRAY);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
-    ASSERT_EQ(frame.format.pixel_format, ARHOST_GREY8);
+    ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const Bytes pixels = smooth_bgr(33, 21);
     for (std::size_t y = 0; y < 21; ++y)
         for (std::size_t x = 0; x < 33; ++x) {

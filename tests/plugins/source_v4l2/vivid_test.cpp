@@ -128,13 +128,13 @@ std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb,
 } // namespace
 
 TEST_F(Vivid, GivesYuyvAtTheSizeAndRateAskedFor) {
-    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
-    EXPECT_EQ(source_.format().pixel_format, ARHOST_YUYV);
+    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_YUYV);
     EXPECT_EQ(source_.format().width, 320u);
     EXPECT_EQ(source_.format().height, 180u);
     EXPECT_EQ(source_.format().fps, 30.0);
     EXPECT_EQ(source_.properties().frame_count, 0u);
-    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
 }
 
@@ -145,18 +145,18 @@ TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
         arhost_yuv_range range;
         double kr, kb;
     };
-    for (const Case &c : {Case{2, 0, ARHOST_BT601, ARHOST_LIMITED_RANGE, 0.299, 0.114},
-                          Case{1, 0, ARHOST_BT709, ARHOST_LIMITED_RANGE, 0.2126, 0.0722},
-                          Case{2, 1, ARHOST_BT601, ARHOST_FULL_RANGE, 0.299, 0.114}}) {
+    for (const Case &c : {Case{2, 0, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_LIMITED, 0.299, 0.114},
+                          Case{1, 0, ARHOST_YUV_MATRIX_BT709, ARHOST_YUV_RANGE_LIMITED, 0.2126, 0.0722},
+                          Case{2, 1, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_FULL, 0.299, 0.114}}) {
         SCOPED_TRACE("colorspace " + std::to_string(c.colorspace) + ", quantization " +
                      std::to_string(c.quantization));
         set(colorspace, c.colorspace);
         set(quantization, c.quantization);
-        ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
         EXPECT_EQ(source_.format().yuv_matrix, c.matrix);
         EXPECT_EQ(source_.format().yuv_range, c.range);
         const SourceFrame frame = source_.read(0);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         // White, yellow, cyan, green, magenta, red, blue, black; eight bars over 320 px.
         const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
                                                          {255, 255, 0},
@@ -169,7 +169,7 @@ TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
         for (const std::size_t y : {5u, 90u, 174u})
             for (std::size_t bar = 0; bar < 8; ++bar) {
                 const std::uint8_t *pair = &frame.bytes[y * 640 + 2 * (bar * 40 + 20)];
-                const auto rgb = rgb_of(pair[0], pair[1], pair[3], c.kr, c.kb, c.range == ARHOST_FULL_RANGE);
+                const auto rgb = rgb_of(pair[0], pair[1], pair[3], c.kr, c.kb, c.range == ARHOST_YUV_RANGE_FULL);
                 for (std::size_t i = 0; i < 3; ++i)
                     EXPECT_NEAR(rgb[i], bars[bar][i], 4) << "bar " << bar << ", row " << y << ", channel " << i;
             }
@@ -178,11 +178,11 @@ TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
 }
 
 TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
-    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
+    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     std::int64_t last = 0;
     for (std::uint64_t n = 0; n < 15; ++n) {
         const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
         EXPECT_GT(frame.info.capture_ns, last);
         const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
@@ -196,20 +196,20 @@ TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
 }
 
 TEST_F(Vivid, GivesTheNewestFrameInLiveUseAndCountsTheOthers) {
-    ASSERT_EQ(start(50), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
     const SourceFrame frame = source_.read(1);
-    ASSERT_EQ(frame.status, ARHOST_OK);
+    ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
     EXPECT_GE(frame.info.skipped, 2u) << "the driver had four buffers to fill";
     // It had none left after that, but has them back now.
     EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "all older frames were drained";
 }
 
 TEST_F(Vivid, GivesEveryFrameInOrderInLockstep) {
-    ASSERT_EQ(start(50, {}, false), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(50, {}, false), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
     for (std::uint64_t n = 1; n < 4; ++n)
@@ -218,13 +218,13 @@ TEST_F(Vivid, GivesEveryFrameInOrderInLockstep) {
 
 TEST_F(Vivid, CountsWhatTheDriverDropped) {
     set(percentage_of_dropped_buffers, 50);
-    ASSERT_EQ(start(50), ARHOST_OK) << source_.log();
+    ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
     std::uint64_t skipped = 0;
     const std::int64_t first = source_.read(0).info.capture_ns;
     std::int64_t last = first;
     for (std::uint64_t n = 1; n < 30; ++n) {
         const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         skipped += frame.info.skipped;
         last = frame.info.capture_ns;
     }
@@ -234,29 +234,29 @@ TEST_F(Vivid, CountsWhatTheDriverDropped) {
 }
 
 TEST_F(Vivid, DropsAFrameThatTheDriverMarksAsDamaged) {
-    ASSERT_EQ(start(30), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_buffer_error, 1);
     std::uint64_t skipped = 0;
     for (std::uint64_t n = 1; n < 6; ++n) {
         const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_OK);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         skipped += frame.info.skipped;
     }
     EXPECT_GE(skipped, 1u);
 }
 
 TEST_F(Vivid, GivesThreeHundredFramesAndLeaksNothing) {
-    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     source_.stop();
     const std::size_t files = open_files();
     [[maybe_unused]] const std::size_t memory = resident_kib();
     for (int round = 0; round < 3; ++round) {
-        ASSERT_EQ(start(), ARHOST_OK) << source_.log();
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
         EXPECT_EQ(device_mappings(), 4u);
         for (std::uint64_t n = 0; n < 100; ++n)
-            ASSERT_EQ(source_.read(n).status, ARHOST_OK) << source_.log();
+            ASSERT_EQ(source_.read(n).status, ARHOST_STATUS_OK) << source_.log();
         source_.stop();
         EXPECT_EQ(device_mappings(), 0u);
         EXPECT_EQ(open_files(), files);
@@ -267,14 +267,14 @@ TEST_F(Vivid, GivesThreeHundredFramesAndLeaksNothing) {
 }
 
 TEST_F(Vivid, TakesTheBuffersAskedFor) {
-    ASSERT_EQ(start(60, {{"buffers", "8"}}), ARHOST_OK) << source_.log();
+    ASSERT_EQ(start(60, {{"buffers", "8"}}), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(device_mappings(), 8u);
-    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
 }
 
 TEST_F(Vivid, TakesTheDriversSizeWhereNoneIsAskedFor) {
-    ASSERT_EQ(start(25, {{"width", "0"}, {"height", "0"}}), ARHOST_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(25, {{"width", "0"}, {"height", "0"}}), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     EXPECT_EQ(source_.format().width * 9, source_.format().height * 16);
 }
 
@@ -285,105 +285,105 @@ TEST_F(Vivid, TakesTheCalibrationsSize) {
     camera.height = 480;
     arhost_source_setup setup{};
     setup.intrinsics = &camera;
-    ASSERT_EQ(source_.start({{"device", device}}, setup), ARHOST_OK) << source_.log();
+    ASSERT_EQ(source_.start({{"device", device}}, setup), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.format().width, 640u);
     EXPECT_EQ(source_.format().height, 480u);
     EXPECT_EQ(source_.start({{"device", device}, {"width", "320"}, {"height", "180"}}, setup),
-              ARHOST_ERROR_CONFIGURATION);
+              ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
                 HasSubstr("320×180 is asked for, but the camera's calibration is for 640×480"));
 }
 
 TEST_F(Vivid, RefusesASizeThatItDoesNotOfferAndNamesTheNearest) {
-    EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has no size 650×470 in YUYV"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("the nearest are 640×480"));
 }
 
 TEST_F(Vivid, RefusesAFormatThatItDoesNotOfferAndListsThoseThatItDoes) {
-    EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("offers no mjpeg"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
 }
 
 TEST_F(Vivid, WarnsOfARateThatItCantReach) {
-    ASSERT_EQ(start(120), ARHOST_OK) << source_.log();
+    ASSERT_EQ(start(120), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.format().fps, 60.0);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("asked for"));
 }
 
 TEST_F(Vivid, TellsThatAnotherProgramHasTheCamera) {
     SourceUnderTest first("source_v4l2");
-    ASSERT_EQ(first.start({{"device", device}}), ARHOST_OK) << first.log();
-    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    ASSERT_EQ(first.start({{"device", device}}), ARHOST_STATUS_OK) << first.log();
+    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("in use by another program"));
     first.stop();
-    EXPECT_EQ(start(), ARHOST_OK) << source_.log();
+    EXPECT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
 }
 
 TEST_F(Vivid, ListsTheCamerasThereAreWhereTheNamedOneIsMissing) {
-    EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
-    ASSERT_EQ(start(1), ARHOST_OK) << source_.log(); // a frame a second
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(1), ARHOST_STATUS_OK) << source_.log(); // a frame a second
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::thread canceller([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
         source_.plugin().cancel();
     });
     const std::int64_t before = monotonic_ns();
-    EXPECT_EQ(source_.read(1).status, ARHOST_ERROR_CANCELLED);
+    EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_LT(monotonic_ns() - before, 700'000'000);
     canceller.join();
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_ERROR), "");
 }
 
 TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
-    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(disconnect, 1);
     std::uint64_t n = 1;
     SourceFrame frame;
     do
         frame = source_.read(n);
-    while (frame.status == ARHOST_OK && ++n < 10);
-    EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
+    while (frame.status == ARHOST_STATUS_OK && ++n < 10);
+    EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has gone away: was it unplugged?"));
     source_.stop();
     EXPECT_EQ(device_mappings(), 0u);
     // vivid plugs itself in again once everyone has let go of it.
     close(fd_);
     fd_ = open(device, O_RDWR | O_CLOEXEC);
-    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
 }
 
 TEST_F(Vivid, TellsThatItsDriverGaveUp) {
-    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_fatal_streaming_error, 1);
     std::uint64_t n = 1;
     SourceFrame frame;
     do
         frame = source_.read(n);
-    while (frame.status == ARHOST_OK && ++n < 10);
-    EXPECT_EQ(frame.status, ARHOST_ERROR_DEVICE_LOST);
+    while (frame.status == ARHOST_STATUS_OK && ++n < 10);
+    EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has stopped streaming"));
 }
 
 TEST_F(Vivid, ReportsFaultsOfTheDriverAtTheStart) {
     set(inject_reqbufs_error, 1);
-    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at reserving 4 buffers"));
     set(inject_qbuf_error, 1);
-    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at handing a buffer"));
     set(inject_streamon_error, 1);
-    EXPECT_EQ(start(), ARHOST_ERROR_IO);
+    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at starting to stream"));
     EXPECT_EQ(device_mappings(), 0u);
-    ASSERT_EQ(start(), ARHOST_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_OK);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
 }

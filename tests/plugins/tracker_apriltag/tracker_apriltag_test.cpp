@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <common_planar_pose/fiducial_tracker_test.hpp>
-#include <common_planar_pose/real_photos.hpp>
+#include <fiducial_common/fiducial_tracker_test.hpp>
+#include <fiducial_common/real_photos.hpp>
 
 namespace {
 
@@ -27,7 +27,7 @@ INSTANTIATE_TEST_SUITE_P(Families, AprilTagFamily,
 TEST_P(AprilTagFamily, TagIsFoundUprightWithTheSquareThatItsCornersBound) {
     Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 160)}) {
-        ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {20, 80}}), ARHOST_OK) << tracker.log();
+        ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {20, 80}}), ARHOST_STATUS_OK) << tracker.log();
         const Print print = april_tag(GetParam(), 20).with_margin(1);
         const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
         ASSERT_EQ(markers.size(), 1u);
@@ -42,13 +42,13 @@ TEST_P(AprilTagFamily, TagIsFoundUprightWithTheSquareThatItsCornersBound) {
 
 TEST_P(AprilTagFamily, NamesTheValidRangeOfIds) {
     Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
-    EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 100000 is not in " + GetParam() + ", whose ids are 0"));
 }
 
 TEST(AprilTagTracker, RefusesADecimationThatTheLibraryGetsWrong) {
     Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
-    EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate must be 1, 1.5 or a whole number"));
 }
 
@@ -56,7 +56,7 @@ TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     for (const auto &[margin, count] : {std::pair{"20", 1u}, std::pair{"200", 0u}}) {
         Tracker tracker("tracker_apriltag", {{"min_decision_margin", margin}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(frame).size(), count);
     }
 }
@@ -68,14 +68,14 @@ TEST(AprilTagTracker, CorrectsAsManyWrongBitsAsConfigured) {
     const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
     for (const auto &[bits, count] : {std::pair{"1", 0u}, std::pair{"2", 1u}}) {
         Tracker tracker("tracker_apriltag", {{"max_hamming", bits}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(frame).size(), count) << bits;
     }
 }
 
 TEST(AprilTagTracker, TheLibrarysOwnCornersHaveTheSameCentres) {
     Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}});
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
     cv::Point2d bias;
     for (int i = 0; i < 6; ++i) {
         const Mt truth = pose_of(7 * i, -5 * i, 450, 10 * i - 25, 20 - 8 * i, 60 * i);

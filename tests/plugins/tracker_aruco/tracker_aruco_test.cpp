@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <common_planar_pose/fiducial_tracker_test.hpp>
-#include <common_planar_pose/real_photos.hpp>
+#include <fiducial_common/fiducial_tracker_test.hpp>
+#include <fiducial_common/real_photos.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -32,7 +32,7 @@ INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictio
 TEST_P(ArucoDictionary, MarkerIsFoundUpright) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
     Tracker tracker("tracker_aruco", {{"dictionary", dictionary}});
-    ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_OK) << tracker.log();
+    ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_STATUS_OK) << tracker.log();
     // AprilTags as AprilTag's own library draws them, the others as OpenCV does.
     const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
@@ -63,7 +63,7 @@ INSTANTIATE_TEST_SUITE_P(Refinements, ArucoRefinement,
 
 TEST_P(ArucoRefinement, HasPixelCentresAtIntegers) {
     Tracker tracker("tracker_aruco", {{"corner_refinement", GetParam().name}});
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
     cv::Point2d bias;
     double error = 0;
     for (int i = 0; i < 6; ++i) {
@@ -90,15 +90,15 @@ TEST(ArucoTracker, ReadsADictionaryFile) {
     for (int i = 0; i < 16; ++i)
         print.cells(1 + i / 4, 1 + i % 4) = bits[i] == '1' ? 255 : 0;
     Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-    ASSERT_EQ(tracker.created(), ARHOST_OK) << tracker.log();
-    ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {1, 80}}), ARHOST_OK) << tracker.log();
+    ASSERT_EQ(tracker.created(), ARHOST_STATUS_OK) << tracker.log();
+    ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {1, 80}}), ARHOST_STATUS_OK) << tracker.log();
     const Mt truth = pose_of(10, 20, 400, 20, 20, 30);
     const auto markers = tracker.track(GreyFrame(picture_of({{print.with_margin(1), 80, truth}})));
     ASSERT_EQ(markers.size(), 1u);
     EXPECT_EQ(markers[0].id, 1);
     EXPECT_STREQ(markers[0].family, "mine");
     EXPECT_LT(angle_degrees(markers[0].mt, truth), 1);
-    EXPECT_EQ(tracker.start(test_camera, {{2, 80}}), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(tracker.start(test_camera, {{2, 80}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 2 is not in mine, whose ids are 0 to 1"));
 }
 
@@ -108,7 +108,7 @@ TEST(ArucoTracker, RefusesAFileThatIsNoDictionary) {
         const auto file = scratch.path() / "bad.yml";
         std::ofstream(file) << text;
         Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-        EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION) << text;
+        EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << text;
         EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: " + file.string() + " is no dictionary")) << text;
     };
     refused("");
@@ -122,13 +122,13 @@ TEST(ArucoTracker, RefusesAFileThatIsNoDictionary) {
     refused("%YAML:1.0\nnmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n");
 
     Tracker absent("tracker_aruco", {{"dictionary_file", (scratch.path() / "absent.yml").string()}});
-    EXPECT_EQ(absent.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(absent.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(absent.log(), HasSubstr("absent.yml is no dictionary: it can't be read"));
 }
 
 TEST(ArucoTracker, RefusesThresholdWindowsThatContradict) {
     Tracker tracker("tracker_aruco", {{"threshold_window_min_px", "31"}, {"threshold_window_max_px", "23"}});
-    EXPECT_EQ(tracker.created(), ARHOST_ERROR_CONFIGURATION);
+    EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("threshold_window_max_px must not be less than threshold_window_min_px"));
 }
 
@@ -137,7 +137,7 @@ TEST(ArucoTracker, FindsInvertedMarkersWhereAskedTo) {
                           picture_of({{aruco_marker("DICT_5X5_50", 9).with_margin(2), 80, pose_of(0, 0, 400)}}));
     for (const auto &[inverted, count] : {std::pair{"false", 0u}, std::pair{"true", 1u}}) {
         Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_50"}, {"inverted", inverted}});
-        ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_OK);
+        ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_STATUS_OK);
         const auto markers = tracker.track(frame);
         ASSERT_EQ(markers.size(), count) << inverted;
         if (count) {
@@ -148,7 +148,7 @@ TEST(ArucoTracker, FindsInvertedMarkersWhereAskedTo) {
 
 TEST(ArucoTracker, ReadsMarkersWithAWideBorder) {
     Tracker tracker("tracker_aruco", {{"dictionary", "DICT_4X4_50"}, {"border_bits", "2"}});
-    ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_OK);
+    ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_STATUS_OK);
     const auto markers =
         tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_4X4_50", 9, 2), 80, pose_of(0, 0, 400)}})));
     ASSERT_EQ(markers.size(), 1u);
@@ -162,7 +162,7 @@ TEST(ArucoTracker, CorrectsWrongBitsOfAprilTags) {
     const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
     for (const auto &[rate, count] : {std::pair{"0", 0u}, std::pair{"0.6", 1u}}) {
         Tracker tracker("tracker_aruco", {{"error_correction_rate", rate}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_OK);
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(frame).size(), count) << rate;
     }
 }
@@ -175,7 +175,7 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     const std::vector<double> d = golden["camera"]["D"];
     const auto camera = intrinsics_of({1280, 960}, k[0], k[4], k[2], k[5], ARHOST_DISTORTION_BROWN, d);
     Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_1000"}, {"corner_refinement", "subpix"}});
-    ASSERT_EQ(tracker.start(camera, {{1, 145}}), ARHOST_OK);
+    ASSERT_EQ(tracker.start(camera, {{1, 145}}), ARHOST_STATUS_OK);
     const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"));
     const auto markers = tracker.track(photo);
     ASSERT_EQ(markers.size(), 1u);
@@ -192,7 +192,7 @@ void expect_opencv_corners(const std::string &photo, Options dictionary, const s
     const auto folder = shared_data("markers/opencv_doc");
     const auto golden = nlohmann::json::parse(std::ifstream(folder / "golden.json"));
     Tracker tracker("tracker_aruco", dictionary);
-    ASSERT_EQ(tracker.created(), ARHOST_OK) << tracker.log();
+    ASSERT_EQ(tracker.created(), ARHOST_STATUS_OK) << tracker.log();
     std::vector<Listed> listed;
     for (const auto &[id, corners] : golden[photo]["corners"].items())
         listed.push_back({std::stoi(id)});

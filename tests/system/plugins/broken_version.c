@@ -5,6 +5,6 @@
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     (void)offer;
     answer->abi_version = 77;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

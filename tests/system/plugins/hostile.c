@@ -457,7 +457,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
                             arhost_instance **instance) {
     tracker *self = calloc(1, sizeof *self);
     if (!self)
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     self->host = host;
     snprintf(self->attack, sizeof self->attack, "%s", arhost_find_option(options, option_count, "attack")->text);
     /* The base name: a whole path would be let through. */
@@ -465,7 +465,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
              arhost_find_option(options, option_count, "target_file")->text);
     self->at = arhost_find_option(options, option_count, "at")->integer;
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 static void destroy(arhost_instance *self) {
     free(self);
@@ -476,7 +476,7 @@ static const void *get_extension(const char *id) {
 
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
     self->marker_id = setup->markers[0].id;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 /* As tracker_counter: a marker so many mm away as the frame's number says. */
@@ -494,7 +494,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     marker->mt[14] = -500.0 - number;
     if (number == self->at)
         attack(self);
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 static void stop(arhost_instance *self) {
     (void)self;
@@ -524,7 +524,7 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     (void)offer;
     answer->abi_version = ARHOST_ABI_VERSION;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

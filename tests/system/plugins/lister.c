@@ -26,23 +26,23 @@ static inline arhost_status list_crash(const arhost_host *host, arhost_take_devi
     tell(take, context, 0, "The last one", NULL);
     signal(SIGSEGV, SIG_DFL);
     raise(SIGSEGV);
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 static inline arhost_status list_hang(const arhost_host *host, arhost_take_device take, void *context) {
     (void)host, (void)take, (void)context;
     for (;;)
         pause();
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 static inline arhost_status list_fail(const arhost_host *host, arhost_take_device take, void *context) {
     (void)take, (void)context;
     host->log(host, ARHOST_SEVERITY_ERROR, "the driver is of another age");
-    return ARHOST_ERROR_UNSUPPORTED;
+    return ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static inline arhost_status list_broken(const arhost_host *host, arhost_take_device take, void *context) {
     (void)host;
     tell(take, context, 0, NULL, NULL);
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 /* 10,000 of them, and the texts of the first have a MiB each: all quotation marks, which take most room as JSON. */
 static inline arhost_status list_many(const arhost_host *host, arhost_take_device take, void *context) {
@@ -51,16 +51,16 @@ static inline arhost_status list_many(const arhost_host *host, arhost_take_devic
     uint32_t i;
     (void)host;
     if (!text)
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     memset(text, '"', size);
     text[size] = '\0';
     for (i = 0; i < 10000; ++i)
         tell(take, context, i, text, text);
     free(text);
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 static inline arhost_status list_none(const arhost_host *host, arhost_take_device take, void *context) {
-    return (void)host, (void)take, (void)context, ARHOST_OK;
+    return (void)host, (void)take, (void)context, ARHOST_STATUS_OK;
 }
 /* A GPU's shaders have a place where the GPU is allowed; and no socket is there where the network is not. */
 static inline arhost_status list_gpu(const arhost_host *host, arhost_take_device take, void *context) {
@@ -68,7 +68,7 @@ static inline arhost_status list_gpu(const arhost_host *host, arhost_take_device
     (void)host;
     tell(take, context, 0, end && !strcmp(end, "/" ID) ? "with its shaders" : "without its shaders",
          socket(AF_INET, SOCK_STREAM, 0) < 0 ? "no network" : "the network");
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static const char *const needs[] = {"gpu", "network", NULL};
@@ -87,7 +87,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance) {
-    return (void)host, (void)options, (void)option_count, (void)instance, ARHOST_ERROR_UNSUPPORTED;
+    return (void)host, (void)options, (void)option_count, (void)instance, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static void destroy(arhost_instance *self) {
     (void)self;
@@ -97,13 +97,13 @@ static const void *get_extension(const char *id) {
     return strcmp(id, ARHOST_DEVICES_EXTENSION) == 0 ? &devices : NULL;
 }
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
-    return (void)self, (void)setup, ARHOST_ERROR_UNSUPPORTED;
+    return (void)self, (void)setup, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
-    return (void)self, (void)output, ARHOST_ERROR_UNSUPPORTED;
+    return (void)self, (void)output, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static arhost_status stop(arhost_instance *self) {
-    return (void)self, ARHOST_OK;
+    return (void)self, ARHOST_STATUS_OK;
 }
 static const arhost_sink functions = {sizeof(arhost_sink), start, write_frame, NULL, stop};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
@@ -111,10 +111,10 @@ static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functi
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

@@ -26,7 +26,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 
 static arhost_status create(const arhost_host *host, const arhost_option *values, uint32_t count,
                             arhost_instance **instance) {
-    return (void)host, (void)values, (void)count, (void)instance, ARHOST_ERROR_UNSUPPORTED;
+    return (void)host, (void)values, (void)count, (void)instance, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static void destroy(arhost_instance *self) {
     (void)self;
@@ -35,13 +35,13 @@ static const void *get_extension(const char *id) {
     return (void)id, (const void *)0;
 }
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
-    return (void)self, (void)setup, ARHOST_ERROR_UNSUPPORTED;
+    return (void)self, (void)setup, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
-    return (void)self, (void)output, ARHOST_ERROR_UNSUPPORTED;
+    return (void)self, (void)output, ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static arhost_status stop(arhost_instance *self) {
-    return (void)self, ARHOST_OK;
+    return (void)self, ARHOST_STATUS_OK;
 }
 static const arhost_sink functions = {sizeof(arhost_sink), start, write_frame, 0, stop};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
@@ -49,6 +49,6 @@ static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functi
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     answer->abi_version = offer->newest_abi_version;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

@@ -26,7 +26,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
                             arhost_instance **instance) {
     arhost_instance *self = calloc(1, sizeof *self);
     if (!self)
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     self->host = host;
     misbehave_install();
     self->crash_at = arhost_find_option(options, option_count, "crash_at")->integer;
@@ -41,14 +41,14 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     if (arhost_find_option(options, option_count, "refuse")->integer) {
         host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
         free(self);
-        return ARHOST_ERROR_CONFIGURATION;
+        return ARHOST_STATUS_ERROR_CONFIGURATION;
     }
     if (arhost_find_option(options, option_count, "crash_in_create")->integer) {
         signal(SIGSEGV, SIG_DFL);
         raise(SIGSEGV);
     }
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void destroy(arhost_instance *self) {
@@ -60,7 +60,7 @@ static const void *get_extension(const char *id) {
 
 static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
     (void)self;
-    return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_OK : ARHOST_ERROR_INVALID_ARGUMENT;
+    return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
 }
 
 /* Whether the host cancels meanwhile. */
@@ -89,7 +89,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
         return (arhost_status)self->error;
     if (waits(self)) {
         self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while it waited");
-        return ARHOST_ERROR_CANCELLED;
+        return ARHOST_STATUS_ERROR_CANCELLED;
     }
     for (y = 0; y < image->height; ++y)
         for (x = 0; x < image->width; ++x) {
@@ -149,10 +149,10 @@ static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functi
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};

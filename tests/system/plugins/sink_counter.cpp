@@ -52,8 +52,8 @@ public:
             line << "none";
         line << ' ' << output.record->overlay << '\n';
         std::ofstream(path_, std::ios::app) << line.str() << std::flush;
-        return end_at_ >= 0 && output.record->sequence >= static_cast<std::uint64_t>(end_at_) ? ARHOST_END
-                                                                                              : ARHOST_OK;
+        return end_at_ >= 0 && output.record->sequence >= static_cast<std::uint64_t>(end_at_) ? ARHOST_STATUS_END
+                                                                                              : ARHOST_STATUS_OK;
     }
 
     void stop() {

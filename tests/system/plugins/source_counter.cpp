@@ -30,7 +30,7 @@ public:
         first_ = setup.first_sequence;
         begin_ = std::chrono::steady_clock::now();
         arhost_frame_format &format = properties.format;
-        format.pixel_format = ARHOST_BGR8;
+        format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
         format.width = width_;
         format.height = height_;
         format.fps = fps_;
@@ -49,7 +49,7 @@ public:
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         if (buffer.sequence >= frames_)
-            return ARHOST_END;
+            return ARHOST_STATUS_END;
         while (first_ == 0 && static_cast<std::int64_t>(buffer.sequence) == hold_at_)
             ::pause();
         faults_.at(buffer.sequence);
@@ -76,7 +76,7 @@ public:
             info.capture_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count() +
                               (now ? static_cast<std::int64_t>(1e6 * ahead_ms_) : 0);
         }
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
 private:
@@ -102,9 +102,18 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "ahead_at", "-1", "Only at this frame of its first life; -1: always"),
     option(ARHOST_OPTION_INTEGER, "hold_at", "-1", "Does not return from this frame of its first life; -1: never"),
     ARHOST_FAULT_OPTIONS};
-constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),     ARHOST_KIND_SOURCE, "source_counter",   "Counter", "0.1.0", "arhost", "Apache-2.0",
-    "Numbered frames, for tests.", ARHOST_CAN_SEEK,    std::size(options), options,   nullptr};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_SOURCE,
+                                          "source_counter",
+                                          "Counter",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Numbered frames, for tests.",
+                                          ARHOST_CAPABILITY_SEEK,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
 
 } // namespace
 

@@ -60,7 +60,7 @@ public:
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
         if (number != (frame.sequence & 0xffff)) // two bytes hold it
-            throw Failure(ARHOST_ERROR_INTERNAL, "the frame is not its own");
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the frame is not its own");
         faults_.at(number);
         const auto signed_number = static_cast<std::int64_t>(number);
         if (signed_number >= lost_from_ && signed_number < lost_to_)

@@ -79,7 +79,7 @@ private:
     const arhost_option &find(const std::string &key) const {
         if (const arhost_option *option = arhost_find_option(first_, count_, key.c_str()))
             return *option;
-        throw Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the option '" + key + "' was not passed");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the option '" + key + "' was not passed");
     }
     const arhost_option *first_;
     std::uint32_t count_;
@@ -127,18 +127,18 @@ template <class Call> arhost_status guarded(const Host &host, Call &&call) noexc
         return call();
     } catch (const Failure &failure) {
         // That it was cancelled is no fault.
-        host.log(failure.status() == ARHOST_ERROR_CANCELLED ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_ERROR,
+        host.log(failure.status() == ARHOST_STATUS_ERROR_CANCELLED ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_ERROR,
                  failure.what());
         return failure.status();
     } catch (const std::bad_alloc &) {
         host.log(ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     } catch (const std::exception &error) {
         host.error(error.what());
-        return ARHOST_ERROR_INTERNAL;
+        return ARHOST_STATUS_ERROR_INTERNAL;
     } catch (...) {
         host.log(ARHOST_SEVERITY_ERROR, "an exception of unknown type");
-        return ARHOST_ERROR_INTERNAL;
+        return ARHOST_STATUS_ERROR_INTERNAL;
     }
 }
 
@@ -152,7 +152,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
                      arhost_instance **instance) {
     return guarded(Host(host), [&] {
         *instance = reinterpret_cast<arhost_instance *>(new Instance<T>(host, Options(options, count)));
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     });
 }
 
@@ -187,7 +187,7 @@ arhost_status list_devices(const arhost_host *host, arhost_take_device take, voi
                 sizeof device, d.index, d.kind, d.is_default, d.name.c_str(), or_null(d.uuid), or_null(d.abilities)};
             take(context, &device);
         }
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     });
 }
 template <ListsDevices T>
@@ -199,7 +199,7 @@ template <class T> void stop(T &plugin) {
         plugin.stop();
 }
 template <class T> void stop_instance(arhost_instance *instance) {
-    with<T>(instance, [](T &plugin) { return stop(plugin), ARHOST_OK; });
+    with<T>(instance, [](T &plugin) { return stop(plugin), ARHOST_STATUS_OK; });
 }
 template <class T> const void *get_extension(const char *id) {
     if constexpr (ListsDevices<T>)
@@ -211,12 +211,12 @@ template <class T> const void *get_extension(const char *id) {
         return no_extension(id);
 }
 
-// The kinds' function tables. `read` and `write` return an arhost_status, since ARHOST_END is no error.
+// The kinds' function tables. `read` and `write` return an arhost_status, since ARHOST_STATUS_END is no error.
 template <class T>
 inline constexpr arhost_source source_functions = {
     sizeof(arhost_source),
     [](arhost_instance *i, const arhost_source_setup *setup, arhost_source_properties *properties) {
-        return with<T>(i, [&](T &p) { return p.start(*setup, *properties), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.start(*setup, *properties), ARHOST_STATUS_OK; });
     },
     [](arhost_instance *i, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
         return with<T>(i, [&](T &p) -> arhost_status { return p.read(*buffer, *info); });
@@ -227,10 +227,10 @@ template <class T>
 inline constexpr arhost_tracker tracker_functions = {
     sizeof(arhost_tracker),
     [](arhost_instance *i, const arhost_tracker_setup *setup) {
-        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
     },
     [](arhost_instance *i, const arhost_frame *frame, arhost_tracker_result *result) {
-        return with<T>(i, [&](T &p) { return p.track(*frame, *result), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.track(*frame, *result), ARHOST_STATUS_OK; });
     },
     stop_instance<T>};
 
@@ -238,11 +238,11 @@ template <class T>
 inline constexpr arhost_raytracer raytracer_functions = {
     sizeof(arhost_raytracer),
     [](arhost_instance *i, const arhost_raytracer_setup *setup) {
-        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
     },
     [](arhost_instance *i, const arhost_render_request *request, const arhost_image *image,
        arhost_render_info *info) {
-        return with<T>(i, [&](T &p) { return p.render(*request, *image, *info), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.render(*request, *image, *info), ARHOST_STATUS_OK; });
     },
     stop_instance<T>};
 
@@ -250,14 +250,14 @@ template <class T> constexpr arhost_sink make_sink_functions() {
     arhost_sink sink{};
     sink.struct_size = sizeof(arhost_sink);
     sink.start = [](arhost_instance *i, const arhost_sink_setup *setup) {
-        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_OK; });
+        return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
     };
     sink.write = [](arhost_instance *i, const arhost_output *output) {
         return with<T>(i, [&](T &p) -> arhost_status { return p.write(*output); });
     };
     if constexpr (requires(T & p) { p.idle(); })
         sink.idle = [](arhost_instance *i) { return with<T>(i, [](T &p) -> arhost_status { return p.idle(); }); };
-    sink.stop = [](arhost_instance *i) { return with<T>(i, [](T &p) { return stop(p), ARHOST_OK; }); };
+    sink.stop = [](arhost_instance *i) { return with<T>(i, [](T &p) { return stop(p), ARHOST_STATUS_OK; }); };
     return sink;
 }
 template <class T> inline constexpr arhost_sink sink_functions = make_sink_functions<T>();
@@ -267,13 +267,13 @@ template <class T> inline constexpr arhost_sink sink_functions = make_sink_funct
 // Answers a loader's offer for `plugin`; what ARHOST_SOURCE and its like define negotiate with.
 inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer, const arhost_plugin &plugin) {
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_ERROR_INVALID_ARGUMENT;
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
     const std::uint32_t spoken = ARHOST_ABI_VERSION;
     if (std::clamp(spoken, offer->oldest_abi_version, offer->newest_abi_version) != spoken)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 } // namespace arhost

@@ -49,8 +49,8 @@ typedef struct arhost_devices {
 
     /* [worker] From negotiate on, without an instance, as often as the host likes. Calls `take` once for each device,
      * in the order of `index`, and closes what it opened for that before it returns. It may take seconds, until
-     * drivers are loaded; a host waits some twenty, and takes the first 64 devices. ARHOST_OK without a device where
-     * there is none, or no driver. Any error where it can't tell, after the reason has been logged with
+     * drivers are loaded; a host waits some twenty, and takes the first 64 devices. ARHOST_STATUS_OK without a device
+     * where there is none, or no driver. Any error where it can't tell, after the reason has been logged with
      * ARHOST_SEVERITY_ERROR. */
     arhost_status (*list)(const arhost_host *host, arhost_take_device take, void *context);
 } arhost_devices;

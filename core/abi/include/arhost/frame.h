@@ -16,19 +16,19 @@ extern "C" {
 
 typedef int32_t arhost_pixel_format;
 enum {
-    ARHOST_GREY8 = 1, /* 1 plane: Y */
-    ARHOST_RGB8 = 2,  /* 1 plane: R G B */
-    ARHOST_BGR8 = 3,  /* 1 plane: B G R */
-    ARHOST_YUYV = 4,  /* 1 plane: Y0 U Y1 V; width is even */
-    ARHOST_NV12 = 5,  /* 2 planes: Y, then U V interleaved at half size; width and height are even */
-    ARHOST_I420 = 6   /* 3 planes: Y, U, V, the last two at half size; width and height are even */
+    ARHOST_PIXEL_FORMAT_GREY8 = 1, /* 1 plane: Y */
+    ARHOST_PIXEL_FORMAT_RGB8 = 2,  /* 1 plane: R G B */
+    ARHOST_PIXEL_FORMAT_BGR8 = 3,  /* 1 plane: B G R */
+    ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; width is even */
+    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y, then U V interleaved at half size; width and height are even */
+    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V, the last two at half size; width and height are even */
 };
 
 /* How Y, U and V were made from R'G'B'. Set for YUYV, NV12 and I420; ignored otherwise. */
 typedef int32_t arhost_yuv_matrix;
-enum { ARHOST_BT601 = 1, ARHOST_BT709 = 2 };
+enum { ARHOST_YUV_MATRIX_BT601 = 1, ARHOST_YUV_MATRIX_BT709 = 2 };
 typedef int32_t arhost_yuv_range;
-enum { ARHOST_LIMITED_RANGE = 1, ARHOST_FULL_RANGE = 2 };
+enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 
 /* What a capture time counts. */
 typedef int32_t arhost_clock;
@@ -69,26 +69,26 @@ static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
         return 0;
     rows[0] = h;
     switch (format->pixel_format) {
-    case ARHOST_GREY8:
+    case ARHOST_PIXEL_FORMAT_GREY8:
         row[0] = w;
         grey_is_plane_0 = 1;
         break;
-    case ARHOST_RGB8:
-    case ARHOST_BGR8:
+    case ARHOST_PIXEL_FORMAT_RGB8:
+    case ARHOST_PIXEL_FORMAT_BGR8:
         row[0] = 3 * w;
         break;
-    case ARHOST_YUYV:
+    case ARHOST_PIXEL_FORMAT_YUYV:
         if (w % 2)
             return 0;
         row[0] = 2 * w;
         break;
-    case ARHOST_NV12:
-    case ARHOST_I420:
+    case ARHOST_PIXEL_FORMAT_NV12:
+    case ARHOST_PIXEL_FORMAT_I420:
         if (w % 2 || h % 2)
             return 0;
-        count = format->pixel_format == ARHOST_NV12 ? 2 : 3;
+        count = format->pixel_format == ARHOST_PIXEL_FORMAT_NV12 ? 2 : 3;
         row[0] = w;
-        row[1] = row[2] = format->pixel_format == ARHOST_NV12 ? w : w / 2;
+        row[1] = row[2] = format->pixel_format == ARHOST_PIXEL_FORMAT_NV12 ? w : w / 2;
         rows[1] = rows[2] = h / 2;
         grey_is_plane_0 = 1;
         break;

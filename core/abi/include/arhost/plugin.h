@@ -45,18 +45,18 @@ extern "C" {
 /* Results. Success is positive, failure negative; 0 is never valid, so a forgotten return is caught. */
 typedef int32_t arhost_status;
 enum {
-    ARHOST_OK = 1,
-    ARHOST_END = 2,           /* no failure, but no more: a source has no further frame, a sink's window was closed */
-    ARHOST_END_CUT_SHORT = 3, /* a source's input ends before its time; what could be read was given */
+    ARHOST_STATUS_OK = 1,
+    ARHOST_STATUS_END = 2, /* no failure, but no more: a source has no further frame, a sink's window was closed */
+    ARHOST_STATUS_END_TRUNCATED = 3, /* a source's input ends before its time; what could be read was given */
 
-    ARHOST_ERROR_INVALID_ARGUMENT = -1, /* the caller broke this ABI's contract */
-    ARHOST_ERROR_CONFIGURATION = -2,    /* options, scene or calibration cannot work; not tried again */
-    ARHOST_ERROR_UNSUPPORTED = -3,      /* valid, but this plugin or machine can't do it; not tried again */
-    ARHOST_ERROR_IO = -4,               /* file, device or disk */
-    ARHOST_ERROR_OUT_OF_MEMORY = -5,
-    ARHOST_ERROR_DEVICE_LOST = -6, /* camera unplugged, GPU reset: a restart may help */
-    ARHOST_ERROR_CANCELLED = -7,   /* returned because host->cancelled said so */
-    ARHOST_ERROR_INTERNAL = -8     /* a defect of the plugin, an exception that it caught, say */
+    ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* the caller broke this ABI's contract */
+    ARHOST_STATUS_ERROR_CONFIGURATION = -2,    /* options, scene or calibration cannot work; not tried again */
+    ARHOST_STATUS_ERROR_UNSUPPORTED = -3,      /* valid, but this plugin or machine can't do it; not tried again */
+    ARHOST_STATUS_ERROR_IO = -4,               /* file, device or disk */
+    ARHOST_STATUS_ERROR_OUT_OF_MEMORY = -5,
+    ARHOST_STATUS_ERROR_DEVICE_LOST = -6, /* camera unplugged, GPU reset: a restart may help */
+    ARHOST_STATUS_ERROR_CANCELLED = -7,   /* returned because host->cancelled said so */
+    ARHOST_STATUS_ERROR_INTERNAL = -8     /* a defect of the plugin, an exception that it caught, say */
 };
 
 typedef int32_t arhost_kind;
@@ -92,7 +92,7 @@ typedef struct arhost_host {
      * every few seconds in create and start. `fraction` is 0 to 1, or negative where it is not known. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
-    /* [any] Non-zero once the host wants the running call to return soon (ARHOST_ERROR_CANCELLED).
+    /* [any] Non-zero once the host wants the running call to return soon (ARHOST_STATUS_ERROR_CANCELLED).
      * One atomic load: ask in every loop that can take longer than 100 ms. */
     int32_t (*cancelled)(const struct arhost_host *host);
 
@@ -147,10 +147,10 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
 
 /* What a plugin can do beyond its kind's minimum: descriptor.capabilities. */
 enum {
-    ARHOST_CAN_SEEK = 1 << 0,        /* source: start at any sequence number gives the same frames */
-    ARHOST_IS_LIVE = 1 << 1,         /* source: a camera; frames that are not read in time are gone */
-    ARHOST_TRACES_LENS = 1 << 2,     /* raytracer: applies the distortion of arhost_intrinsics */
-    ARHOST_IS_REALTIME_SINK = 1 << 4 /* sink: wants the newest frame rather than every frame */
+    ARHOST_CAPABILITY_SEEK = 1 << 0,            /* source: start at any sequence number gives the same frames */
+    ARHOST_CAPABILITY_LIVE = 1 << 1,            /* source: a camera; frames that are not read in time are gone */
+    ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the distortion of arhost_intrinsics */
+    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4    /* sink: wants the newest frame rather than every frame */
 };
 
 /* Static, lives as long as the library. A host takes 4,096 bytes of a text, and of all as JSON 127 KiB. */
@@ -163,7 +163,7 @@ typedef struct arhost_descriptor {
     const char *vendor;
     const char *licence;     /* SPDX */
     const char *description; /* one sentence */
-    uint32_t capabilities;   /* ARHOST_CAN_SEEK | … */
+    uint32_t capabilities;   /* ARHOST_CAPABILITY_SEEK | … */
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count of them; NULL where there are none */
     /* NULL-terminated list of what the sandbox must allow, or NULL: "video" (/dev/video*), "usb", "gpu",
@@ -213,7 +213,7 @@ typedef struct arhost_answer {
 
 typedef struct arhost_entry_point {
     uint32_t struct_size;
-    /* [worker] ARHOST_OK with a version inside the offer and a plugin, or ARHOST_ERROR_UNSUPPORTED.
+    /* [worker] ARHOST_STATUS_OK with a version inside the offer and a plugin, or ARHOST_STATUS_ERROR_UNSUPPORTED.
      * A success with a NULL plugin or a version outside the offer is refused. */
     arhost_status (*negotiate)(const arhost_offer *offer, arhost_answer *answer);
 } arhost_entry_point;

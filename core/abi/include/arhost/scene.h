@@ -29,13 +29,16 @@ typedef struct arhost_buffer {
 } arhost_buffer;
 
 typedef int32_t arhost_axes;
-enum { ARHOST_Z_UP = 1 /* x right, y back, z up: the marker's own */, ARHOST_Y_UP = 2 /* x right, y up, z front */ };
+enum {
+    ARHOST_AXES_Z_UP = 1 /* x right, y back, z up: the marker's own */,
+    ARHOST_AXES_Y_UP = 2 /* x right, y up, z front */
+};
 
 typedef int32_t arhost_geometry_type;
 enum {
-    ARHOST_TRIANGLES = 1, /* positions FLOAT3, normals FLOAT3 or absent, texcoords FLOAT2 or absent,
+    ARHOST_GEOMETRY_TRIANGLES = 1, /* positions FLOAT3, normals FLOAT3 or absent, texcoords FLOAT2 or absent,
                              indices 3×uint32 */
-    ARHOST_SPHERES = 2    /* positions FLOAT4: centre and radius; nothing else */
+    ARHOST_GEOMETRY_SPHERES = 2    /* positions FLOAT4: centre and radius; nothing else */
 };
 
 typedef struct arhost_geometry {
@@ -77,13 +80,13 @@ typedef struct arhost_texture {
 
 typedef int32_t arhost_material_model;
 enum {
-    ARHOST_DIFFUSE = 1,           /* Lambert */
-    ARHOST_SPECULAR = 2,          /* Lambert + Phong */
-    ARHOST_MIRROR = 3,            /* perfect reflection times `reflectivity` */
-    ARHOST_METAL = 4,             /* Lambert + Phong + perfect reflection times Schlick's Fresnel term of
+    ARHOST_MATERIAL_DIFFUSE = 1,           /* Lambert */
+    ARHOST_MATERIAL_SPECULAR = 2,          /* Lambert + Phong */
+    ARHOST_MATERIAL_MIRROR = 3,            /* perfect reflection times `reflectivity` */
+    ARHOST_MATERIAL_METAL = 4,             /* Lambert + Phong + perfect reflection times Schlick's Fresnel term of
                                      `reflectivity` */
-    ARHOST_GLASS = 5,             /* refraction and reflection by a Fresnel term, absorption inside */
-    ARHOST_METALLIC_ROUGHNESS = 6 /* glTF 2.0's: GGX over Lambert */
+    ARHOST_MATERIAL_GLASS = 5,             /* refraction and reflection by a Fresnel term, absorption inside */
+    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* glTF 2.0's: GGX over Lambert */
 };
 
 /* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; what a
@@ -123,10 +126,10 @@ typedef struct arhost_material {
 
 typedef int32_t arhost_role;
 enum {
-    ARHOST_VIRTUAL = 1, /* alpha 255 */
-    ARHOST_CATCHER = 2, /* stands for real geometry: alpha only where shadowed; seen by secondary rays.
+    ARHOST_ROLE_VIRTUAL = 1, /* alpha 255 */
+    ARHOST_ROLE_CATCHER = 2, /* stands for real geometry: alpha only where shadowed; seen by secondary rays.
                            Primary rays pass through the sides that face away. */
-    ARHOST_OCCLUDER = 3 /* stands for real geometry: hides what is behind it, alpha 0 */
+    ARHOST_ROLE_OCCLUDER = 3 /* stands for real geometry: hides what is behind it, alpha 0 */
 };
 
 typedef struct arhost_object {
@@ -185,12 +188,12 @@ typedef struct arhost_skin {
 
 typedef int32_t arhost_light_type;
 enum {
-    ARHOST_POINT_LIGHT = 1,       /* at `position` */
-    ARHOST_DIRECTIONAL_LIGHT = 2, /* from infinitely far, along `direction` */
-    ARHOST_SPOT_LIGHT = 3,        /* at `position`, along `direction`, in a cone */
-    ARHOST_RECTANGLE_LIGHT = 4,   /* about `position`, corners at ±axis_u ±axis_v, shining to the side of
+    ARHOST_LIGHT_POINT = 1,       /* at `position` */
+    ARHOST_LIGHT_DIRECTIONAL = 2, /* from infinitely far, along `direction` */
+    ARHOST_LIGHT_SPOT = 3,        /* at `position`, along `direction`, in a cone */
+    ARHOST_LIGHT_RECTANGLE = 4,   /* about `position`, corners at ±axis_u ±axis_v, shining to the side of
                                      `direction` with the cosine to it */
-    ARHOST_SPHERE_LIGHT = 5       /* about `position`, of `radius` */
+    ARHOST_LIGHT_SPHERE = 5       /* about `position`, of `radius` */
 };
 typedef int32_t arhost_falloff;
 enum {

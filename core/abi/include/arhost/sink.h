@@ -68,9 +68,10 @@ typedef struct arhost_sink {
      * moment. */
     arhost_status (*start)(arhost_instance *instance, const arhost_sink_setup *setup);
 
-    /* [worker] One frame, sequence numbers ascending. Once it has returned ARHOST_OK the frame is not sent again, so
-     * it must survive the death of this process. Frames in one file are in order; of files of a frame each whose
-     * names differ in a number, the numbers ascend. ARHOST_END: the user closed the window, the run is to end. */
+    /* [worker] One frame, sequence numbers ascending. Once it has returned ARHOST_STATUS_OK the frame is not sent
+     * again, so it must survive the death of this process. Frames in one file are in order; of files of a frame each
+     * whose names differ in a number, the numbers ascend. ARHOST_STATUS_END: the user closed the window, the run is
+     * to end. */
     arhost_status (*write)(arhost_instance *instance, const arhost_output *output);
 
     /* [worker] About 30 times a second while no frame comes, for windows' events; may be NULL. */

@@ -76,8 +76,8 @@ typedef struct arhost_source {
     arhost_status (*start)(arhost_instance *instance, const arhost_source_setup *setup,
                            arhost_source_properties *properties);
 
-    /* [worker] The next frame; waits for it, asking host->cancelled meanwhile. ARHOST_OK, ARHOST_END
-     * (and the same if asked again), or an error. A file that is cut short gives ARHOST_END_CUT_SHORT
+    /* [worker] The next frame; waits for it, asking host->cancelled meanwhile. ARHOST_STATUS_OK, ARHOST_STATUS_END
+     * (and the same if asked again), or an error. A file that is cut short gives ARHOST_STATUS_END_TRUNCATED
      * after what could be read, and a log message of severity WARNING that says where. */
     arhost_status (*read)(arhost_instance *instance, const arhost_frame_buffer *buffer, arhost_frame_info *info);
 

@@ -68,13 +68,14 @@ typedef struct arhost_tracker_result {
 typedef struct arhost_tracker {
     uint32_t struct_size;
 
-    /* [worker] Once after create. ARHOST_ERROR_CONFIGURATION where an id is not in the dictionary; that or
-     * ARHOST_ERROR_UNSUPPORTED where the lens is of a model, or of a count of coefficients, that it can't do. */
+    /* [worker] Once after create. ARHOST_STATUS_ERROR_CONFIGURATION where an id is not in the dictionary; that or
+     * ARHOST_STATUS_ERROR_UNSUPPORTED where the lens is of a model, or of a count of coefficients, that it can't do.
+     */
     arhost_status (*start)(arhost_instance *instance, const arhost_tracker_setup *setup);
 
     /* [worker] Finds the listed markers and no others, in the order of the setup's list. Those not
      * found are left out. The frame is read-only and may be gone after the call. `result` comes zeroed
-     * but for struct_size. ARHOST_OK also when none is found.
+     * but for struct_size. ARHOST_STATUS_OK also when none is found.
      * What is DETECTED, and the bytes of its record, depend on the frame's pixels alone: not on frames before,
      * its number, its time, or threads. So a tracker that is killed and started again goes on as if nothing
      * had happened. One that smooths or predicts tells that as PREDICTED, which depends on the frames since

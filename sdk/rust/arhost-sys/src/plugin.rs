@@ -21,7 +21,7 @@ impl Failure {
 }
 impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
-        Failure::new(ARHOST_ERROR_IO, error.to_string())
+        Failure::new(ARHOST_STATUS_ERROR_IO, error.to_string())
     }
 }
 
@@ -55,7 +55,7 @@ impl Host {
             }
         }
     }
-    /// True once the running call is to return soon, with `ARHOST_ERROR_CANCELLED`.
+    /// True once the running call is to return soon, with `ARHOST_STATUS_ERROR_CANCELLED`.
     pub fn cancelled(&self) -> bool {
         unsafe { (*self.0).cancelled.map_or(false, |cancelled| cancelled(self.0) != 0) }
     }
@@ -168,7 +168,7 @@ macro_rules! plugin {
                 if (*offer).struct_size < std::mem::size_of::<$crate::arhost_offer>() as u32
                     || (*answer).struct_size < std::mem::size_of::<$crate::arhost_answer>() as u32
                 {
-                    return $crate::ARHOST_ERROR_UNSUPPORTED;
+                    return $crate::ARHOST_STATUS_ERROR_UNSUPPORTED;
                 }
                 $crate::negotiate(&*offer, &mut *answer, &PLUGIN)
             }
@@ -244,7 +244,7 @@ fn guarded(host: Host, call: impl FnOnce() -> Result<arhost_status, Failure>) ->
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(status)) => status,
         Ok(Err(failure)) => {
-            if failure.status != ARHOST_ERROR_CANCELLED {
+            if failure.status != ARHOST_STATUS_ERROR_CANCELLED {
                 host.log(ARHOST_SEVERITY_ERROR, &failure.message);
             }
             failure.status
@@ -255,7 +255,7 @@ fn guarded(host: Host, call: impl FnOnce() -> Result<arhost_status, Failure>) ->
                 .cloned()
                 .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
             host.log(ARHOST_SEVERITY_ERROR, &format!("panicked: {}", text.as_deref().unwrap_or("no message")));
-            ARHOST_ERROR_INTERNAL
+            ARHOST_STATUS_ERROR_INTERNAL
         }
     }
 }
@@ -271,9 +271,9 @@ unsafe fn with<T>(
 
 fn end_unless(more: bool) -> arhost_status {
     if more {
-        ARHOST_OK
+        ARHOST_STATUS_OK
     } else {
-        ARHOST_END
+        ARHOST_STATUS_END
     }
 }
 
@@ -286,21 +286,21 @@ unsafe extern "C" fn create<T: Plugin>(
     guarded(Host(host), || {
         let plugin = T::new(Host(host), &Options(elements(options, option_count)))?;
         *instance = Box::into_raw(Box::new(Instance { host: Host(host), plugin })).cast();
-        Ok(ARHOST_OK)
+        Ok(ARHOST_STATUS_OK)
     })
 }
 unsafe extern "C" fn destroy<T: Plugin>(instance: *mut arhost_instance) {
     let instance = Box::from_raw(instance.cast::<Instance<T>>());
     guarded(instance.host, || {
         drop(instance.plugin);
-        Ok(ARHOST_OK)
+        Ok(ARHOST_STATUS_OK)
     });
 }
 unsafe extern "C" fn stop<T: Plugin>(instance: *mut arhost_instance) {
     stop_sink::<T>(instance);
 }
 unsafe extern "C" fn stop_sink<T: Plugin>(instance: *mut arhost_instance) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.stop().map(|()| ARHOST_OK))
+    with(instance, |plugin: &mut T| plugin.stop().map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn no_extension(_id: *const c_char) -> *const c_void {
     std::ptr::null()
@@ -321,11 +321,11 @@ pub const fn plugin_of<T: Plugin>(descriptor: &'static arhost_descriptor, functi
 #[doc(hidden)]
 pub fn negotiate(offer: &arhost_offer, answer: &mut arhost_answer, plugin: &'static arhost_plugin) -> arhost_status {
     if !(offer.oldest_abi_version..=offer.newest_abi_version).contains(&ARHOST_ABI_VERSION) {
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     }
     answer.abi_version = ARHOST_ABI_VERSION;
     answer.plugin = plugin;
-    ARHOST_OK
+    ARHOST_STATUS_OK
 }
 
 unsafe extern "C" fn start_source<T: Source>(
@@ -336,9 +336,9 @@ unsafe extern "C" fn start_source<T: Source>(
     with(instance, |plugin: &mut T| {
         plugin.start(&*setup, &mut *properties)?;
         if !(*properties).format.lay_out() {
-            return Err(Failure::new(ARHOST_ERROR_CONFIGURATION, "the frames' format or size is not valid"));
+            return Err(Failure::new(ARHOST_STATUS_ERROR_CONFIGURATION, "the frames' format or size is not valid"));
         }
-        Ok(ARHOST_OK)
+        Ok(ARHOST_STATUS_OK)
     })
 }
 unsafe extern "C" fn read<T: Source>(
@@ -362,14 +362,14 @@ unsafe extern "C" fn start_tracker<T: Tracker>(
     instance: *mut arhost_instance,
     setup: *const arhost_tracker_setup,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn track<T: Tracker>(
     instance: *mut arhost_instance,
     frame: *const arhost_frame,
     result: *mut arhost_tracker_result,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.track(&Frame(&*frame), &mut *result).map(|()| ARHOST_OK))
+    with(instance, |plugin: &mut T| plugin.track(&Frame(&*frame), &mut *result).map(|()| ARHOST_STATUS_OK))
 }
 #[doc(hidden)]
 pub const fn tracker<T: Tracker>() -> arhost_tracker {
@@ -385,7 +385,7 @@ unsafe extern "C" fn start_raytracer<T: Raytracer>(
     instance: *mut arhost_instance,
     setup: *const arhost_raytracer_setup,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn render<T: Raytracer>(
     instance: *mut arhost_instance,
@@ -394,7 +394,7 @@ unsafe extern "C" fn render<T: Raytracer>(
     info: *mut arhost_render_info,
 ) -> arhost_status {
     with(instance, |plugin: &mut T| {
-        plugin.render(&*request, &mut Image(&*image), &mut *info).map(|()| ARHOST_OK)
+        plugin.render(&*request, &mut Image(&*image), &mut *info).map(|()| ARHOST_STATUS_OK)
     })
 }
 #[doc(hidden)]
@@ -411,7 +411,7 @@ unsafe extern "C" fn start_sink<T: Sink>(
     instance: *mut arhost_instance,
     setup: *const arhost_sink_setup,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_OK))
+    with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn write<T: Sink>(instance: *mut arhost_instance, output: *const arhost_output) -> arhost_status {
     with(instance, |plugin: &mut T| plugin.write(&Output(&*output)).map(end_unless))

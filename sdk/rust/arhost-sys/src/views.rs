@@ -194,11 +194,11 @@ impl arhost_frame_format {
         let even = w % 2 == 0 && h % 2 == 0;
         // Bytes a row and rows of each plane, and whether the first one is luma.
         let (planes, grey_is_plane_0) = match self.pixel_format {
-            ARHOST_GREY8 => (vec![(w, h)], true),
-            ARHOST_RGB8 | ARHOST_BGR8 => (vec![(3 * w, h)], false),
-            ARHOST_YUYV if w % 2 == 0 => (vec![(2 * w, h)], false),
-            ARHOST_NV12 if even => (vec![(w, h), (w, h / 2)], true),
-            ARHOST_I420 if even => (vec![(w, h), (w / 2, h / 2), (w / 2, h / 2)], true),
+            ARHOST_PIXEL_FORMAT_GREY8 => (vec![(w, h)], true),
+            ARHOST_PIXEL_FORMAT_RGB8 | ARHOST_PIXEL_FORMAT_BGR8 => (vec![(3 * w, h)], false),
+            ARHOST_PIXEL_FORMAT_YUYV if w % 2 == 0 => (vec![(2 * w, h)], false),
+            ARHOST_PIXEL_FORMAT_NV12 if even => (vec![(w, h), (w, h / 2)], true),
+            ARHOST_PIXEL_FORMAT_I420 if even => (vec![(w, h), (w / 2, h / 2), (w / 2, h / 2)], true),
             _ => return false,
         };
         let stride_of = |bytes: u64| (bytes + 63) / 64 * 64;

@@ -44,7 +44,7 @@ fn the_descriptor_lists_them_and_ends_with_null() {
         plugin: std::ptr::null(),
     };
     unsafe {
-        assert_eq!((arhost_entry.negotiate.unwrap())(&offer, &mut answer), ARHOST_OK);
+        assert_eq!((arhost_entry.negotiate.unwrap())(&offer, &mut answer), ARHOST_STATUS_OK);
         let needs = (*(*answer.plugin).descriptor).needs;
         assert_eq!(CStr::from_ptr(*needs).to_str(), Ok("display"));
         assert_eq!(CStr::from_ptr(*needs.add(1)).to_str(), Ok("gpu"));

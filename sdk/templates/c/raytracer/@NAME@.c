@@ -79,17 +79,17 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     (void)info; /* it could tell a region outside of which every alpha is 0 */
     if (!look_through(&v, &request->camera)) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "the camera's up is parallel to its view");
-        return ARHOST_ERROR_INVALID_ARGUMENT;
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
     }
     if (request->motion)
         tracer_move(self->tracer, request->motion);
     for (row = 0; row < image->height; ++row) {
         if (self->host->cancelled(self->host)) /* arhost wants to end: rows must not keep it waiting */
-            return ARHOST_ERROR_CANCELLED;
+            return ARHOST_STATUS_ERROR_CANCELLED;
         for (column = 0; column < image->width; ++column)
             write_pixel(image->rgba + (size_t)row * image->stride + 4 * (size_t)column, self, &v, column, row);
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 /* ---- start and end ---- */
@@ -98,9 +98,9 @@ static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *
     self->tracer = tracer_new(setup->scene);
     if (!self->tracer) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void stop(arhost_instance *self) {
@@ -113,13 +113,13 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     arhost_instance *self = calloc(1, sizeof *self);
     if (!self) {
         host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
     /* Every option that is declared below is there. */
     self->side = (int)sqrt((double)arhost_find_option(options, option_count, "samples")->integer);
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void destroy(arhost_instance *self) {
@@ -156,12 +156,12 @@ static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, cre
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_ERROR_UNSUPPORTED; /* of a version before this one */
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};

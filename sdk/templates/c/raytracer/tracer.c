@@ -138,11 +138,11 @@ tracer *tracer_new(const arhost_scene *scene) {
         object *o = &self->objects[i];
         o->geometry = &geometries[objects[i].geometry];
         o->material = &materials[objects[i].material];
-        o->kind = objects[i].role == ARHOST_CATCHER    ? CATCHER
-                  : objects[i].role == ARHOST_OCCLUDER ? OCCLUDER
-                  : o->material->model == ARHOST_GLASS ? GLASS
+        o->kind = objects[i].role == ARHOST_ROLE_CATCHER    ? CATCHER
+                  : objects[i].role == ARHOST_ROLE_OCCLUDER ? OCCLUDER
+                  : o->material->model == ARHOST_MATERIAL_GLASS ? GLASS
                                                        : SOLID;
-        o->sphere_count = o->geometry->type == ARHOST_SPHERES ? o->geometry->positions.count : 0;
+        o->sphere_count = o->geometry->type == ARHOST_GEOMETRY_SPHERES ? o->geometry->positions.count : 0;
         o->spheres = calloc(o->sphere_count + 1, sizeof *o->spheres);
         o->triangles = calloc((size_t)o->geometry->indices.count + 1, sizeof *o->triangles);
         if (!o->spheres || !o->triangles)
@@ -281,7 +281,7 @@ static incoming incoming_of(const arhost_light *light, const surface *s) {
     const vec beam = vec_of(light->direction);
     incoming in = {scale(-1, beam), INFINITY, 0, 1};
     double along_beam;
-    if (light->type != ARHOST_DIRECTIONAL_LIGHT) {
+    if (light->type != ARHOST_LIGHT_DIRECTIONAL) {
         const vec way = subtract(vec_of(light->position), s->position);
         in.distance = length(way);
         in.direction = scale(1 / in.distance, way);
@@ -289,9 +289,9 @@ static incoming incoming_of(const arhost_light *light, const surface *s) {
             in.irradiance = 1 / fmax(dot(way, way), 1e-6);
     }
     along_beam = -dot(beam, in.direction);
-    if (light->type == ARHOST_RECTANGLE_LIGHT)
+    if (light->type == ARHOST_LIGHT_RECTANGLE)
         in.irradiance *= fmax(along_beam, 0);
-    if (light->type == ARHOST_SPOT_LIGHT) {
+    if (light->type == ARHOST_LIGHT_SPOT) {
         const double outer = light->cosine_outer, inner = light->cosine_inner;
         const double t = fmin(fmax((along_beam - outer) / fmax(inner - outer, 1e-6), 0), 1);
         in.irradiance *= t * t * (3 - 2 * t);
@@ -312,7 +312,7 @@ static unsigned blocked_by(const tracer *self, const incoming *light, const surf
 
 /* Lambert, and Phong's highlight. */
 static vec lit(const tracer *self, const surface *s, const arhost_material *material, vec to_eye) {
-    const int shines = material->model == ARHOST_SPECULAR || material->model == ARHOST_METAL;
+    const int shines = material->model == ARHOST_MATERIAL_SPECULAR || material->model == ARHOST_MATERIAL_METAL;
     vec sum = add(multiply(vec_of(self->scene->ambient), vec_of(material->ambient)), vec_of(material->emission));
     uint32_t i;
     for (i = 0; i < self->scene->lights.count; ++i) {
@@ -355,14 +355,14 @@ static vec colour_of(const tracer *self, ray r, const hit *h, uint32_t bounces) 
     cosine = -dot(r.direction, s.normal);
     mirrored = add(r.direction, scale(2 * cosine, s.normal));
     switch (material->model) {
-    case ARHOST_MIRROR:
+    case ARHOST_MATERIAL_MIRROR:
         return multiply(vec_of(material->reflectivity), light_from(self, s.position, mirrored, bounces + 1));
-    case ARHOST_METAL:
+    case ARHOST_MATERIAL_METAL:
         rim = pow(1 - fmin(fmax(cosine, 0), 1), 5); /* Schlick */
         reflectance = add(scale(1 - rim, vec_of(material->reflectivity)), (vec){rim, rim, rim});
         return add(lit(self, &s, material, scale(-1, r.direction)),
                    multiply(reflectance, light_from(self, s.position, mirrored, bounces + 1)));
-    case ARHOST_GLASS:
+    case ARHOST_MATERIAL_GLASS:
         return multiply(vec_of(material->refraction), light_from(self, s.below, r.direction, bounces + 1));
     default:
         return lit(self, &s, material, scale(-1, r.direction));

@@ -20,7 +20,7 @@ static arhost_status complain(const arhost_instance *self, const char *file) {
     char text[PATH_SIZE + 256];
     snprintf(text, sizeof text, "can't write %s: %s", file, strerror(errno));
     self->host->log(self->host, ARHOST_SEVERITY_ERROR, text);
-    return ARHOST_ERROR_IO;
+    return ARHOST_STATUS_ERROR_IO;
 }
 
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
@@ -41,9 +41,9 @@ static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup
     self->row = malloc(3 * (size_t)setup->width);
     if (!self->row) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
@@ -71,13 +71,13 @@ static arhost_status write_frame(arhost_instance *self, const arhost_output *out
     whole = !ferror(file);
     if (fclose(file) != 0 || !whole || rename(part, name) != 0) /* under its own name only when it is whole */
         return complain(self, name);
-    return ARHOST_OK; /* the frame must now survive the death of this process */
+    return ARHOST_STATUS_OK; /* the frame must now survive the death of this process */
 }
 
 static arhost_status stop(arhost_instance *self) {
     free(self->row);
     self->row = NULL;
-    return ARHOST_OK; /* all files are whole */
+    return ARHOST_STATUS_OK; /* all files are whole */
 }
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
@@ -85,13 +85,13 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     arhost_instance *self = calloc(1, sizeof *self);
     if (!self) {
         host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
     /* Every option that is declared below is there. */
     snprintf(self->path, sizeof self->path, "%s", arhost_find_option(options, option_count, "path")->text);
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void destroy(arhost_instance *self) {
@@ -129,12 +129,12 @@ static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, cre
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_ERROR_UNSUPPORTED; /* of a version before this one */
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};

@@ -27,15 +27,15 @@ static arhost_status start(arhost_instance *self, const arhost_source_setup *set
     self->paced = setup->paced;
     self->began_ns = now_ns() - (int64_t)(1e9 * (double)setup->first_sequence / self->fps);
     properties->frame_count = self->frames;
-    properties->format.pixel_format = ARHOST_RGB8;
+    properties->format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
     properties->format.width = self->width;
     properties->format.height = self->height;
     properties->format.fps = self->fps;
     if (!arhost_frame_layout(&properties->format)) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "width and height are none that a frame can have");
-        return ARHOST_ERROR_CONFIGURATION;
+        return ARHOST_STATUS_ERROR_CONFIGURATION;
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static arhost_status read(arhost_instance *self, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
@@ -43,14 +43,14 @@ static arhost_status read(arhost_instance *self, const arhost_frame_buffer *buff
     const uint64_t n = buffer->sequence;
     uint32_t column, row;
     if (self->frames > 0 && n >= self->frames)
-        return ARHOST_END;
+        return ARHOST_STATUS_END;
 
     info->clock = ARHOST_CLOCK_MEDIA; /* of a camera: ARHOST_CLOCK_MONOTONIC, when the picture was taken */
     info->capture_ns = (int64_t)(1e9 * (double)n / self->fps);
     while (self->paced && now_ns() < self->began_ns + info->capture_ns) {
         const struct timespec moment = {0, 2000000};
         if (self->host->cancelled(self->host)) /* whatever waits asks this */
-            return ARHOST_ERROR_CANCELLED;
+            return ARHOST_STATUS_ERROR_CANCELLED;
         nanosleep(&moment, NULL);
     }
 
@@ -63,7 +63,7 @@ static arhost_status read(arhost_instance *self, const arhost_frame_buffer *buff
             *rgb++ = 128;
         }
     }
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void stop(arhost_instance *self) {
@@ -75,7 +75,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     arhost_instance *self = calloc(1, sizeof *self);
     if (!self) {
         host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
     /* Every option that is declared below is there. */
@@ -83,7 +83,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->height = (uint32_t)arhost_find_option(options, option_count, "height")->integer;
     self->frames = (uint64_t)arhost_find_option(options, option_count, "frames")->integer;
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void destroy(arhost_instance *self) {
@@ -114,7 +114,7 @@ static const arhost_descriptor descriptor = {
     .vendor = "unknown", /* FILL IN: you */
     .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
     .description = "A gradient that moves.",
-    .capabilities = ARHOST_CAN_SEEK, /* frame n is the same, whatever was read before */
+    .capabilities = ARHOST_CAPABILITY_SEEK, /* frame n is the same, whatever was read before */
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
@@ -123,12 +123,12 @@ static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, cre
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_ERROR_UNSUPPORTED; /* of a version before this one */
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};

@@ -16,7 +16,7 @@ struct arhost_instance {
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
     self->lens = *setup->intrinsics;
     self->marker = setup->markers[0];
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
@@ -26,7 +26,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     uint32_t column, row;
     int i;
 
-    /* FILL IN: your detector. Without `return ARHOST_OK` before the end, it has found self->marker. */
+    /* FILL IN: your detector. Without `return ARHOST_STATUS_OK` before the end, it has found self->marker. */
     for (row = 0; row < format->height; ++row) {
         const uint8_t *grey = frame->grey + (size_t)row * format->grey_stride;
         for (column = 0; column < format->width; ++column)
@@ -37,7 +37,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
             }
     }
     if (area < 100)
-        return ARHOST_OK; /* nothing found is no error: the video goes on without an overlay */
+        return ARHOST_STATUS_OK; /* nothing found is no error: the video goes on without an overlay */
     x = sum_x / area;
     y = sum_y / area;
     half = sqrt(area) / 2;
@@ -58,7 +58,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     marker->mt[12] = distance * (x - self->lens.cx) / self->lens.fx;
     marker->mt[13] = -distance * (y - self->lens.cy) / self->lens.fy;
     marker->mt[14] = -distance;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void stop(arhost_instance *self) {
@@ -70,13 +70,13 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     arhost_instance *self = calloc(1, sizeof *self);
     if (!self) {
         host->log(host, ARHOST_SEVERITY_ERROR, "out of memory");
-        return ARHOST_ERROR_OUT_OF_MEMORY;
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
     /* Every option that is declared below is there. */
     self->threshold = arhost_find_option(options, option_count, "threshold")->integer;
     *instance = self;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 static void destroy(arhost_instance *self) {
@@ -113,12 +113,12 @@ static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, cre
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_ERROR_UNSUPPORTED; /* of a version before this one */
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
     if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
-        return ARHOST_ERROR_UNSUPPORTED;
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = spoken;
     answer->plugin = &plugin;
-    return ARHOST_OK;
+    return ARHOST_STATUS_OK;
 }
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};

@@ -23,7 +23,7 @@ public:
     explicit Camera(const arhost_camera &camera) : eye_(vec(camera.eye)), lens_(camera.intrinsics) {
         const Vec back = eye_ - vec(camera.look_at), up = vec(camera.up), right = cross(up, back);
         if (!(length(right) > 1e-9 * length(up) * length(back))) // nor is it where a number is not finite
-            throw arhost::Failure(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view");
+            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view");
         back_ = normalised(back);
         right_ = normalised(right);
         up_ = cross(back_, right_);
@@ -52,7 +52,7 @@ public:
             tracer_->move(*request.motion);
         for (std::uint32_t row = 0; row < image.height; ++row) {
             if (host_.cancelled()) // arhost wants to end: rows must not keep it waiting
-                throw arhost::Failure(ARHOST_ERROR_CANCELLED, "cancelled");
+                throw arhost::Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled");
             std::uint8_t *pixel = image.rgba + std::size_t(row) * image.stride;
             for (std::uint32_t column = 0; column < image.width; ++column, pixel += 4)
                 write(pixel, camera, column, row);
@@ -97,7 +97,7 @@ constexpr arhost_descriptor descriptor = {
     "unknown", // FILL IN: you
     "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
     "Traces rays by brute force.",
-    0, // FILL IN: ARHOST_TRACES_LENS, once rays go through the lens
+    0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION, once rays go through the lens
     std::size(options),
     options,
     nullptr, // what of the machine it needs: arhost/plugin.h

@@ -18,9 +18,9 @@ Tracer::Tracer(const arhost_scene &scene) : scene_(scene), objects_(scene.object
         const arhost_geometry &geometry = elements<arhost_geometry>(scene.geometries)[from.geometry];
         Object &object = objects_[i];
         object.material = &elements<arhost_material>(scene.materials)[from.material];
-        object.kind = from.role == ARHOST_CATCHER              ? catcher
-                      : from.role == ARHOST_OCCLUDER           ? occluder
-                      : object.material->model == ARHOST_GLASS ? glass
+        object.kind = from.role == ARHOST_ROLE_CATCHER              ? catcher
+                      : from.role == ARHOST_ROLE_OCCLUDER           ? occluder
+                      : object.material->model == ARHOST_MATERIAL_GLASS ? glass
                                                                : solid;
         place(i, from.world_from_object, elements<float>(geometry.positions), elements<float>(geometry.normals));
     }
@@ -63,7 +63,7 @@ void Tracer::place(std::uint32_t number, const float *world_from_object, const f
     Object &object = objects_[number];
     object.spheres.clear();
     object.triangles.clear();
-    if (geometry.type == ARHOST_SPHERES) {
+    if (geometry.type == ARHOST_GEOMETRY_SPHERES) {
         for (std::uint32_t i = 0; i < geometry.positions.count; ++i)
             object.spheres.push_back({to_world(positions + 4 * i), positions[4 * i + 3] * length(x)});
     } else {
@@ -201,7 +201,7 @@ struct Tracer::Incoming {
 Tracer::Incoming Tracer::incoming(const arhost_light &light, const Surface &surface) {
     const Vec beam = vec(light.direction);
     Incoming in = {-1 * beam, infinity, 0};
-    if (light.type != ARHOST_DIRECTIONAL_LIGHT) {
+    if (light.type != ARHOST_LIGHT_DIRECTIONAL) {
         const Vec way = vec(light.position) - surface.position;
         in.distance = length(way);
         in.direction = 1 / in.distance * way;
@@ -209,9 +209,9 @@ Tracer::Incoming Tracer::incoming(const arhost_light &light, const Surface &surf
             in.irradiance = 1 / std::max(dot(way, way), 1e-6);
     }
     const double along_beam = -dot(beam, in.direction);
-    if (light.type == ARHOST_RECTANGLE_LIGHT)
+    if (light.type == ARHOST_LIGHT_RECTANGLE)
         in.irradiance *= std::max(along_beam, 0.0);
-    if (light.type == ARHOST_SPOT_LIGHT) {
+    if (light.type == ARHOST_LIGHT_SPOT) {
         const double outer = light.cosine_outer, inner = light.cosine_inner;
         const double t = std::clamp((along_beam - outer) / std::max(inner - outer, 1e-6), 0.0, 1.0);
         in.irradiance *= t * t * (3 - 2 * t);
@@ -231,7 +231,7 @@ Tracer::Way Tracer::way_to(const Incoming &light, const Surface &surface) const 
 
 // Lambert, and Phong's highlight.
 Vec Tracer::lit(const Surface &surface, const arhost_material &material, Vec to_eye) const {
-    const bool shines = material.model == ARHOST_SPECULAR || material.model == ARHOST_METAL;
+    const bool shines = material.model == ARHOST_MATERIAL_SPECULAR || material.model == ARHOST_MATERIAL_METAL;
     const auto *lights = elements<arhost_light>(scene_.lights);
     Vec sum = vec(scene_.ambient) * vec(material.ambient) + vec(material.emission);
     for (std::uint32_t i = 0; i < scene_.lights.count; ++i) {
@@ -265,14 +265,14 @@ Vec Tracer::colour(const Ray &ray, const Hit &hit, unsigned bounces) const {
     const double cosine = -dot(ray.direction, surface.normal);
     const Vec mirrored = ray.direction + 2 * cosine * surface.normal;
     switch (material.model) {
-    case ARHOST_MIRROR:
+    case ARHOST_MATERIAL_MIRROR:
         return vec(material.reflectivity) * light_from(surface.position, mirrored);
-    case ARHOST_METAL: {
+    case ARHOST_MATERIAL_METAL: {
         const double rim = std::pow(1 - std::clamp(cosine, 0.0, 1.0), 5); // Schlick
         const Vec reflectance = (1 - rim) * vec(material.reflectivity) + Vec{rim, rim, rim};
         return lit(surface, material, -1 * ray.direction) + reflectance * light_from(surface.position, mirrored);
     }
-    case ARHOST_GLASS:
+    case ARHOST_MATERIAL_GLASS:
         return vec(material.refraction) * light_from(surface.below, ray.direction);
     default:
         return lit(surface, material, -1 * ray.direction);

@@ -21,7 +21,7 @@ public:
         std::error_code ignored; // what is wrong shows in the next lines
         fs::create_directories(fs::path(path_).parent_path(), ignored);
         if (!std::ofstream(part_))
-            throw arhost::Failure(ARHOST_ERROR_IO, "can't write " + part_);
+            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "can't write " + part_);
         fs::remove(part_);
         row_.resize(std::size_t(3) * setup.width);
     }
@@ -43,9 +43,9 @@ public:
         }
         file.close();
         if (!file)
-            throw arhost::Failure(ARHOST_ERROR_IO, "can't write " + part_);
+            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "can't write " + part_);
         fs::rename(part_, path_ + number); // under its own name only when it is whole
-        return ARHOST_OK;                  // the frame must now survive the death of this process
+        return ARHOST_STATUS_OK;                  // the frame must now survive the death of this process
     }
 
 private:

@@ -18,7 +18,7 @@ public:
         paced_ = setup.paced;
         began_ = Clock::now() - time_of(setup.first_sequence);
         properties.frame_count = frames_;
-        properties.format.pixel_format = ARHOST_RGB8;
+        properties.format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
         properties.format.width = width_;
         properties.format.height = height_;
         properties.format.fps = fps_;
@@ -28,11 +28,11 @@ public:
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         const std::uint64_t n = buffer.sequence;
         if (frames_ > 0 && n >= frames_)
-            return ARHOST_END;
+            return ARHOST_STATUS_END;
         info.clock = ARHOST_CLOCK_MEDIA; // of a camera: ARHOST_CLOCK_MONOTONIC, when the picture was taken
         info.capture_ns = time_of(n).count();
         if (paced_ && !host_.wait_until(began_ + time_of(n)))
-            return ARHOST_ERROR_CANCELLED;
+            return ARHOST_STATUS_ERROR_CANCELLED;
 
         // FILL IN: your pixels. The grey plane that trackers see is made of them by arhost.
         for (std::uint32_t row = 0; row < height_; ++row) {
@@ -43,7 +43,7 @@ public:
                 *rgb++ = 128;
             }
         }
-        return ARHOST_OK;
+        return ARHOST_STATUS_OK;
     }
 
 private:
@@ -75,7 +75,7 @@ constexpr arhost_descriptor descriptor = {
     "unknown", // FILL IN: you
     "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
     "A gradient that moves.",
-    ARHOST_CAN_SEEK,
+    ARHOST_CAPABILITY_SEEK,
     std::size(options),
     options,
     nullptr, // what of the machine it needs: arhost/plugin.h

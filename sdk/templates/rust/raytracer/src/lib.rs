@@ -30,7 +30,7 @@ impl View<'_> {
         let right = cross(up, back);
         // Nor is it longer where a number is not finite.
         if !(length(right) > 1e-9 * length(up) * length(back)) {
-            return Err(Failure::new(ARHOST_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view"));
+            return Err(Failure::new(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view"));
         }
         let (right, back) = (normalised(right), normalised(back));
         Ok(View { lens: &camera.intrinsics, eye, right, up: cross(back, right), back })
@@ -95,7 +95,7 @@ impl Raytracer for @CLASS@ {
         }
         for row in 0..image.height() {
             if self.host.cancelled() {
-                return Err(Failure::new(ARHOST_ERROR_CANCELLED, "")); // rows must not keep arhost waiting
+                return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // rows must not keep arhost waiting
             }
             for (column, rgba) in image.row_mut(row).iter_mut().enumerate() {
                 *rgba = pixel(tracer, &view, self.side, column as f64, f64::from(row));
@@ -107,7 +107,7 @@ impl Raytracer for @CLASS@ {
 
 plugin! {
     raytracer @CLASS@, "@NAME@", "Traces rays by brute force.",
-    capabilities: 0, // FILL IN: ARHOST_TRACES_LENS, once rays go through the lens
+    capabilities: 0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION, once rays go through the lens
     // arhost checks the configuration against these before `new` sees a value.
     options: [
         option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel: the largest square number up to it.", 1.0, 64.0),

@@ -73,7 +73,7 @@ fn geometry_of(scene: Scene, object: u32) -> &'static arhost_geometry {
 /// The geometry as the scene has it, in another place.
 fn shape_at(scene: Scene, object: u32, world_from_object: &[f32; 12]) -> Shape {
     let geometry = geometry_of(scene, object);
-    if geometry.type_ == ARHOST_SPHERES {
+    if geometry.type_ == ARHOST_GEOMETRY_SPHERES {
         let x = vec3(&world_from_object[0..3]);
         let spheres: &[[f32; 4]] = unsafe { scene.elements(geometry.positions) };
         let placed = |s: &[f32; 4]| Sphere {
@@ -140,9 +140,9 @@ impl Tracer {
         let object = |(number, from): (usize, &arhost_object)| {
             let material = materials[from.material as usize];
             let kind = match from.role {
-                ARHOST_CATCHER => CATCHER,
-                ARHOST_OCCLUDER => OCCLUDER,
-                _ if material.model == ARHOST_GLASS => GLASS,
+                ARHOST_ROLE_CATCHER => CATCHER,
+                ARHOST_ROLE_OCCLUDER => OCCLUDER,
+                _ if material.model == ARHOST_MATERIAL_GLASS => GLASS,
                 _ => SOLID,
             };
             Object { kind, material, shape: shape_at(scene, number as u32, &from.world_from_object) }
@@ -274,7 +274,7 @@ struct Incoming {
 fn incoming(light: &arhost_light, surface: &Surface) -> Incoming {
     let beam = vec3(&light.direction);
     let mut of = Incoming { direction: -1.0 * beam, distance: f64::INFINITY, cosine: 0.0, irradiance: 1.0 };
-    if light.type_ != ARHOST_DIRECTIONAL_LIGHT {
+    if light.type_ != ARHOST_LIGHT_DIRECTIONAL {
         let way = vec3(&light.position) - surface.position;
         of.distance = length(way);
         of.direction = 1.0 / of.distance * way;
@@ -283,10 +283,10 @@ fn incoming(light: &arhost_light, surface: &Surface) -> Incoming {
         }
     }
     let along_beam = -dot(beam, of.direction);
-    if light.type_ == ARHOST_RECTANGLE_LIGHT {
+    if light.type_ == ARHOST_LIGHT_RECTANGLE {
         of.irradiance *= along_beam.max(0.0);
     }
-    if light.type_ == ARHOST_SPOT_LIGHT {
+    if light.type_ == ARHOST_LIGHT_SPOT {
         let (inner, outer) = (f64::from(light.cosine_inner), f64::from(light.cosine_outer));
         let t = ((along_beam - outer) / (inner - outer).max(1e-6)).clamp(0.0, 1.0);
         of.irradiance *= t * t * (3.0 - 2.0 * t);
@@ -320,7 +320,7 @@ impl Tracer {
 
     /// Lambert, and Phong's highlight.
     fn lit(&self, surface: &Surface, material: &arhost_material, to_eye: Vec3) -> Vec3 {
-        let shines = material.model == ARHOST_SPECULAR || material.model == ARHOST_METAL;
+        let shines = material.model == ARHOST_MATERIAL_SPECULAR || material.model == ARHOST_MATERIAL_METAL;
         let mut sum = vec3(&self.scene.ambient) * vec3(&material.ambient) + vec3(&material.emission);
         for light in &self.lights {
             let of = incoming(light, surface);
@@ -358,13 +358,13 @@ impl Tracer {
         let cosine = -dot(ray.direction, surface.normal);
         let mirrored = || self.light_from(surface.position, ray.direction + 2.0 * cosine * surface.normal, bounces + 1);
         match material.model {
-            ARHOST_MIRROR => vec3(&material.reflectivity) * mirrored(),
-            ARHOST_METAL => {
+            ARHOST_MATERIAL_MIRROR => vec3(&material.reflectivity) * mirrored(),
+            ARHOST_MATERIAL_METAL => {
                 let rim = (1.0 - cosine.clamp(0.0, 1.0)).powi(5); // Schlick
                 let reflectance = (1.0 - rim) * vec3(&material.reflectivity) + Vec3([rim; 3]);
                 self.lit(&surface, material, -1.0 * ray.direction) + reflectance * mirrored()
             }
-            ARHOST_GLASS => vec3(&material.refraction) * self.light_from(surface.below, ray.direction, bounces + 1),
+            ARHOST_MATERIAL_GLASS => vec3(&material.refraction) * self.light_from(surface.below, ray.direction, bounces + 1),
             _ => self.lit(&surface, material, -1.0 * ray.direction),
         }
     }

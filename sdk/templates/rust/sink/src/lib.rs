@@ -45,7 +45,7 @@ impl Sink for @CLASS@ {
         let name = PathBuf::from(format!("{}{:06}.ppm", self.path, output.record().sequence));
         write_picture(&self.part, output)
             .and_then(|()| fs::rename(&self.part, &name)) // under its own name only when it is whole
-            .map_err(|error| Failure::new(ARHOST_ERROR_IO, format!("can't write {}: {}", name.display(), error)))?;
+            .map_err(|error| Failure::new(ARHOST_STATUS_ERROR_IO, format!("can't write {}: {}", name.display(), error)))?;
         Ok(true) // the frame must now survive the death of this process
     }
 }

@@ -35,7 +35,7 @@ impl Source for @CLASS@ {
             self.pace = Some((setup.first_sequence, Instant::now()));
         }
         properties.frame_count = self.frames;
-        properties.format.pixel_format = ARHOST_RGB8;
+        properties.format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
         properties.format.width = self.width;
         properties.format.height = self.height;
         properties.format.fps = self.fps;
@@ -53,7 +53,7 @@ impl Source for @CLASS@ {
             let due = began + Duration::from_secs_f64(n.saturating_sub(first) as f64 / self.fps);
             while Instant::now() < due {
                 if self.host.cancelled() {
-                    return Err(Failure::new(ARHOST_ERROR_CANCELLED, "")); // whatever waits asks this
+                    return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // whatever waits asks this
                 }
                 sleep(Duration::from_millis(2));
             }
@@ -74,7 +74,7 @@ impl Source for @CLASS@ {
 
 plugin! {
     source @CLASS@, "@NAME@", "A gradient that moves.",
-    capabilities: ARHOST_CAN_SEEK, // frame n is the same, whatever was read before
+    capabilities: ARHOST_CAPABILITY_SEEK, // frame n is the same, whatever was read before
     // arhost checks the configuration against these before `new` sees a value.
     options: [
         option!(ARHOST_OPTION_INTEGER, "width", "640", "Image width in px.", 1.0, 4096.0),

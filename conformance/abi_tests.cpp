@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What plugins of every kind promise.
+#include "conformance/elf.hpp"
+#include "conformance/process_usage.hpp"
+#include "conformance/test.hpp"
+#include "ipc/json_abi.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <set>
+
+namespace arhost::conformance {
+namespace {
+
+using ipc::Call;
+
+void load(Context &context) {
+    try {
+        const ipc::Json told = ipc::to_json(context.library.descriptor());
+        ipc::description_from_json(told);
+        const std::size_t size = told.dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
+        if (size > ipc::max_descriptor_size)
+            throw std::runtime_error(fmt::format("its descriptor has {} bytes as JSON, and {} are the most: fewer "
+                                                 "options, or shorter texts",
+                                                 size, ipc::max_descriptor_size));
+        context.facts = told;
+    } catch (const std::exception &error) { // what arhost-worker or the host would say
+        throw Failure(error.what());
+    }
+}
+
+void exports(Context &context) {
+    // These belong to every shared object of older linkers.
+    const std::set<std::string> customary = {"arhost_entry", "_init", "_fini", "__bss_start", "_edata", "_end"};
+    for (const std::string &symbol : exported_symbols(context.library.file()))
+        if (!customary.contains(symbol))
+            throw Failure(fmt::format("it exports '{}' besides arhost_entry", symbol));
+}
+
+// ---- Negotiation -----------------------------------------------------------------------------------
+
+// An offer and an answer with bytes behind them that no reader may know, and no writer may touch.
+class Exchange {
+public:
+    Exchange(Context &context, const arhost_offer &offer, std::uint32_t answer_size) {
+        std::memset(&memory_, garbage, sizeof memory_);
+        memory_.offer = offer;
+        memory_.answer.struct_size = answer_size;
+        memory_.answer.abi_version = ~0u;
+        const arhost_entry_point &entry = context.library.entry();
+        status = in_call(context.library.calls(), Call::negotiate,
+                         [&] { return entry.negotiate(&memory_.offer, &memory_.answer); });
+        // What lies behind the answer that the plugin was told of.
+        const auto *bytes = reinterpret_cast<const std::uint8_t *>(&memory_.answer);
+        const std::size_t end = sizeof memory_ - offsetof(Memory, answer);
+        for (std::size_t i = std::min<std::size_t>(answer_size, sizeof(arhost_answer)); i < end; ++i)
+            if (bytes[i] != garbage)
+                throw Failure(
+                    fmt::format("negotiate wrote byte {} of an answer with a struct_size of {}", i, answer_size));
+    }
+    const arhost_answer &answer() const { return memory_.answer; }
+    arhost_status status;
+
+private:
+    static constexpr std::uint8_t garbage = 0xa5;
+    struct Memory {
+        arhost_offer offer;
+        std::uint8_t behind_offer[64];
+        arhost_answer answer;
+        std::uint8_t behind_answer[64];
+    } memory_;
+};
+
+void negotiation(Context &context) {
+    constexpr std::uint32_t spoken = ARHOST_ABI_VERSION, longer = 32;
+    constexpr auto offer_size = static_cast<std::uint32_t>(sizeof(arhost_offer)),
+                   answer_size = static_cast<std::uint32_t>(sizeof(arhost_answer));
+    const auto expect_accepted = [&](const Exchange &exchange, const char *offer) {
+        if (exchange.status != ARHOST_STATUS_OK || exchange.answer().abi_version != spoken ||
+            !exchange.answer().plugin)
+            throw Failure(fmt::format("offered {}, negotiate returned {} and version {}; it must be OK and {}", offer,
+                                      status_name(exchange.status), exchange.answer().abi_version, spoken));
+    };
+    expect_accepted(Exchange(context, {offer_size, spoken, spoken}, answer_size), "its version");
+    expect_accepted(Exchange(context, {offer_size, spoken, spoken + 7}, answer_size), "its version and newer ones");
+    expect_accepted(Exchange(context, {offer_size + longer, spoken, spoken}, answer_size + longer),
+                    "structs longer than it knows");
+
+    const Exchange newer(context, {offer_size, spoken + 1, spoken + 7}, answer_size);
+    if (newer.status != ARHOST_STATUS_ERROR_UNSUPPORTED)
+        throw Failure(fmt::format("offered versions {} to {}, negotiate returned {}; it must be UNSUPPORTED",
+                                  spoken + 1, spoken + 7, status_name(newer.status)));
+
+    constexpr auto short_offer = static_cast<std::uint32_t>(offsetof(arhost_offer, newest_abi_version));
+    const Exchange half_offered(context, {short_offer, spoken, spoken}, answer_size);
+    if (half_offered.status >= 0)
+        throw Failure(fmt::format("given an offer of {} bytes, without the newest version, negotiate returned {}; it "
+                                  "must refuse",
+                                  short_offer, status_name(half_offered.status)));
+
+    constexpr auto short_answer = static_cast<std::uint32_t>(offsetof(arhost_answer, plugin));
+    const Exchange shorter(context, {offer_size, spoken, spoken}, short_answer);
+    if (shorter.status >= 0)
+        throw Failure(
+            fmt::format("given an answer of {} bytes, without a place for the plugin, negotiate returned {}; "
+                        "it must refuse",
+                        short_answer, status_name(shorter.status)));
+}
+
+// ---- Descriptor ------------------------------------------------------------------------------------
+
+void descriptor(Context &context) {
+    const arhost_descriptor &d = context.library.descriptor();
+    const std::pair<const char *, const char *> texts[] = {{"name", d.name},
+                                                           {"version", d.version},
+                                                           {"vendor", d.vendor},
+                                                           {"licence", d.licence},
+                                                           {"description", d.description}};
+    for (const auto &[field, text] : texts)
+        if (!text || !*text)
+            throw Failure(fmt::format("the descriptor's {} is empty", field));
+    constexpr std::uint32_t capabilities_of_kind[] = {0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, 0,
+                                                      ARHOST_CAPABILITY_LENS_DISTORTION,
+                                                      ARHOST_CAPABILITY_REALTIME_SINK};
+    if (const std::uint32_t others = d.capabilities & ~capabilities_of_kind[d.kind])
+        throw Failure(
+            fmt::format("the descriptor's capabilities have the bits {:#x}, which its kind has not", others));
+    const ipc::Json told = ipc::to_json(d);
+    for (const auto &[field, value] : told.items()) {
+        const std::string text = value.dump(-1, ' ', false, ipc::Json::error_handler_t::replace);
+        try {
+            value.dump();
+        } catch (const ipc::Json::exception &) {
+            throw Failure(fmt::format("the descriptor's {} is not UTF-8: {:.200}", field, text));
+        }
+    }
+    std::set<std::string> keys;
+    for (const arhost_option_descriptor *option : options_of(d)) {
+        if (!*option->key)
+            throw Failure(fmt::format("option {} has no key", keys.size()));
+        if (!keys.insert(option->key).second)
+            throw Failure(fmt::format("the option '{}' is declared twice", option->key));
+        if (!option->help || !*option->help)
+            throw Failure(fmt::format("the option '{}' has no help", option->key));
+        if (option->minimum > option->maximum)
+            throw Failure(fmt::format("the option '{}' has a minimum of {} above its maximum of {}", option->key,
+                                      option->minimum, option->maximum));
+        try {
+            if (option->default_value)
+                parse_option(*option, option->default_value);
+        } catch (const std::runtime_error &error) {
+            throw Failure(fmt::format("a default can't be: {}", error.what()));
+        }
+    }
+}
+
+// A capability that is withdrawn, say, once the host has reckoned with it.
+void same_answer(Context &context) {
+    const arhost_plugin &plugin = context.library.plugin();
+    const ipc::Json descriptor = ipc::to_json(*plugin.descriptor);
+    const auto expect_same = [&](const char *when) {
+        constexpr auto size = static_cast<std::uint32_t>(sizeof(arhost_answer));
+        const Exchange again(context, {sizeof(arhost_offer), ARHOST_ABI_VERSION, ARHOST_ABI_VERSION}, size);
+        if (again.status != ARHOST_STATUS_OK || again.answer().plugin != &plugin)
+            throw Failure(
+                fmt::format("{}, negotiate returned {} and another plugin", when, status_name(again.status)));
+        const ipc::Json now = ipc::to_json(*plugin.descriptor);
+        for (const auto &[key, value] : descriptor.items())
+            if (now[key] != value)
+                throw Failure(fmt::format("{}, the descriptor's {} is {} and was {}", when, key, now[key].dump(),
+                                          value.dump()));
+    };
+    expect_same("asked again");
+    {
+        Instance instance(context.library);
+        instance.create_or_fail();
+        expect_same("asked with an instance");
+    }
+    expect_same("asked after an instance");
+}
+
+void unknown_extension(Context &context) {
+    if (context.library.plugin().get_extension("arhost.conform.no-such-extension/1"))
+        throw Failure("get_extension gave a pointer for an id that nobody has; it must be NULL");
+}
+
+// ---- Instances -------------------------------------------------------------------------------------
+
+void create(Context &context) {
+    Instance instance(context.library);
+    instance.create_or_fail();
+}
+
+void longer_options(Context &context) {
+    if (context.library.descriptor().option_count < 2)
+        throw Skip("it has fewer than two options");
+    Instance instance(context.library);
+    instance.create_or_fail({.bytes = 16, .option = false}); // who steps too short takes garbage for a key
+}
+
+void unknown_option(Context &context) {
+    Instance instance(context.library);
+    instance.create_or_fail({.bytes = 0, .option = true});
+}
+
+void two_instances(Context &context) {
+    Instance first(context.library), second(context.library);
+    first.create_or_fail();
+    second.create_or_fail();
+    if (first.get() == second.get())
+        throw Failure("two instances that live at a time are the same pointer");
+    first.destroy();
+    Instance third(context.library);
+    third.create_or_fail();
+}
+
+void create_again_and_again(Context &context) {
+    using Clock = std::chrono::steady_clock;
+    constexpr int warm_up = 20, least = 100, most = 1000;
+    constexpr auto enough = 20s; // for who takes long over each
+    constexpr long allowed_kib = 4096;
+    const auto create_and_destroy = [&] {
+        Instance instance(context.library);
+        instance.create_or_fail();
+    };
+    for (int i = 0; i < warm_up; ++i)
+        create_and_destroy();
+    int count = 0;
+    const auto work = [&] {
+        const ProcessUsage before = ProcessUsage::now();
+        const auto begin = Clock::now();
+        for (count = 0; count < most && (count < least || Clock::now() - begin < enough); ++count) {
+            // Before descriptors or memory run out.
+            if (count > 0 && count % least == 0 && !growth(before, ProcessUsage::now(), allowed_kib).empty())
+                return;
+            create_and_destroy();
+        }
+    };
+    if (const std::string grown = growth_by(work, allowed_kib); !grown.empty())
+        throw Failure(fmt::format("{} times create and destroy led {}", count, grown));
+    context.note = fmt::format("{} times", count);
+}
+
+void cancelled(Context &context) {
+    Instance instance(context.library);
+    instance.host().cancel();
+    const arhost_status status = instance.create();
+    if (status != ARHOST_STATUS_OK && status != ARHOST_STATUS_ERROR_CANCELLED)
+        instance.expect_ok("create, cancelled before,", status);
+    if ((status == ARHOST_STATUS_OK) != (instance.get() != nullptr))
+        throw Failure(fmt::format("create returned {} and the instance is{} NULL", status_name(status),
+                                  instance.get() ? " not" : ""));
+}
+
+constexpr Test tests[] = {
+    {"abi.load",
+     "arhost-worker takes it: it opens, agrees on the version, and describes itself under its file's name.", 0, "",
+     10s, load},
+    {"abi.exports", "Its one exported symbol is arhost_entry.", 0, "abi.load", 10s, exports},
+    {"abi.negotiation",
+     "It answers offers of every range, and structs longer or shorter than it knows, as the ABI says.", 0, "abi.load",
+     10s, negotiation},
+    {"abi.descriptor",
+     "Its texts are there, its capabilities are its kind's, its options and their defaults make sense.", 0,
+     "abi.load", 10s, descriptor},
+    {"abi.unknown-extension", "It has no pointer for an extension that it can't know.", 0, "abi.load", 10s,
+     unknown_extension},
+    {"abi.create", "An instance is made with the default options and destroyed without a start.", 0, "abi.load", 20s,
+     create},
+    {"abi.same-answer", "Asked again, it gives the same plugin with the same descriptor.", 0, "abi.create", 20s,
+     same_answer},
+    {"abi.longer-options", "It steps through the options by their struct_size.", 0, "abi.create", 10s,
+     longer_options},
+    {"abi.unknown-option", "It passes over an option whose key it does not know.", 0, "abi.create", 10s,
+     unknown_option},
+    {"abi.two-instances", "Two instances live at a time, and end in any order.", 0, "abi.create", 20s, two_instances},
+    {"abi.create-1000-times",
+     "Created and destroyed 1,000 times, or 20 s long, it keeps no descriptor, no thread and no memory.", 0,
+     "abi.create", 240s, create_again_and_again},
+    {"abi.cancelled-create", "Cancelled before, create returns soon, OK or CANCELLED.", 0, "abi.create", 10s,
+     cancelled},
+};
+
+} // namespace
+
+std::span<const Test> abi_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/child.hpp"
+
+#include "conformance/test.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace arhost::conformance {
+namespace {
+
+CallPage map_call_page() {
+    void *address = ::mmap(nullptr, sizeof(ipc::Call), PROT_READ | PROT_WRITE, MAP_SHARED, call_page_fd, 0);
+    if (address == MAP_FAILED)
+        base::throw_errno("mmap of the call page");
+    ::close(call_page_fd);
+    return CallPage(ipc::Mapping(static_cast<std::byte *>(address), sizeof(ipc::Call)));
+}
+
+// As arhost-worker does before it opens a plugin. What a sink writes goes to the scratch folder.
+sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
+    sandbox::Policy policy = subject.policy;
+    policy.writable.push_back(subject.scratch);
+    if (test.forks) {
+        policy.allow.insert("processes");
+        policy.readable.push_back(std::filesystem::read_symlink("/proc/self/exe")); // it becomes this anew
+    }
+    return sandbox::enter_for(subject.plugin, policy);
+}
+
+constexpr off_t room_mib = 16;
+
+// 0: the folder has room for so much; otherwise the error.
+int look_for_room(const std::filesystem::path &folder) {
+    const std::filesystem::path file = folder / "room";
+    const base::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
+    const int error = fd ? ::posix_fallocate(fd.get(), 0, room_mib << 20) : errno;
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+    return error;
+}
+std::runtime_error no_room(const std::filesystem::path &folder, int error) {
+    return std::runtime_error(fmt::format("the test's folder {} has no room for {} MiB: {}; free some, or set "
+                                          "TMPDIR to another place",
+                                          folder.string(), room_mib, std::strerror(error)));
+}
+
+void run_in_sandbox(const Test &test, Context &context) {
+    if (test.kind != ARHOST_KIND_SINK)
+        return test.run(context);
+    const std::filesystem::path &folder = context.library.scratch();
+    if (const int error = look_for_room(folder); error != 0)
+        throw no_room(folder, error);
+    try {
+        test.run(context);
+    } catch (const Failure &) {
+        // Others write too, and for a full disk no sink is to blame; for other errors it may be.
+        if (const int error = look_for_room(folder); error == ENOSPC || error == EDQUOT)
+            throw no_room(folder, error);
+        throw;
+    }
+}
+
+Result run(const Test &test, const Subject &subject, Context &context) {
+    Result result;
+    result.test = test.name;
+    try {
+        const sandbox::Level level = enter_sandbox(test, subject);
+        run_in_sandbox(test, context);
+        if (!context.facts.empty())
+            context.facts["sandbox"] = sandbox::to_text(level);
+        result.verdict = Verdict::pass;
+        result.message = context.note;
+    } catch (const Failure &failure) {
+        result.verdict = Verdict::fail;
+        result.message = failure.what();
+        result.wrong_pixel = failure.wrong_pixel;
+        for (const auto &[label, picture] : failure.pictures)
+            result.exhibits.push_back({label, picture.png_base64(), picture.width(), picture.height()});
+    } catch (const Skip &skip) {
+        result.verdict = Verdict::skip;
+        result.message = skip.what();
+    } catch (const Warning &warning) {
+        result.verdict = Verdict::warn;
+        result.message = warning.what();
+    } catch (const std::exception &error) {
+        const auto *system = dynamic_cast<const std::system_error *>(&error);
+        const bool none_left = system && system->code() == std::errc::too_many_files_open; // the suite keeps few
+        result.verdict = none_left ? Verdict::fail : Verdict::error;
+        result.message = none_left ? "it keeps descriptors until there is none left" : error.what();
+    }
+    return result;
+}
+
+} // namespace
+
+std::filesystem::path default_reference() {
+    const std::filesystem::path own_folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+    return (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+}
+
+int run_child(const std::string &name, const Subject &subject) {
+    const CallPage calls = map_call_page();
+    std::vector<Test> tests = all_tests();
+    tests.insert(tests.end(), helper_tests().begin(), helper_tests().end());
+    for (const Test &test : tests) {
+        if (name != test.name)
+            continue;
+        PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
+        Context context{library, subject.reference, std::mt19937_64(subject.seed)};
+        context.prints = subject.prints;
+        context.timeout_factor = subject.timeout_factor;
+        Result result = run(test, subject, context);
+        result.facts = context.facts;
+        const std::string line = to_json(result).dump(-1, ' ', false, ipc::Json::error_handler_t::replace) + "\n";
+        std::FILE *pipe = ::fdopen(result_fd, "w");
+        std::fwrite(line.data(), 1, line.size(), pipe);
+        std::fclose(pipe);
+        return EXIT_SUCCESS; // the plugin's static destructors are part of the test
+    }
+    return EXIT_FAILURE;
+}
+
+ipc::Json to_json(const Result &result) {
+    ipc::Json json = {{"test", result.test},       {"verdict", to_text(result.verdict)},
+                      {"message", result.message}, {"seconds", result.seconds},
+                      {"facts", result.facts},     {"images", ipc::Json::array()}};
+    for (const Exhibit &exhibit : result.exhibits)
+        json["images"].push_back(
+            {{"label", exhibit.label}, {"width", exhibit.width}, {"height", exhibit.height}, {"png", exhibit.png}});
+    if (result.wrong_pixel)
+        json["wrong_pixel"] = *result.wrong_pixel;
+    return json;
+}
+
+Result result_from_json(const ipc::Json &json) {
+    Result result;
+    result.test = json.at("test").get<std::string>();
+    const auto verdict =
+        std::find(verdict_texts.begin() + 1, verdict_texts.end(), json.at("verdict").get<std::string>());
+    if (verdict == verdict_texts.end())
+        throw std::runtime_error("a verdict that is none");
+    result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
+    result.message = json.at("message").get<std::string>();
+    result.facts = json.at("facts");
+    if (result.facts != ipc::Json::object())
+        ipc::description_from_json(result.facts); // throws unless it is one
+    for (const ipc::Json &image : json.at("images"))
+        result.exhibits.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
+                                   image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});
+    if (json.contains("wrong_pixel"))
+        result.wrong_pixel = json["wrong_pixel"].get<std::array<unsigned, 2>>();
+    return result;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/picture.hpp"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+
+namespace arhost::conformance {
+namespace {
+
+std::string base64(const std::vector<std::uint8_t> &bytes) {
+    constexpr const char *digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    text.reserve((bytes.size() + 2) / 3 * 4);
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+        std::uint32_t bits = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+            bits = bits << 8 | (k < count ? bytes[i + k] : 0);
+        for (std::size_t k = 0; k < 4; ++k)
+            text += k <= count ? digits[bits >> (18 - 6 * k) & 63] : '=';
+    }
+    return text;
+}
+
+} // namespace
+
+Picture::Picture(std::uint32_t width, std::uint32_t height, std::uint8_t fill)
+    : width_(width), height_(height), stride_((4 * width + 63) / 64 * 64 + 64),
+      memory_((2 * guard_size + std::size_t{stride_} * height + sizeof(Page) - 1) / sizeof(Page)) {
+    std::memset(bytes(), guard, memory_.size() * sizeof(Page));
+    for (std::uint32_t y = 0; y < height; ++y)
+        std::memset(bytes() + row(y), fill, std::size_t{4} * width);
+}
+
+arhost_image Picture::image() {
+    return {sizeof(arhost_image), stride_, width_, height_, bytes() + row(0)};
+}
+
+Pixel Picture::at(std::uint32_t x, std::uint32_t y) const {
+    const std::uint8_t *p = bytes() + row(y) + std::size_t{4} * x;
+    return {p[0], p[1], p[2], p[3]};
+}
+
+void Picture::set(std::uint32_t x, std::uint32_t y, const Pixel &pixel) {
+    std::copy(pixel.begin(), pixel.end(), bytes() + row(y) + std::size_t{4} * x);
+}
+
+std::string Picture::damage() const {
+    const auto first_in = [&](std::size_t begin, std::size_t end) -> std::optional<std::size_t> {
+        for (std::size_t i = begin; i < end; ++i)
+            if (bytes()[i] != guard)
+                return i - begin;
+        return std::nullopt;
+    };
+    if (const auto at = first_in(0, guard_size))
+        return fmt::format("{} bytes before the image", guard_size - *at);
+    for (std::uint32_t y = 0; y < height_; ++y)
+        if (const auto at = first_in(row(y) + std::size_t{4} * width_,
+                                     y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Page)))
+            return y + 1 < height_ ? fmt::format("in row {}, {} bytes behind its last pixel", y, *at)
+                                   : fmt::format("{} bytes behind the image's last pixel", *at);
+    return {};
+}
+
+bool Picture::is_smooth(std::uint32_t x, std::uint32_t y) const {
+    for (std::uint32_t j = y - (y > 0); j <= std::min(y + 1, height_ - 1); ++j)
+        for (std::uint32_t i = x - (x > 0); i <= std::min(x + 1, width_ - 1); ++i)
+            if (alpha(i, j) != alpha(x, y) || differs(at(i, j), at(x, y), 24))
+                return false;
+    return true;
+}
+
+std::string Picture::png_base64() const {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = width_;
+    png.height = height_;
+    png.format = PNG_FORMAT_RGBA;
+    std::vector<std::uint8_t> file(PNG_IMAGE_PNG_SIZE_MAX(png));
+    png_alloc_size_t size = file.size();
+    if (!png_image_write_to_memory(&png, file.data(), &size, 0, bytes() + row(0), static_cast<png_int_32>(stride_),
+                                   nullptr))
+        throw std::runtime_error(std::string("libpng: ") + png.message);
+    file.resize(size);
+    return base64(file);
+}
+
+bool differs(const Pixel &a, const Pixel &b, int tolerance) {
+    for (int channel = a[3] != 0 && b[3] != 0 ? 0 : 3; channel < 4; ++channel)
+        if (std::abs(a[channel] - b[channel]) > tolerance)
+            return true;
+    return false;
+}
+
+std::optional<std::array<unsigned, 2>> first_difference(const Picture &a, const Picture &b, int tolerance) {
+    for (std::uint32_t y = 0; y < a.height(); ++y)
+        for (std::uint32_t x = 0; x < a.width(); ++x)
+            if (differs(a.at(x, y), b.at(x, y), tolerance))
+                return {{x, y}};
+    return std::nullopt;
+}
+
+Picture difference(const Picture &a, const Picture &b) {
+    Picture result(a.width(), a.height());
+    for (std::uint32_t y = 0; y < a.height(); ++y)
+        for (std::uint32_t x = 0; x < a.width(); ++x) {
+            const Pixel p = a.at(x, y), q = b.at(x, y);
+            Pixel d{0, 0, 0, 255};
+            for (int channel = 0; channel < 3; ++channel)
+                d[channel] = std::min(
+                    255, 5 * std::max(std::abs(p[channel] * p[3] - q[channel] * q[3]) / 255, std::abs(p[3] - q[3])));
+            result.set(x, y, d);
+        }
+    return result;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/prints.hpp"
+
+#include <arhost/shading/lens.hpp>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/mat3x3.hpp>
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+namespace arhost::conformance {
+namespace {
+
+constexpr double margin = 1.0 / 8; // of paper, over the marker's side
+
+// '#' is ink. Upright as AprilTag's own library draws them.
+struct Tag {
+    int id;
+    std::array<std::string_view, 8> rows;
+};
+constexpr Tag tag36h11[] = {
+    {31, {"########", "###.#..#", "##...#.#", "#...##.#", "#.#.#.##", "###....#", "##..#.##", "########"}},
+    {7, {"########", "####.###", "####..##", "##.#.###", "#.#...##", "####...#", "##.#.###", "########"}},
+    {586, {"########", "#...#.##", "#####..#", "#.#....#", "#.##.###", "#.#..#.#", "#..##..#", "########"}},
+    {2, {"########", "#..#...#", "##.##.##", "#.######", "###.##.#", "####.###", "###...##", "########"}},
+};
+
+Print print_of(const Tag &tag) {
+    Print print{tag.id, static_cast<std::uint32_t>(tag.rows.size()), {}};
+    for (const std::string_view row : tag.rows)
+        for (const char cell : row)
+            print.grey.push_back(cell == '#' ? 0 : 255);
+    return print;
+}
+
+Print read_print(int id, const std::filesystem::path &file) {
+    const auto refuse = [&](const std::string &why) {
+        return std::runtime_error("--print " + std::to_string(id) + "=" + file.string() + ": " + why);
+    };
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    if (!png_image_begin_read_from_file(&png, file.c_str()))
+        throw refuse(png.message);
+    if (png.width != png.height) {
+        png_image_free(&png);
+        throw refuse("the picture must be square: the part of the print that the corners bound");
+    }
+    png.format = PNG_FORMAT_GRAY;
+    Print print{id, png.width, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(png))};
+    const png_color white{255, 255, 255};
+    if (!png_image_finish_read(&png, &white, print.grey.data(), 0, nullptr))
+        throw refuse(png.message);
+    return print;
+}
+
+constexpr std::uint32_t rays = 32;
+using Offsets = std::array<glm::dvec2, rays>; // in the pixel's square, from (0, 0) to (1, 1)
+
+Offsets hammersley() {
+    Offsets offsets;
+    for (std::uint32_t i = 0; i < rays; ++i) {
+        double reversed = 0;
+        for (std::uint32_t bit = 0; bit < 5; ++bit)
+            reversed += (i >> bit & 1) / static_cast<double>(2u << bit);
+        offsets[i] = {(i + 0.5) / rays, reversed + 0.5 / rays};
+    }
+    return offsets;
+}
+
+glm::dvec3 ray_at(const shading::Lens &lens, double x, double y) {
+    const auto ray = lens.ray({x, y});
+    return ray ? glm::dvec3(ray->x, ray->y, ray->z) : glm::dvec3(0, 0, -1);
+}
+
+// From rays (OpenCV's axes) to a marker's plane.
+struct View {
+    const Placed &marker;
+    glm::dmat3 marker_from_ray;
+    std::uint32_t left, top, right, bottom; // of the pixels where it may be seen; right and bottom are outside
+
+    View(const arhost_intrinsics &camera, const Placed &placed) : marker(placed) {
+        const Pose &m = placed.camera_from_marker;
+        const glm::dmat3 cv_from_gl(1, 0, 0, 0, -1, 0, 0, 0, -1);
+        marker_from_ray = glm::inverse(cv_from_gl * glm::dmat3(m[0], m[1], m[3]));
+        const double reach = placed.side_mm * (0.5 + margin);
+        glm::dvec2 low(1e9), high(-1e9);
+        for (int i = 0; i < 32; ++i) { // a lens bends the edges outwards
+            const double along = reach * ((i % 8) / 3.5 - 1);
+            const glm::dvec2 edge[] = {{along, -reach}, {along, reach}, {-reach, along}, {reach, along}};
+            const glm::dvec2 px = pixel_of(camera, m * glm::dvec4(edge[i / 8], 0, 1));
+            low = glm::min(low, px);
+            high = glm::max(high, px);
+        }
+        const auto clamped = [](double px, std::uint32_t limit) {
+            return static_cast<std::uint32_t>(std::clamp(px, 0.0, static_cast<double>(limit)));
+        };
+        constexpr double spare = 2;
+        left = clamped(low.x - spare, camera.width), top = clamped(low.y - spare, camera.height);
+        right = clamped(high.x + spare, camera.width), bottom = clamped(high.y + spare, camera.height);
+    }
+
+    // Where a ray meets the marker's plane, in its sides: (0, 0) is the print's top left, (1, 1) its bottom right.
+    std::optional<glm::dvec2> met_by(const glm::dvec3 &ray) const {
+        const glm::dvec3 at = marker_from_ray * ray;
+        if (at.z <= 0)
+            return std::nullopt;
+        return glm::dvec2(0.5 + at.x / at.z / marker.side_mm, 0.5 - at.y / at.z / marker.side_mm);
+    }
+    // The code there; nothing where there is no paper.
+    std::optional<int> code(const glm::dvec2 &at) const {
+        const double least = std::min(at.x, at.y), most = std::max(at.x, at.y);
+        if (least < -margin || most > 1 + margin)
+            return std::nullopt;
+        if (least < 0 || most >= 1)
+            return paper_code;
+        const auto [column, row] = cell(at);
+        return ink_code +
+               (paper_code - ink_code) *
+                   marker.print
+                       .grey[static_cast<std::size_t>(row) * marker.print.side + static_cast<std::size_t>(column)] /
+                   255;
+    }
+    std::pair<int, int> cell(const glm::dvec2 &at) const {
+        return {static_cast<int>(std::floor(at.x * marker.print.side)),
+                static_cast<int>(std::floor(at.y * marker.print.side))};
+    }
+
+    // The mean over a pixel, before what is there. The rays: at its top left corner, and from there to the next ones.
+    std::uint8_t mean(const glm::dvec3 &corner, const glm::dvec3 &right_of, const glm::dvec3 &below,
+                      const Offsets &offsets, std::uint8_t behind) const {
+        // Within a pixel any lens is linear enough.
+        const glm::dvec3 right = right_of - corner, down = below - corner;
+        const auto met = [&](double u, double v) { return met_by(corner + right * u + down * v); };
+        const auto same = [&](const std::optional<glm::dvec2> &a, const std::optional<glm::dvec2> &b) {
+            return a && b && cell(*a) == cell(*b) && code(*a) == code(*b);
+        };
+        const auto first = met(0, 0);
+        if (same(first, met(1, 0)) && same(first, met(0, 1)) && same(first, met(1, 1))) // most pixels
+            return static_cast<std::uint8_t>(code(*first).value_or(behind));
+        int sum = 0;
+        for (const glm::dvec2 &offset : offsets) {
+            const auto at = met(offset.x, offset.y);
+            sum += (at ? code(*at) : std::nullopt).value_or(behind);
+        }
+        return static_cast<std::uint8_t>((sum + rays / 2) / rays);
+    }
+};
+
+} // namespace
+
+Print Print::mirrored() const {
+    Print other = *this;
+    for (auto row = other.grey.begin(); row != other.grey.end(); row += side)
+        std::reverse(row, row + side);
+    return other;
+}
+
+std::vector<Print> prints_of(const PrintFiles &files) {
+    std::vector<Print> prints;
+    if (files.empty())
+        for (const Tag &tag : tag36h11)
+            prints.push_back(print_of(tag));
+    for (auto file = files.rbegin(); file != files.rend(); ++file)
+        prints.push_back(read_print(file->first, file->second));
+    return prints;
+}
+
+Grey Grey::part(std::uint32_t x0, std::uint32_t y0, std::uint32_t part_width, std::uint32_t part_height) const {
+    return filled(part_width, part_height, [&](auto x, auto y) { return at(x0 + x, y0 + y); });
+}
+
+Picture Grey::picture() const {
+    Picture picture(width, height);
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            picture.set(x, y, {at(x, y), at(x, y), at(x, y), 255});
+    return picture;
+}
+
+Pose pose(const glm::dvec3 &centre, double about_x, double about_y, double about_z) {
+    Pose result = glm::translate(Pose(1), centre);
+    result = glm::rotate(result, glm::radians(about_z), glm::dvec3(0, 0, 1));
+    result = glm::rotate(result, glm::radians(about_y), glm::dvec3(0, 1, 0));
+    return glm::rotate(result, glm::radians(about_x), glm::dvec3(1, 0, 0));
+}
+
+Pose tilted(const glm::dvec3 &centre, double tilt, double towards, double about_z) {
+    const double direction = glm::radians(towards);
+    Pose result = glm::translate(Pose(1), centre);
+    result = glm::rotate(result, glm::radians(tilt), glm::dvec3(-std::sin(direction), std::cos(direction), 0));
+    return glm::rotate(result, glm::radians(about_z), glm::dvec3(0, 0, 1));
+}
+
+Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers) {
+    const Offsets offsets = hammersley();
+    const shading::Lens lens(camera);
+    Grey image = filled(camera.width, camera.height, [](auto, auto) { return background_code; });
+    std::vector<View> views;
+    views.reserve(markers.size());
+    for (const Placed &marker : markers)
+        views.emplace_back(camera, marker);
+    for (const View &view : views) {
+        const auto rays_at = [&](std::uint32_t row) { // at the pixels' top corners
+            std::vector<glm::dvec3> found;
+            found.reserve(view.right - view.left + 1);
+            for (std::uint32_t x = view.left; x <= view.right; ++x)
+                found.push_back(ray_at(lens, x - 0.5, row - 0.5));
+            return found;
+        };
+        std::vector<glm::dvec3> above = rays_at(view.top);
+        for (std::uint32_t y = view.top; y < view.bottom; ++y) {
+            std::vector<glm::dvec3> below = rays_at(y + 1);
+            for (std::uint32_t x = view.left; x < view.right; ++x) {
+                const std::size_t i = x - view.left;
+                image.at(x, y) = view.mean(above[i], above[i + 1], below[i], offsets, image.at(x, y));
+            }
+            above = std::move(below);
+        }
+    }
+    return image;
+}
+
+glm::dvec2 pixel_of(const arhost_intrinsics &camera, const glm::dvec3 &p) {
+    const auto pixel = shading::Lens(camera).project({p.x, -p.y, -p.z});
+    if (!pixel)
+        throw std::runtime_error("the test's marker is not in view");
+    return {pixel->x, pixel->y};
+}
+
+std::array<glm::dvec2, 4> corners_of(const arhost_intrinsics &camera, const Placed &marker) {
+    const double h = marker.side_mm / 2;
+    const auto corner = [&](double x, double y) {
+        return pixel_of(camera, marker.camera_from_marker * glm::dvec4(x, y, 0, 1));
+    };
+    return {corner(-h, h), corner(h, h), corner(h, -h), corner(-h, -h)};
+}
+
+Grey blurred(const Grey &image, double sigma_px) {
+    const int reach = static_cast<int>(std::ceil(3 * sigma_px));
+    std::vector<double> weights;
+    double sum = 0;
+    for (int i = -reach; i <= reach; ++i)
+        sum += weights.emplace_back(std::exp(-i * i / (2 * sigma_px * sigma_px)));
+    // Along rows into an image that is turned, twice.
+    const auto pass = [&](const Grey &from) {
+        return filled(from.height, from.width, [&](auto y, auto x) {
+            double mean = 0;
+            for (int i = -reach; i <= reach; ++i) {
+                const int at = std::clamp(static_cast<int>(x) + i, 0, static_cast<int>(from.width) - 1);
+                mean += weights[i + reach] / sum * from.at(static_cast<std::uint32_t>(at), y);
+            }
+            return static_cast<int>(std::lround(mean));
+        });
+    };
+    return pass(pass(image));
+}
+
+} // namespace arhost::conformance

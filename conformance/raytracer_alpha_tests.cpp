@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What is transparent, what covers, and what shadows do.
+#include "conformance/expect.hpp"
+#include "conformance/tracer.hpp"
+
+namespace arhost::conformance {
+namespace {
+
+constexpr double rim = 1.5; // px on both sides of a silhouette that are not looked at
+constexpr int opaque = 153, translucent = 77;
+
+// A sphere of radius 30 at the origin, seen from (0, 0, 200): its silhouette has this radius.
+const double silhouette = 200 * 30 / std::sqrt(200.0 * 200 - 30 * 30);
+
+void empty_scene(Context &context) {
+    const Picture picture = Tracer(context, scene::ArenaBuilder()).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const int alpha = picture.alpha(x, y);
+        return alpha == 0 ? "" : fmt::format("the scene is empty, alpha is {} and must be 0", alpha);
+    });
+}
+
+void miss_alpha(Context &context) {
+    const Picture picture = Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const int alpha = picture.alpha(x, y);
+        const bool miss = distance_from_centre(picture, x, y) > silhouette + rim;
+        return !miss || alpha == 0 ? "" : fmt::format("no ray hit, alpha is {} and must be 0", alpha);
+    });
+}
+
+void hit_alpha(Context &context) {
+    const Picture picture = Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const int alpha = picture.alpha(x, y);
+        const bool hit = distance_from_centre(picture, x, y) < silhouette - rim;
+        return !hit || alpha == 255 ? ""
+                                    : fmt::format("every ray hit the sphere, alpha is {} and must be 255", alpha);
+    });
+}
+
+void inside_sphere(Context &context) {
+    const Picture picture = Tracer(context, one_sphere({0, 0, 200, 50})).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const int alpha = picture.alpha(x, y);
+        return alpha == 255 ? "" : fmt::format("the eye is inside a sphere, alpha is {} and must be 255", alpha);
+    });
+}
+
+void near_the_eye(Context &context) {
+    for (const double mm : {1.0, 0.05}) { // of a scene of 230; the sphere begins at 3/4 of it: 1.6e-4 of that
+        scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
+        builder.add_object("near", builder.add_spheres({{0, 0, 200 - mm, mm / 4}}),
+                           builder.add_material(glowing(glm::vec3(0.8f))));
+        const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+        expect_pixels(picture, [&](auto x, auto y) {
+            constexpr double radius = 48; // of 51.6 px: the sine is 1/4
+            const Pixel p = picture.at(x, y);
+            if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // 231 and 255
+                return fmt::format("a bright sphere {} mm before the eye is not seen, but {}", mm, text_of(p));
+            return std::string();
+        });
+    }
+}
+
+void depth_order(Context &context) {
+    scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
+    const std::uint32_t bright = builder.add_material(glowing(glm::vec3(0.8f)));
+    for (const float z : {-60.0f, 60.0f}) // the one behind is hidden
+        builder.add_object("small", builder.add_spheres({{0, 0, z, 8}}), bright);
+    const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const double r = distance_from_centre(picture, x, y);
+        const int code = picture.at(x, y)[0];
+        if (r < 8 && code < 150) // 231, be it a fifth too dark
+            return fmt::format("the near sphere is bright, the code is {}: something farther is seen", code);
+        if (r > 20 && r < 25 && code > 120) // 89
+            return fmt::format("only the large, dark sphere is here, the code is {}", code);
+        return std::string();
+    });
+}
+
+void occluder(Context &context) {
+    scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30});
+    const std::uint32_t material = builder.add_material(diffuse(glm::vec3(1)));
+    const std::uint32_t screen = builder.add_triangles(box({10, 10, 1}));
+    for (const float z : {-60.0f, 60.0f})
+        builder.add_object(
+            "screen", screen, material, ARHOST_ROLE_OCCLUDER,
+            glm::mat4x3(glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0, 0, z)));
+    const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const double r = distance_from_centre(picture, x, y);
+        const int alpha = picture.alpha(x, y);
+        if (r < 12 && alpha > 2) // a screen of ±14 px; whether it is exactly 0, miss-alpha asks
+            return fmt::format("an occluder is before the sphere, alpha is {} and must be 0", alpha);
+        if (r > 22 && r < silhouette - rim && alpha < 250)
+            return fmt::format("the sphere is seen past the occluder, alpha is {} and must be 255", alpha);
+        return std::string();
+    });
+}
+
+// ---- Shadows ---------------------------------------------------------------------------------------
+
+// The shadow of ball_over_catcher lies about the image's centre.
+void expect_shadow(const Picture &picture, int alpha, const char *of) {
+    constexpr int radius = 10; // of a shadow of 15 and more
+    expect_pixels(picture, [&](auto x, auto y) {
+        if (distance_from_centre(picture, x, y) > radius)
+            return std::string();
+        const Pixel p = picture.at(x, y);
+        if (p[3] != alpha)
+            return fmt::format("in the shadow of {}, alpha is {} and must be {}", of, p[3], alpha);
+        if (p[0] + p[1] + p[2] != 0)
+            return fmt::format("in the shadow of {}, the colour is {} and must be black", of, text_of(p));
+        return std::string();
+    });
+}
+
+void opaque_shadow(Context &context) {
+    const Picture picture = Tracer(context, ball_over_catcher(diffuse(glm::vec3(0.5f)))).render(from_front());
+    expect_shadow(picture, opaque, "an opaque ball");
+}
+
+void translucent_shadow(Context &context) {
+    const Picture picture = Tracer(context, ball_over_catcher(glass())).render(from_front());
+    expect_shadow(picture, translucent, "a glass ball");
+}
+
+void catcher_in_light(Context &context) {
+    const Picture picture = Tracer(context, ball_over_catcher(diffuse(glm::vec3(0.5f)))).render(from_front());
+    // Left of the shadow, and above and below; mirrored images included.
+    expect_pixels(picture, [&](auto x, auto y) {
+        const bool far = distance_from_centre(picture, x, y) > 24;
+        const bool ball = std::abs(y - (picture.height() - 1) / 2.0) < 22;
+        const int alpha = picture.alpha(x, y);
+        return !far || ball || alpha <= 2 ? "" : fmt::format("the catcher is lit, alpha is {} and must be 0", alpha);
+    });
+}
+
+void stronger_shadow_wins(Context &context) {
+    scene::ArenaBuilder builder = ball_over_catcher(diffuse(glm::vec3(0.5f)));
+    // Between lamp and ball, beyond the image: its shadow covers a half of the ball's, and more beside it.
+    builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
+    const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+    // The glass ball's shadow (20 mm about y = 17.5) covers the upper half of the other (15 mm about y = 0).
+    const int both = picture.alpha(79, 59 - 6), one = picture.alpha(79, 59 + 8);
+    if (std::abs(both - one) > 2)
+        throw Failure(
+            fmt::format("where an opaque and a translucent shadow overlap, alpha is {}; it must be {} as in the "
+                        "opaque one alone",
+                        both, one))
+            .with("rendered", picture);
+}
+
+void shadow_alpha_of_the_scene(Context &context) {
+    for (const bool is_glass : {false, true}) {
+        scene::ArenaBuilder builder = ball_over_catcher(is_glass ? glass() : diffuse(glm::vec3(0.5f)));
+        builder.settings.shadow_alpha_opaque = 0.8f;
+        builder.settings.shadow_alpha_translucent = 0.2f;
+        const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+        const int expected = is_glass ? 51 : 204;
+        const int alpha = picture.alpha(79, 59);
+        if (alpha != expected)
+            throw Failure(fmt::format("pixel (79, 59): the scene's shadows of {} bodies have alpha {}, it is {}",
+                                      is_glass ? "translucent" : "opaque", expected, alpha))
+                .with("rendered", picture)
+                .at(79, 59);
+    }
+}
+
+void straight_alpha(Context &context) {
+    const arhost_option_descriptor *samples = context.library.option("samples");
+    const bool settable = samples && samples->type == ARHOST_OPTION_INTEGER;
+    const Settings settings = settable ? Settings{{"samples", "16"}} : Settings{};
+    const Picture picture =
+        Tracer(context, one_sphere({0, 0, 0, 30}, glowing({0.8f, 0.8f, 0.8f})), settings).render(from_front());
+    const int inside = picture.at(79, 59)[1];
+    int edges = 0;
+    expect_pixels(picture, [&](auto x, auto y) {
+        const Pixel p = picture.at(x, y);
+        const bool edge = p[3] > 40 && p[3] < 250 && std::abs(distance_from_centre(picture, x, y) - silhouette) < rim;
+        edges += edge ? 1 : 0;
+        return !edge || std::abs(p[1] - inside) <= 4
+                   ? ""
+                   : fmt::format(
+                         "alpha is {}, green is {} and must be {} as where the sphere covers wholly (straight alpha)",
+                         p[3], p[1], inside);
+    });
+    if (edges == 0)
+        throw Skip("no pixel is partly covered");
+}
+
+constexpr const char *gate = "raytracer.render";
+constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
+constexpr Test tests[] = {
+    {"raytracer.empty-scene", "Of a scene without objects every alpha is 0.", kind, gate, 20s, empty_scene},
+    {"raytracer.miss-alpha", "Where no ray hits, alpha is exactly 0.", kind, gate, 20s, miss_alpha},
+    {"raytracer.hit-alpha", "Where every ray hits a virtual object, alpha is exactly 255.", kind, gate, 20s,
+     hit_alpha},
+    {"raytracer.straight-alpha", "Where an object covers a part of a pixel, its colour is not multiplied by alpha.",
+     kind, gate, 20s, straight_alpha},
+    {"raytracer.inside-sphere", "A camera inside an object sees it everywhere.", kind, gate, 20s, inside_sphere},
+    {"raytracer.near-the-eye", "What is a twentieth of a millimetre before the eye is seen.", kind, gate, 20s,
+     near_the_eye},
+    {"raytracer.depth-order", "The nearer object hides the farther one.", kind, gate, 20s, depth_order},
+    {"raytracer.occluder", "An occluder hides what is behind it, and nothing else.", kind, gate, 20s, occluder},
+    {"raytracer.catcher-in-light", "A catcher in the light is not seen.", kind, gate, 20s, catcher_in_light},
+    {"raytracer.opaque-shadow", "On a catcher, the shadow of an opaque body is black with alpha 153.", kind, gate,
+     20s, opaque_shadow},
+    {"raytracer.translucent-shadow", "On a catcher, the shadow of a glass body is black with alpha 77.", kind, gate,
+     20s, translucent_shadow},
+    {"raytracer.stronger-shadow-wins", "Where shadows of both classes overlap, alpha is that of the opaque one.",
+     kind, gate, 20s, stronger_shadow_wins},
+    {"raytracer.shadow-alpha-of-scene", "A scene that sets other shadow alphas gets these.", kind, gate, 20s,
+     shadow_alpha_of_the_scene},
+};
+
+} // namespace
+
+std::span<const Test> raytracer_alpha_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

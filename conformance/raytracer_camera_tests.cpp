@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where things are seen. One sample a pixel leaves a centroid uncertain by some hundredths of a pixel, so the
+// narrow bounds are on means over several places.
+#include "conformance/expect.hpp"
+#include "conformance/projection.hpp"
+#include "conformance/tracer.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace arhost::conformance {
+namespace {
+
+glm::dvec2 seen_at(const Picture &picture) {
+    const auto at = centroid(picture);
+    if (!at)
+        throw Failure("a sphere in full view is not seen: no alpha is 128 or more").with("rendered", picture);
+    return *at;
+}
+
+void expect_near(const glm::dvec2 &is, const glm::dvec2 &should, double tolerance, const std::string &what,
+                 const Picture &picture) {
+    if (glm::length(is - should) > tolerance)
+        throw Failure(fmt::format("{} is at ({:.3f}, {:.3f}) px and must be at ({:.3f}, {:.3f})", what, is.x, is.y,
+                                  should.x, should.y))
+            .with("rendered", picture)
+            .at(static_cast<unsigned>(std::max(0.0, std::round(is.x))),
+                static_cast<unsigned>(std::max(0.0, std::round(is.y))));
+}
+
+void pixel_centres(Context &context) {
+    // Pairs on both sides of the axis: their mean is on it, whichever way the image is turned.
+    constexpr int pairs = 10;
+    Tracer tracer(context, one_sphere({0, 0, 0, 30}));
+    glm::dvec2 sum(0);
+    for (int i = 0; i < pairs; ++i) {
+        const glm::dvec3 aside(context.uniform(-3, 3), context.uniform(-3, 3), 0);
+        for (const double sign : {1.0, -1.0}) {
+            const glm::dvec3 eye = glm::dvec3(0, 0, 200) + sign * aside;
+            sum += seen_at(tracer.render(camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0})));
+        }
+    }
+    const glm::dvec2 mean = sum / (2.0 * pairs);
+    if (std::abs(mean.x - 79.5) > 0.02 || std::abs(mean.y - 59.5) > 0.02)
+        throw Failure(
+            fmt::format("spheres about the axis of a 160×120 image have their mean centroid at ({:.3f}, {:.3f}) "
+                        "and must have it at (79.5, 59.5): pixel centres are at integers",
+                        mean.x, mean.y));
+}
+
+void focal_length(Context &context) {
+    arhost_intrinsics in = pinhole(200, 120, 200);
+    in.fy = 150;
+    Tracer tracer(context, one_sphere({0, 0, 0, 18}));
+    const auto distance = [&](const glm::dvec3 &half) {
+        const auto at = [&](const glm::dvec3 &aside) {
+            const glm::dvec3 eye = glm::dvec3(0, 0, 200) + aside;
+            const arhost_camera view = camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0}, in);
+            return std::pair(seen_at(tracer.render(view)), silhouette_centroid(view, {0, 0, 0}, 18));
+        };
+        const auto [is_a, should_a] = at(half);
+        const auto [is_b, should_b] = at(-half);
+        return std::pair(glm::length(is_a - is_b), glm::length(should_a - should_b));
+    };
+    for (const auto &[half, name] : {std::pair(glm::dvec3(75, 0, 0), "fx"), {glm::dvec3(0, 40, 0), "fy"}}) {
+        const auto [is, should] = distance(half);
+        if (std::abs(is - should) > 0.2)
+            throw Failure(fmt::format("two places of a sphere are {:.2f} px apart and must be {:.2f}: {} is not {}",
+                                      is, should, name, name[1] == 'x' ? in.fx : in.fy));
+    }
+}
+
+void orientation(Context &context) {
+    const Picture picture = Tracer(context, one_sphere({35, 20, 0, 12})).render(from_front());
+    const glm::dvec2 is = seen_at(picture);
+    const glm::dvec2 should = silhouette_centroid(from_front(), {35, 20, 0}, 12);
+    if (glm::length(is - should) > 4)
+        throw Failure(
+            fmt::format("a sphere to the right of the axis and above it is seen at ({:.1f}, {:.1f}) px and must "
+                        "be at ({:.1f}, {:.1f}): the first row is at the top",
+                        is.x, is.y, should.x, should.y))
+            .with("rendered", picture)
+            .at(static_cast<unsigned>(is.x), static_cast<unsigned>(is.y));
+}
+
+void principal_point(Context &context) {
+    arhost_intrinsics in = pinhole();
+    in.cx = 50;
+    in.cy = 80;
+    const Picture picture = Tracer(context, one_sphere({0, 0, 0, 20})).render(from_front(in));
+    expect_near(seen_at(picture), {50, 80}, 1, "the sphere on the axis", picture);
+}
+
+void eye_look_at_up(Context &context) {
+    constexpr double radius = 18;
+    const glm::dvec3 centre(12, -7, 21);
+    Tracer tracer(context, one_sphere(glm::vec4(centre, radius)));
+    const auto direction = [&] { // of unit length, all equally likely
+        for (;;) {
+            const glm::dvec3 d(context.uniform(-1, 1), context.uniform(-1, 1), context.uniform(-1, 1));
+            if (const double length = glm::length(d); length > 0.1 && length <= 1)
+                return d / length;
+        }
+    };
+    constexpr int count = 16;
+    glm::dvec2 sum(0);
+    for (int i = 0; i < count;) {
+        // Nothing of unit length, nothing perpendicular: a ray tracer copes.
+        const glm::dvec3 eye = centre + 200.0 * direction();
+        const glm::dvec3 look_at = eye + (centre - eye) * context.uniform(0.1, 2) + 40.0 * direction();
+        const arhost_camera view = camera(eye, look_at, direction() * context.uniform(0.1, 5));
+        const glm::dvec3 seen = in_camera(view, centre);
+        const glm::dvec2 should = silhouette_centroid(view, centre, radius);
+        const double off = glm::length(should - glm::dvec2(79.5, 59.5));
+        if (seen.z < 100 || std::abs(should.x - 79.5) > 55 || std::abs(should.y - 59.5) > 35 || off < 30 ||
+            glm::length(glm::cross(glm::normalize(look_at - eye), glm::dvec3(view.up[0], view.up[1], view.up[2]))) <
+                0.2)
+            continue; // not all of it in view, or too near the axis to tell much
+        const Picture picture = tracer.render(view);
+        const glm::dvec2 is = seen_at(picture);
+        expect_near(is, should, 0.25,
+                    fmt::format("from eye ({:.1f}, {:.1f}, {:.1f}) the sphere", eye.x, eye.y, eye.z), picture);
+        sum += is - should;
+        ++i;
+    }
+    const glm::dvec2 mean = sum / static_cast<double>(count);
+    if (glm::length(mean) > 0.04)
+        throw Failure(
+            fmt::format("over {} cameras, spheres are seen ({:.3f}, {:.3f}) px beside the analytic projection on "
+                        "the mean; 0.04 px are allowed",
+                        count, mean.x, mean.y));
+}
+
+void lens(Context &context) {
+    if (!(context.library.descriptor().capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
+        throw Skip("ARHOST_CAPABILITY_LENS_DISTORTION is not declared");
+    arhost_intrinsics in = pinhole();
+    in.distortion = ARHOST_DISTORTION_BROWN;
+    in.coefficient_count = 4;
+    const double coefficients[] = {-0.3, 0.1, 0.02, -0.03};
+    std::copy(std::begin(coefficients), std::end(coefficients), in.coefficients);
+    Tracer tracer(context, one_sphere({0, 0, 0, 14}));
+    for (const glm::dvec3 &aside : {glm::dvec3(48, 30, 0), {-48, 30, 0}, {50, -5, 0}, {-20, -33, 0}}) {
+        const glm::dvec3 eye = glm::dvec3(0, 0, 200) + aside;
+        const arhost_camera view = camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0}, in);
+        const Picture picture = tracer.render(view);
+        expect_near(seen_at(picture), silhouette_centroid(view, {0, 0, 0}, 14), 0.3,
+                    "through Brown's lens the sphere", picture);
+    }
+}
+
+void crop(Context &context) {
+    Tracer tracer(context, still_life());
+    const Picture whole = tracer.render(of_still_life());
+    arhost_intrinsics part = pinhole();
+    constexpr std::uint32_t x0 = 41, y0 = 30;
+    part.width = 77;
+    part.height = 61;
+    part.cx -= x0;
+    part.cy -= y0;
+    const Picture cropped = tracer.render(of_still_life(part));
+    Picture expected(part.width, part.height);
+    for (std::uint32_t y = 0; y < part.height; ++y)
+        for (std::uint32_t x = 0; x < part.width; ++x)
+            expected.set(x, y, whole.at(x + x0, y + y0));
+    expect_alike(cropped, expected, "a camera with a part of the image does not see that part of it", 3, 0.01);
+}
+
+void moved_with_camera(Context &context) {
+    glm::dmat4 moved = glm::translate(glm::dmat4(1), glm::dvec3(300, -200, 150));
+    moved = glm::rotate(moved, context.uniform(0.5, 2), glm::normalize(glm::dvec3(1, -2, 0.5)));
+    const Picture here = Tracer(context, still_life()).render(of_still_life());
+    const Picture there = Tracer(context, still_life(glm::mat4(moved))).render(of_still_life(pinhole(), moved));
+    expect_alike(there, here, "the scene moved together with its camera looks different", 3, 0.01);
+}
+
+void moving_object(Context &context) {
+    constexpr double radius = 15;
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    builder.settings.duration_s = 1;
+    scene::MotionNode node;
+    node.animated = true;
+    scene::Motion motion;
+    motion.moves = true;
+    motion.node = builder.add_node(node);
+    builder.add_object("ball", builder.add_spheres({{0, 0, 0, radius}}),
+                       builder.add_material(glowing(glm::vec3(0.5f))), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), motion);
+    Tracer tracer(context, std::move(builder));
+    for (const double way : {0.0, 15.0, 30.0})
+        for (const glm::dvec3 &to : {glm::dvec3(way, way / 2, 0), glm::dvec3(-way, -way / 2, 0)}) {
+            arhost_moved_object moved{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
+            for (int i = 0; i < 3; ++i)
+                moved.world_from_object[9 + i] = static_cast<float>(to[i]);
+            const arhost_motion now{sizeof now, 1, &moved, nullptr, 0, 0};
+            const Picture picture = tracer.render(from_front(), &now);
+            const glm::dvec2 is = seen_at(picture) - glm::dvec2(79.5, 59.5);
+            const double should = glm::length(silhouette_centroid(from_front(), to, radius) - glm::dvec2(79.5, 59.5));
+            if (std::abs(glm::length(is) - should) > 2)
+                throw Failure(
+                    fmt::format("moved by {:.1f} mm, an object is seen {:.1f} px off the centre and must be {:.1f}",
+                                glm::length(to), glm::length(is), should))
+                    .with("rendered", picture);
+        }
+}
+
+constexpr const char *gate = "raytracer.render";
+constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
+constexpr Test tests[] = {
+    {"raytracer.pixel-centres", "A pixel's ray goes through its centre, which is at integers, to 0.02 px.", kind,
+     gate, 30s, pixel_centres},
+    {"raytracer.focal-length", "fx and fy are those of the intrinsics.", kind, gate, 20s, focal_length},
+    {"raytracer.orientation", "Right is right, and the first row is at the top.", kind, gate, 20s, orientation},
+    {"raytracer.principal-point", "The axis is seen at the principal point, wherever that is.", kind, gate, 20s,
+     principal_point},
+    {"raytracer.eye-look-at-up", "Of any eye, look-at and up a sphere is seen where the analytic projection has it.",
+     kind, gate, 30s, eye_look_at_up},
+    {"raytracer.lens", "One that traces the lens bends its rays by Brown's model.", kind, gate, 20s, lens},
+    {"raytracer.crop", "A part of an image is the image of a camera with that part.", kind, gate, 20s, crop},
+    {"raytracer.moved-with-camera", "A scene that is moved together with its camera looks the same.", kind, gate, 20s,
+     moved_with_camera},
+    {"raytracer.moving-object", "An object is where the request's motion has it.", kind, gate, 20s, moving_object},
+};
+
+} // namespace
+
+std::span<const Test> raytracer_camera_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

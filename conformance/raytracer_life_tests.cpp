@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A ray tracer's life from start to stop, what it refuses, and what it survives.
+#include "conformance/cancelling.hpp"
+#include "conformance/expect.hpp"
+#include "conformance/frame_times.hpp"
+#include "conformance/process_usage.hpp"
+#include "conformance/tracer.hpp"
+
+#include <limits>
+
+namespace arhost::conformance {
+namespace {
+
+void start(Context &context) {
+    Tracer tracer(context, one_sphere({0, 0, 0, 30}));
+    tracer.start(pinhole());
+}
+
+void render(Context &context) {
+    Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front());
+}
+
+void start_again(Context &context) {
+    Tracer tracer(context, one_sphere({0, 0, 0, 30}));
+    tracer.render(from_front());
+    tracer.change_scene(still_life());
+    const arhost_intrinsics smaller = pinhole(90, 70, 110);
+    expect_alike(tracer.render(of_still_life(smaller)), Tracer(context, still_life()).render(of_still_life(smaller)),
+                 "stopped, and started with another scene and size, it gives another image than a new instance", 1);
+}
+
+void leaks(Context &context) {
+    Tracer tracer(context, still_life());
+    expect_no_leak([&](int frames) {
+        for (int frame = 0; frame < frames; ++frame)
+            tracer.render(of_still_life(pinhole(40, 30, 50)));
+        tracer.stop();
+    });
+}
+
+// ---- Refusals --------------------------------------------------------------------------------------
+
+void parallel_up(Context &context) {
+    Tracer tracer(context, one_sphere({0, 0, 0, 30}));
+    tracer.start(pinhole());
+    Picture picture(160, 120);
+    arhost_render_info info;
+    for (const glm::dvec3 &up : {glm::dvec3(0, 0, 1), {0, 0, -3}, {0, 0, 0}})
+        if (const arhost_status status = tracer.try_render(camera({0, 0, 200}, {0, 0, 0}, up), picture, info);
+            status != ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
+            throw Failure(
+                fmt::format("looking along −z with up (0, 0, {}), render returned {}; it must be INVALID_ARGUMENT",
+                            up.z, status_name(status)));
+    tracer.render(from_front()); // and goes on
+}
+
+void not_finite(Context &context) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                     infinity = std::numeric_limits<double>::infinity();
+    Tracer tracer(context, one_sphere({0, 0, 0, 30}));
+    const Picture before = tracer.render(from_front());
+    Picture picture(160, 120);
+    arhost_render_info info;
+    for (const arhost_camera &view :
+         {camera({nan, 0, 200}, {0, 0, 0}, {0, 1, 0}), camera({0, 0, 200}, {0, infinity, 0}, {0, 1, 0}),
+          camera({0, 0, 200}, {0, 0, 0}, {0, nan, 0})})
+        if (const arhost_status status = tracer.try_render(view, picture, info);
+            status != ARHOST_STATUS_ERROR_INVALID_ARGUMENT && status != ARHOST_STATUS_OK)
+            throw Failure(
+                fmt::format("with a camera that is not finite, render returned {}; it must be INVALID_ARGUMENT, "
+                            "or OK",
+                            status_name(status)));
+    expect_alike(tracer.render(from_front()), before, "after a camera that is not finite, the image is another", 1);
+}
+
+void cancelled(Context &context) {
+    Tracer running(context, still_life()), starting(context, still_life());
+    running.start(pinhole());
+    running.instance().host().cancel();
+    Picture picture(160, 120);
+    arhost_render_info info;
+    expect_ok_or_cancelled("render", running.try_render(of_still_life(), picture, info));
+    starting.instance().host().cancel();
+    expect_ok_or_cancelled("start", starting.try_start(pinhole()));
+}
+
+// Inside of a mirror that is a sphere, where each ray is followed as far as it may be.
+scene::ArenaBuilder hall_of_mirrors() {
+    scene::ArenaBuilder builder = one_sphere({0, 0, 0, 300}, mirror(1));
+    builder.settings.max_depth = scene::max_depth_limit;
+    return builder;
+}
+
+void cancel_while_rendering(Context &context) {
+    for (const char *const *need = context.library.descriptor().needs; need && *need; ++need)
+        if (*need == std::string_view("gpu"))
+            throw Skip("it needs 'gpu', and what a GPU has begun can't be called back");
+    const arhost_intrinsics large = pinhole(1920, 1440, 1600); // seconds of work for a processor
+    Tracer tracer(context, hall_of_mirrors());
+    tracer.start(large);
+    Picture picture(large.width, large.height);
+    arhost_render_info info;
+    expect_to_be_cancelled(context, tracer.instance().host(), "render",
+                           [&] { return tracer.try_render(from_front(large), picture, info); });
+}
+
+// ---- Odd scenes ------------------------------------------------------------------------------------
+
+// The sphere is where it would be without what else there is.
+void expect_sphere(const Picture &picture, double radius_px, const char *scene) {
+    expect_pixels(picture, [&](auto x, auto y) {
+        const double r = distance_from_centre(picture, x, y);
+        const int alpha = picture.alpha(x, y);
+        if (r < radius_px - 2 && alpha < 250)
+            return fmt::format("{}, the sphere is not seen: alpha is {}", scene, alpha);
+        if (r > radius_px + 2 && alpha > 2)
+            return fmt::format("{}, something is seen beside the sphere: alpha is {}", scene, alpha);
+        return std::string();
+    });
+}
+
+void degenerate(Context &context) {
+    scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30});
+    scene::TriangleMesh slivers{
+        {{-50, 45, 40}, {0, 45, 40}, {50, 45, 40}, {45, 20, 0}}, {}, {}, {{3, 3, 3}, {0, 0, 1}, {2, 1, 2}}};
+    const std::uint32_t material = builder.add_material(diffuse(glm::vec3(1)));
+    builder.add_object("slivers", builder.add_triangles(slivers), material);
+    slivers.normals.assign(4, {0, 0, 1});
+    builder.add_object("smooth slivers", builder.add_triangles(slivers), material);
+    builder.add_light(lamp({0, 0, 200}, 1));
+    expect_sphere(Tracer(context, std::move(builder)).render(from_front()), 30, "among triangles without area");
+}
+
+void far_away(Context &context) {
+    // A kilometre away and just as large: the same image.
+    constexpr double factor = 5000;
+    const arhost_camera view = camera(glm::dvec3(0, 0, 200) * factor, {0, 0, 0}, {0, 1, 0});
+    expect_sphere(Tracer(context, one_sphere(glm::vec4(0, 0, 0, 30) * static_cast<float>(factor))).render(view), 30,
+                  "in a scene of a kilometre");
+}
+
+// ---- Speed -----------------------------------------------------------------------------------------
+
+void speed(Context &context) {
+    Tracer tracer(context, still_life());
+    const arhost_camera view = of_still_life(pinhole(640, 480, 800));
+    tracer.render(view);
+    judge_speed(context, 640, 480, frame_times_ms([&] { return tracer.render(view), true; }), 250);
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
+constexpr Test tests[] = {
+    {"raytracer.start", "It starts on a scene in read-only memory, and stops.", kind, "abi.create", 30s, start},
+    {"raytracer.render", "It renders an image of a scene in read-only memory.", kind, "raytracer.start", 30s, render},
+    {"raytracer.start-again", "After a stop it starts with another scene and another size.", kind, "raytracer.render",
+     30s, start_again},
+    {"raytracer.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind,
+     "raytracer.render", 60s, leaks},
+    {"raytracer.parallel-up", "An up that is parallel to the view is refused as INVALID_ARGUMENT.", kind,
+     "raytracer.render", 20s, parallel_up},
+    {"raytracer.not-finite", "A camera that is not finite is refused or drawn, and the next image is right.", kind,
+     "raytracer.render", 20s, not_finite},
+    {"raytracer.cancelled", "Cancelled before, start and render return soon, OK or CANCELLED.", kind,
+     "raytracer.render", 20s, cancelled},
+    {"raytracer.cancel-while-rendering",
+     "Cancelled in the midst of a large image, render returns within 2 s; not of GPUs.", kind, "raytracer.cancelled",
+     30s, cancel_while_rendering},
+    {"raytracer.degenerate", "Triangles without area harm nothing.", kind, "raytracer.render", 20s, degenerate},
+    {"raytracer.far-away", "A scene of a kilometre looks like one of a foot.", kind, "raytracer.render", 20s,
+     far_away},
+    {"raytracer.speed", "A small image takes less than 250 ms on the median; a warning otherwise.", kind,
+     "raytracer.render", 120s, speed},
+};
+
+} // namespace
+
+std::span<const Test> raytracer_life_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

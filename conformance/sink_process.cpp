@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/sink_process.hpp"
+
+#include "conformance/child.hpp"
+
+#include <fmt/format.h>
+
+#include <csignal>
+#include <deque>
+#include <fcntl.h>
+#include <iostream>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace arhost::conformance {
+namespace {
+
+struct Pipe {
+    Pipe() {
+        int ends[2];
+        if (::pipe2(ends, O_CLOEXEC) != 0)
+            base::throw_errno("pipe2");
+        read_end.reset(ends[0]);
+        write_end.reset(ends[1]);
+    }
+    base::UniqueFd read_end, write_end;
+};
+
+constexpr const char *helper = "sink.process";
+
+// What that process does: the work comes on its standard input; a byte goes out for each frame, and after them, where
+// it fails, why.
+void work(Context &context) {
+    SinkProcess::Work work{};
+    std::cin >> work.frames >> work.size.width >> work.size.height >> work.folder;
+    SinkRun run(context, work.folder);
+    run.start(0, work.size);
+    std::deque<SealedOutput> frames; // made before: behind a frame's byte the next is being written
+    for (std::uint64_t n = 0; n < work.frames; ++n)
+        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = work.size});
+    for (const SealedOutput &frame : frames) {
+        run.write(frame);
+        if (::write(result_fd, ".", 1) != 1)
+            break;
+    }
+    while (std::cin.get() != EOF) { // what is not on the disk yet will never be; at the end the suite itself is gone
+    }
+}
+
+constexpr Test helpers[] = {{helper, "It writes frames until it is killed.", ARHOST_KIND_SINK, "", 60s, work}};
+
+} // namespace
+
+std::span<const Test> helper_tests() {
+    return helpers;
+}
+
+SinkProcess::SinkProcess(Context &context, const Work &work) {
+    PluginLibrary &library = context.library;
+    std::vector<std::string> arguments = {"arhost-conform",  library.file(), "--run", helper, "--scratch",
+                                          library.scratch(), "--sandbox",    "none" /* it is in this one's */};
+    for (const auto &[key, value] : library.settings())
+        arguments.insert(arguments.end(), {"--set", key + "=" + value});
+    std::vector<char *> argv;
+    argv.reserve(arguments.size() + 1);
+    for (std::string &argument : arguments)
+        argv.push_back(argument.data());
+    argv.push_back(nullptr);
+
+    Pipe orders, written;
+    const ipc::SharedMemory call_page = ipc::SharedMemory::create("arhost-conform-call", sizeof(ipc::Call));
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ < 0)
+        base::throw_errno("fork");
+    if (pid_ == 0) { // only what a thread of many may do, until execv
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (::getppid() != parent)
+            ::_exit(127);
+        const int high_written = ::fcntl(written.write_end.get(), F_DUPFD_CLOEXEC, 10),
+                  high_page = ::fcntl(call_page.fd(), F_DUPFD_CLOEXEC, 10);
+        ::dup2(orders.read_end.get(), STDIN_FILENO);
+        ::dup2(high_written, result_fd);
+        ::dup2(high_page, call_page_fd);
+        ::execv("/proc/self/exe", argv.data());
+        ::_exit(127);
+    }
+    orders_ = std::move(orders.write_end);
+    written_ = std::move(written.read_end);
+    const std::string order =
+        fmt::format("{} {} {} {}\n", work.frames, work.size.width, work.size.height, work.folder);
+    if (::write(orders_.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
+        base::throw_errno("write to the sink's process");
+}
+
+void SinkProcess::wait_until_written(std::uint64_t frames) {
+    std::string result; // comes after the last frame's byte
+    for (char byte = 0; count_ < frames && ::read(written_.get(), &byte, 1) == 1;)
+        if (byte == '.' && result.empty())
+            ++count_;
+        else
+            result += byte;
+    if (count_ == frames)
+        return;
+    const ipc::Json told = ipc::Json::parse(result, nullptr, false);
+    throw Failure(fmt::format("in a process of its own it gave up after {} frames: {}", count_,
+                              told.is_object() ? told.value("message", "") : "the process ended"));
+}
+
+void SinkProcess::kill() {
+    if (pid_ <= 0)
+        return;
+    ::kill(pid_, SIGTERM);
+    int status = 0;
+    pid_t reaped = 0;
+    for (int i = 0; i < 500 && reaped == 0; ++i) { // it may do something about it
+        std::this_thread::sleep_for(2ms);
+        reaped = ::waitpid(pid_, &status, WNOHANG);
+    }
+    if (reaped == 0) {
+        ::kill(pid_, SIGKILL);
+        ::waitpid(pid_, &status, 0);
+    }
+    pid_ = 0;
+}
+
+} // namespace arhost::conformance

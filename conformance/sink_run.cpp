@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/sink_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <sys/mman.h>
+#include <unistd.h>
+
+namespace arhost::conformance {
+
+using ipc::Call;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double fps = 25;
+
+std::size_t whole_pages(std::size_t size) {
+    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    return (size + page - 1) / page * page;
+}
+
+arhost_intrinsics lens(const Size &size) {
+    arhost_intrinsics in{};
+    in.struct_size = sizeof in;
+    in.width = size.width;
+    in.height = size.height;
+    in.distortion = ARHOST_DISTORTION_NONE;
+    in.fx = in.fy = 1.2 * size.width;
+    in.cx = (size.width - 1) / 2.0;
+    in.cy = (size.height - 1) / 2.0;
+    return in;
+}
+
+arhost_marker marker(double z_mm) {
+    arhost_marker m{};
+    m.struct_size = sizeof m;
+    m.id = 3;
+    std::strcpy(m.family, "tag36h11");
+    m.state = ARHOST_MARKER_DETECTED;
+    for (int corner = 0; corner < 4; ++corner) {
+        m.corners_px[corner][0] = corner == 1 || corner == 2 ? 40.25 : 20.5;
+        m.corners_px[corner][1] = corner >= 2 ? 30.75 : 10;
+    }
+    m.mt[0] = m.mt[5] = m.mt[10] = m.mt[15] = 1;
+    m.mt[14] = z_mm;
+    m.reprojection_px = 0.125;
+    m.ambiguity = 0.25;
+    return m;
+}
+
+} // namespace
+
+SealedOutput::SealedOutput(const Look &look) {
+    const Size &size = look.size;
+    const std::uint32_t stride = ipc::OutputSlot::stride(size.width) + look.padding;
+    const std::size_t pixels = std::size_t{stride} * size.height, page = whole_pages(1);
+    size_ = whole_pages(sizeof(arhost_record)) + whole_pages(pixels);
+    memory_ = ::mmap(nullptr, size_ + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory_ == MAP_FAILED)
+        base::throw_errno("mmap of a frame");
+    auto *bytes = static_cast<std::uint8_t *>(memory_);
+    ::mprotect(bytes + size_, page, PROT_NONE);
+
+    std::uint8_t *bgr = bytes + size_ - pixels;
+    std::mt19937 noise(static_cast<std::uint32_t>(2 * look.sequence + look.other));
+    for (std::uint32_t y = 0; y < size.height; ++y) {
+        std::uint8_t *row = bgr + std::size_t{stride} * y;
+        std::memset(row, look.in_padding, stride);
+        std::generate_n(row, 3 * size.width, [&] { return static_cast<std::uint8_t>(noise() >> 24); });
+    }
+
+    arhost_record &r = record();
+    r.struct_size = sizeof r;
+    r.clock = ARHOST_CLOCK_MEDIA;
+    r.sequence = look.sequence;
+    r.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(look.sequence) / fps);
+    r.overlay = ARHOST_OVERLAY_RENDERED;
+    r.has_camera = 1;
+    const double eye[] = {0, 0, look.other ? 400.5 : 500.5}, look_at[] = {0, 0, eye[2] - 1}, up[] = {0, 1, 0};
+    r.camera.struct_size = sizeof r.camera;
+    std::copy_n(eye, 3, r.camera.eye);
+    std::copy_n(look_at, 3, r.camera.look_at);
+    std::copy_n(up, 3, r.camera.up);
+    r.camera.intrinsics = lens(size);
+    r.marker_count = 1;
+    r.markers[0] = marker(-eye[2]);
+    output_ = {sizeof output_, stride, size.width, size.height, bgr, &r};
+    seal();
+}
+
+SealedOutput::~SealedOutput() {
+    ::munmap(memory_, size_ + whole_pages(1));
+}
+
+void SealedOutput::seal() {
+    ::mprotect(memory_, size_, PROT_READ);
+}
+void SealedOutput::unseal() {
+    ::mprotect(memory_, size_, PROT_READ | PROT_WRITE);
+}
+
+Files files_in(const fs::path &folder) {
+    Files files;
+    for (const fs::directory_entry &entry : fs::recursive_directory_iterator(folder)) {
+        if (!entry.is_regular_file())
+            continue;
+        std::ostringstream bytes;
+        bytes << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+        files[entry.path().lexically_relative(folder)] = bytes.str();
+    }
+    return files;
+}
+
+SinkRun::SinkRun(Context &context, const std::string &folder)
+    : library_(context.library), folder_(folder),
+      functions_(*static_cast<const arhost_sink *>(context.library.plugin().functions)) {
+    fs::create_directories(library_.scratch() / folder_);
+    create();
+}
+
+void SinkRun::create() {
+    instance_.emplace(library_, Settings{}, folder_);
+    instance_->create_or_fail();
+}
+
+SinkRun::~SinkRun() {
+    try_stop();
+}
+
+arhost_status SinkRun::try_start(std::uint64_t first_sequence, const Size &size) {
+    try_stop();
+    if (!std::exchange(fresh_, false))
+        create();
+    const arhost_intrinsics intrinsics = lens(size);
+    const arhost_sink_setup setup{sizeof setup, size.width, size.height, 0, fps, first_sequence, &intrinsics};
+    const arhost_status status =
+        in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
+    started_ = status == ARHOST_STATUS_OK;
+    size_ = size;
+    return status;
+}
+
+void SinkRun::start(std::uint64_t first_sequence, const Size &size) {
+    instance_->expect_ok("start", try_start(first_sequence, size));
+}
+
+arhost_status SinkRun::try_write(const SealedOutput &frame) {
+    return in_call(library_.calls(), Call::per_frame,
+                   [&] { return functions_.write(instance_->get(), &frame.output()); });
+}
+
+void SinkRun::write(const SealedOutput &frame) {
+    instance_->expect_ok(fmt::format("write of frame {}", frame.output().record->sequence).c_str(), try_write(frame));
+}
+
+void SinkRun::write(std::uint64_t first, std::uint64_t end) {
+    for (std::uint64_t sequence = first; sequence < end; ++sequence)
+        write(SealedOutput({sequence, size_}));
+}
+
+arhost_status SinkRun::try_idle() {
+    return in_call(library_.calls(), Call::idle, [&] { return functions_.idle(instance_->get()); });
+}
+
+arhost_status SinkRun::try_stop() {
+    if (!std::exchange(started_, false))
+        return ARHOST_STATUS_OK;
+    return in_call(library_.calls(), Call::stop, [&] { return functions_.stop(instance_->get()); });
+}
+
+void SinkRun::stop() {
+    instance_->expect_ok("stop", try_stop());
+}
+
+} // namespace arhost::conformance

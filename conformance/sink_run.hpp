@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A sink at work in a folder, the frames that it is given, and what lies in the folder then.
+#pragma once
+
+#include "conformance/plugin_library.hpp"
+#include "conformance/test.hpp"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+namespace arhost::conformance {
+
+struct Size {
+    std::uint32_t width = 64, height = 48;
+};
+
+// A frame in memory that can't be written, as the host's is, with memory behind its last row that can't be read.
+// Its pixels are noise, which no encoder makes small: each frame is another.
+class SealedOutput {
+public:
+    struct Look {
+        std::uint64_t sequence;
+        Size size{};
+        std::uint32_t padding = 0;   // bytes that a row takes beyond what the host gives it
+        std::uint8_t in_padding = 0; // what is there
+        bool other = false;          // another frame of that number
+    };
+    explicit SealedOutput(const Look &look);
+    ~SealedOutput();
+    SealedOutput(const SealedOutput &) = delete;
+    SealedOutput &operator=(const SealedOutput &) = delete;
+
+    // While no sink has it.
+    template <class Change> void change(Change &&change) {
+        unseal();
+        change(record());
+        seal();
+    }
+    const arhost_output &output() const { return output_; }
+
+private:
+    void seal();
+    void unseal();
+    arhost_record &record() { return *static_cast<arhost_record *>(memory_); }
+
+    void *memory_;
+    std::size_t size_; // without what can't be read
+    arhost_output output_{};
+};
+
+// Each file's bytes by its path in a folder.
+using Files = std::map<std::string, std::string>;
+Files files_in(const std::filesystem::path &folder);
+
+// An instance is started once: another start makes another one.
+class SinkRun {
+public:
+    // Its output lies in `folder` of the test's own folder.
+    SinkRun(Context &context, const std::string &folder);
+    ~SinkRun();
+    SinkRun(const SinkRun &) = delete;
+    SinkRun &operator=(const SinkRun &) = delete;
+
+    arhost_status try_start(std::uint64_t first_sequence = 0, const Size &size = {});
+    void start(std::uint64_t first_sequence = 0, const Size &size = {}); // throws Failure unless it succeeds
+    arhost_status try_write(const SealedOutput &frame);
+    void write(const SealedOutput &frame); // throws Failure unless it succeeds
+    void write(std::uint64_t first, std::uint64_t end);
+    arhost_status try_idle();
+    arhost_status try_stop();
+    void stop(); // throws Failure unless it succeeds
+
+    bool has_idle() const { return functions_.idle != nullptr; }
+    Files files() const { return files_in(library_.scratch() / folder_); }
+    Instance &instance() { return *instance_; }
+
+private:
+    void create();
+
+    PluginLibrary &library_;
+    std::string folder_;
+    std::optional<Instance> instance_;
+    const arhost_sink &functions_;
+    bool fresh_ = true, started_ = false;
+    Size size_{};
+};
+
+} // namespace arhost::conformance

@@ -1,0 +1,622 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sinks: what they take, and what becomes of their files, in peace, after a kill and on a full disk.
+#include "conformance/cancelling.hpp"
+#include "conformance/frame_times.hpp"
+#include "conformance/process_usage.hpp"
+#include "conformance/sink_process.hpp"
+#include "conformance/sink_run.hpp"
+#include "conformance/slow_disk.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <deque>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <sys/resource.h>
+#include <thread>
+
+namespace arhost::conformance {
+namespace {
+
+// What can only be seen in files needs some.
+void require_files(Context &context) {
+    const Settings &settings = context.library.settings();
+    for (const arhost_option_descriptor *option : options_of(context.library.descriptor())) {
+        const auto set = settings.find(option->key);
+        const char *const path = set != settings.end() ? set->second.c_str() : option->default_value;
+        if (option->type == ARHOST_OPTION_OUTPUT_PATH && (!path || *path)) // without any, create tells what to set
+            return;
+    }
+    throw Skip("it has no output path, so it can't be seen what becomes of the frames");
+}
+
+void expect_same(const Files &is, const Files &should, const std::string &what) {
+    for (const auto &[name, bytes] : should) {
+        const auto found = is.find(name);
+        if (found == is.end())
+            throw Failure(fmt::format("{}: '{}' is not there", what, name));
+        if (found->second.size() != bytes.size())
+            throw Failure(
+                fmt::format("{}: '{}' has {} bytes instead of {}", what, name, found->second.size(), bytes.size()));
+        const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin());
+        if (at.first != bytes.end())
+            throw Failure(fmt::format("{}: '{}' is another from byte {} on", what, name, at.first - bytes.begin()));
+    }
+    for (const auto &[name, bytes] : is)
+        if (!should.contains(name))
+            throw Failure(fmt::format("{}: '{}' is there too", what, name));
+}
+
+// What lies in the folder after each of an uninterrupted run's frames, and at its end.
+struct Course {
+    std::vector<Files> after; // after[n]: once n frames were written
+    Files end;
+
+    bool has_been(const std::string &name, const std::string &bytes) const {
+        const auto in = [&](const Files &files) {
+            const auto found = files.find(name);
+            return found != files.end() && found->second == bytes;
+        };
+        return in(end) || std::any_of(after.begin(), after.end(), in);
+    }
+};
+Course course_of(Context &context, std::uint64_t frames, const Size &size = {}) {
+    SinkRun run(context, "uninterrupted");
+    Course course;
+    run.start(0, size);
+    course.after.push_back(run.files());
+    for (std::uint64_t n = 0; n < frames; ++n) {
+        run.write(n, n + 1);
+        course.after.push_back(run.files());
+    }
+    run.stop();
+    course.end = run.files();
+    return course;
+}
+
+// ---- From start to stop ----------------------------------------------------------------------------
+
+void start(Context &context) {
+    SinkRun run(context, "out");
+    const arhost_status status = run.try_start();
+    if (const char *const *needs = context.library.descriptor().needs; needs && *needs && status < 0)
+        throw Skip(fmt::format("it needs '{}', and {}", *needs, told("start", status, run.instance().host())));
+    run.instance().expect_ok("start", status);
+    run.stop();
+}
+
+void write(Context &context) {
+    SinkRun run(context, "out");
+    run.start();
+    run.write(0, 4);
+    run.stop();
+}
+
+void start_again(Context &context) {
+    SinkRun run(context, "a"), fresh(context, "b");
+    for (int i = 0; i < 2; ++i) {
+        run.start();
+        run.write(0, 3);
+        run.stop();
+    }
+    fresh.start();
+    fresh.write(0, 3);
+    fresh.stop();
+    expect_same(run.files(), fresh.files(), "in the second run with the same frames");
+    run.start(0, {90, 70}); // whatever becomes of the files: it works
+    run.write(0, 2);
+    run.stop();
+}
+
+void two_instances(Context &context) {
+    SinkRun first(context, "a"), second(context, "b"), alone(context, "c");
+    first.start();
+    second.start(0, {40, 30});
+    for (std::uint64_t n = 0; n < 3; ++n) {
+        first.write(n, n + 1);
+        second.write(n, n + 1);
+    }
+    second.stop();
+    first.stop();
+    alone.start();
+    alone.write(0, 3);
+    alone.stop();
+    expect_same(first.files(), alone.files(), "with another instance at work meanwhile");
+}
+
+void leaks(Context &context) {
+    SinkRun run(context, "out");
+    expect_no_leak([&](int frames) {
+        run.start();
+        run.write(0, static_cast<std::uint64_t>(frames));
+        run.stop();
+    });
+}
+
+void idle(Context &context) {
+    SinkRun run(context, "out");
+    if (!run.has_idle())
+        throw Skip("it has no idle");
+    run.start();
+    for (std::uint64_t n = 0; n < 3; ++n) {
+        for (int i = 0; i < 3; ++i)
+            if (const arhost_status status = run.try_idle();
+                status != ARHOST_STATUS_OK && status != ARHOST_STATUS_END)
+                throw Failure(told("idle", status, run.instance().host()));
+        run.write(n, n + 1);
+    }
+    run.stop();
+}
+
+void cancelled(Context &context) {
+    SinkRun running(context, "a"), starting(context, "b");
+    running.start();
+    running.write(0, 1);
+    running.instance().host().cancel();
+    expect_ok_or_cancelled("write", running.try_write(SealedOutput({1})));
+    expect_ok_or_cancelled("stop", running.try_stop());
+    starting.instance().host().cancel();
+    expect_ok_or_cancelled("start", starting.try_start());
+}
+
+// ---- What it is given ------------------------------------------------------------------------------
+
+void sizes(Context &context) {
+    int i = 0;
+    for (const Size &size : {Size{1, 1}, Size{1, 40}, Size{67, 1}, Size{17, 13}, Size{22, 3}, Size{1280, 720}}) {
+        SinkRun run(context, fmt::format("{}", i++));
+        const arhost_status status = run.try_start(0, size);
+        if (status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION) {
+            if (run.instance().host().last_error().empty())
+                throw Failure(fmt::format("it refuses {}×{} without a word", size.width, size.height));
+            continue;
+        }
+        run.instance().expect_ok(fmt::format("start with {}×{}", size.width, size.height).c_str(), status);
+        run.write(0, 2);
+        run.stop();
+    }
+}
+
+void stride(Context &context) {
+    const auto run = [&](const char *folder, std::uint32_t padding, std::uint8_t in_padding) {
+        constexpr Size size{50, 20}; // not even as the host has them do rows follow each other
+        SinkRun sink(context, folder);
+        sink.start(0, size);
+        for (std::uint64_t n = 0; n < 3; ++n)
+            sink.write(SealedOutput({n, size, padding, in_padding}));
+        sink.stop();
+        return sink.files();
+    };
+    const Files should = run("a", 0, 0);
+    expect_same(run("b", 0, 0xa5), should, "with other bytes behind each row's pixels");
+    expect_same(run("c", 128, 0x5a), should, "with rows 128 bytes longer");
+}
+
+void records(Context &context) {
+    SinkRun run(context, "out");
+    run.start();
+    std::uint64_t n = 0;
+    const auto write = [&](const char *what, void (*change)(arhost_record &)) {
+        SealedOutput frame({n++});
+        frame.change(change);
+        run.instance().expect_ok(fmt::format("write of a frame {}", what).c_str(), run.try_write(frame));
+    };
+    write("as any", [](arhost_record &) {});
+    write("without markers and camera", [](arhost_record &r) {
+        r.marker_count = 0;
+        r.has_camera = 0;
+        r.camera = {};
+        r.overlay = ARHOST_OVERLAY_NONE;
+    });
+    write("with 64 markers", [](arhost_record &r) {
+        r.marker_count = ARHOST_MAX_MARKERS;
+        for (int i = 0; i < ARHOST_MAX_MARKERS; ++i) {
+            r.markers[i] = r.markers[0];
+            r.markers[i].id = i;
+        }
+    });
+    write("with a marker that is lost and a held overlay", [](arhost_record &r) {
+        r.overlay = ARHOST_OVERLAY_HELD;
+        r.markers[0].state = ARHOST_MARKER_LOST;
+        r.markers[0].age_frames = 17;
+    });
+    write("with the true pose", [](arhost_record &r) {
+        r.has_truth = 1;
+        r.truth_id = 3;
+        std::copy_n(r.markers[0].mt, 16, r.true_mt);
+    });
+    write("with a marker that is predicted, and one that is lost, far away", [](arhost_record &r) {
+        r.marker_count = 2;
+        r.markers[0].state = ARHOST_MARKER_PREDICTED;
+        r.markers[0].age_frames = std::numeric_limits<std::uint32_t>::max();
+        r.markers[1] = r.markers[0];
+        r.markers[1].state = ARHOST_MARKER_LOST;
+        r.markers[1].mt[14] = -1e9;
+    });
+    write("with numbers as large as they can be", [](arhost_record &r) {
+        constexpr double most = std::numeric_limits<double>::max();
+        r.markers[0].reprojection_px = r.markers[0].ambiguity = most;
+        r.markers[0].corners_px[0][0] = -most;
+    });
+    run.stop();
+}
+
+void gaps(Context &context) {
+    SinkRun run(context, "out");
+    run.start();
+    for (const std::uint64_t sequence : {3u, 4u, 9u, 10u, 40u})
+        run.write(sequence, sequence + 1);
+    run.stop();
+}
+
+// ---- What becomes of it ----------------------------------------------------------------------------
+
+void files(Context &context) {
+    const Files once = course_of(context, 4).end;
+    if (once.empty())
+        throw Failure("4 frames were written, and there is no file");
+    SinkRun run(context, "again");
+    run.start();
+    run.write(0, 4);
+    run.stop();
+    try {
+        expect_same(run.files(), once, "given the same frames again");
+    } catch (const Failure &difference) { // a date, say
+        throw Skip(std::string("its runs can't be compared: ") + difference.what());
+    }
+}
+
+void require_every_frame(Context &context) {
+    if (context.library.descriptor().capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
+        throw Skip("ARHOST_CAPABILITY_REALTIME_SINK is declared");
+}
+
+void every_frame(Context &context) {
+    require_every_frame(context);
+    constexpr std::uint64_t frames = 12;
+    const Course course = course_of(context, frames);
+    for (std::size_t n = 0; n < frames; ++n)
+        if (course.after[n] == course.after[n + 1])
+            throw Failure(
+                fmt::format("write of frame {} returned OK, but no file has changed; from then on the frame "
+                            "must survive a kill",
+                            n));
+}
+
+using Number = std::pair<std::size_t, std::string>; // of so many digits: "10" comes behind "9"
+
+// Each number in a file's name, under the path without it.
+std::map<std::string, Number> numbers_in(const std::string &path) {
+    constexpr const char *digits = "0123456789";
+    std::map<std::string, Number> numbers;
+    for (std::size_t at = path.find_first_of(digits, path.rfind('/') + 1), end; at != std::string::npos;
+         at = path.find_first_of(digits, end)) {
+        end = std::min(path.find_first_not_of(digits, at), path.size());
+        numbers[path.substr(0, at) + '#' + path.substr(end)] = {end - at, path.substr(at, end - at)};
+    }
+    return numbers;
+}
+
+// With another frame of one number its files change where that frame is; without knowing more of them, only those
+// tell that are as long whatever is in them, or one for each frame, with names that differ in a number.
+void order(Context &context) {
+    require_every_frame(context);
+    constexpr std::uint64_t frames = 6;
+    const auto files_with_other = [&](std::uint64_t other) {
+        SinkRun run(context, fmt::format("{}", other));
+        run.start();
+        for (std::uint64_t n = 0; n < frames; ++n)
+            run.write(SealedOutput({.sequence = n, .size = {}, .padding = 0, .in_padding = 0, .other = n == other}));
+        run.stop();
+        return run.files();
+    };
+    struct Change {
+        std::uint64_t frame;
+        std::size_t byte;
+    };
+    const Files usual = files_with_other(frames); // none
+    std::map<std::string, std::vector<Change>> changes;
+    std::set<std::string> resized;
+    for (std::uint64_t frame = 0; frame < frames; ++frame)
+        for (const auto &[name, bytes] : files_with_other(frame)) {
+            const auto found = usual.find(name);
+            if (found == usual.end() || found->second == bytes)
+                continue;
+            if (found->second.size() != bytes.size())
+                resized.insert(name);
+            const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin(), found->second.end());
+            changes[name].push_back({frame, static_cast<std::size_t>(at.first - bytes.begin())});
+        }
+    bool told = false;
+    struct File {
+        std::uint64_t frame;
+        std::string name;
+    };
+    std::map<std::string, std::map<Number, File>> families; // files of a frame each
+    for (const auto &[name, of_file] : changes) {
+        if (of_file.size() == 1)
+            for (const auto &[family, number] : numbers_in(name))
+                families[family][number] = {of_file[0].frame, name};
+        for (std::size_t i = 1; i < of_file.size() && !resized.contains(name); ++i) {
+            told = told || of_file[i].byte > of_file[i - 1].byte; // the same byte may be a checksum's, ahead of all
+            if (of_file[i].byte < of_file[i - 1].byte)
+                throw Failure(
+                    fmt::format("in '{}', frame {} begins at byte {}, before frame {}, which begins at byte {}", name,
+                                of_file[i].frame, of_file[i].byte, of_file[i - 1].frame, of_file[i - 1].byte));
+        }
+    }
+    for (const auto &[family, files] : families) {
+        std::set<std::uint64_t> in_files;
+        for (const auto &[number, file] : files)
+            in_files.insert(file.frame);
+        if (in_files.size() != frames) // what the number counts is not the frames
+            continue;
+        told = true;
+        const File *before = nullptr;
+        for (const auto &[number, file] : files) {
+            if (before && file.frame == before->frame)
+                throw Failure(
+                    fmt::format("frame {} is in '{}', and in '{}' too", file.frame, before->name, file.name));
+            if (before && file.frame < before->frame)
+                throw Failure(fmt::format("frame {} is in '{}', and frame {} in '{}'", before->frame, before->name,
+                                          file.frame, file.name));
+            before = &file;
+        }
+    }
+    if (!told)
+        throw Skip("without decoding them its files do not tell where a frame begins");
+}
+
+void last_frame(Context &context) {
+    const Files one = course_of(context, 3).end;
+    SinkRun run(context, "other");
+    run.start();
+    run.write(0, 2);
+    run.write(SealedOutput({.sequence = 2, .size = {}, .padding = 0, .in_padding = 0, .other = true}));
+    run.stop();
+    if (run.files() == one)
+        throw Failure("with another last frame, and another camera, its files are the same");
+}
+
+void earlier_files(Context &context) {
+    const Files should = course_of(context, 3).end;
+    SinkRun run(context, "uninterrupted"); // there
+    run.start();
+    expect_same(run.files(), should, "started anew, and no frame has come");
+    run.stop();
+    expect_same(run.files(), should, "started and stopped anew without a frame");
+}
+
+void no_place(Context &context) {
+    SinkRun run(context, "file");
+    const std::filesystem::path folder = context.library.scratch() / "file";
+    std::filesystem::remove(folder);
+    std::ofstream(folder) << "no folder";
+    const arhost_status status = run.try_start();
+    if (status == ARHOST_STATUS_OK)
+        throw Failure("its output would lie in a folder that is a file, but start returned OK");
+    if (run.instance().host().last_error().empty())
+        throw Failure(
+            fmt::format("where nothing can be written start returned {} without a word", status_name(status)));
+}
+
+// ---- Kills -----------------------------------------------------------------------------------------
+
+// The shortest of some: the others waited for a disk or a processor.
+std::chrono::steady_clock::duration time_of_a_write(Context &context, const Size &size) {
+    auto shortest = std::chrono::steady_clock::duration::max();
+    SinkRun run(context, "timed");
+    run.start(0, size);
+    for (std::uint64_t n = 0; n < 4; ++n) {
+        const SealedOutput frame({n, size});
+        const auto begin = std::chrono::steady_clock::now();
+        run.write(frame);
+        shortest = std::min(shortest, std::chrono::steady_clock::now() - begin);
+    }
+    run.stop();
+    return shortest;
+}
+
+void killed(Context &context) {
+    constexpr std::uint64_t frames = 4, done = 2;
+    constexpr Size size{160, 120};
+    const Course course = course_of(context, frames, size);
+    const std::chrono::duration<double> a_frame = time_of_a_write(context, size);
+    int i = 0;
+    for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+        const std::string folder = fmt::format("killed-{}", i++);
+        SinkProcess process(context, {folder, frames, size});
+        process.wait_until_written(done);
+        std::this_thread::sleep_for(part * a_frame);
+        process.kill();
+        for (const auto &[name, bytes] : files_in(context.library.scratch() / folder))
+            if (course.end.contains(name) && !course.has_been(name, bytes))
+                throw Failure(
+                    fmt::format("killed while it wrote frame {}, its file '{}' has {} bytes, as never between "
+                                "frames: it is no whole file",
+                                done, name, bytes.size()));
+    }
+}
+
+void restart(Context &context) {
+    constexpr std::uint64_t frames = 8, first = 4;
+    const Files should = course_of(context, frames).end;
+    {
+        SinkProcess process(context, {"killed", frames, {}});
+        process.wait_until_written(frames);
+        process.kill();
+    }
+    SinkRun run(context, "killed");
+    run.start(first);
+    run.write(first, frames);
+    run.stop();
+    const Files is = run.files();
+    for (const auto &[name, bytes] : should) {
+        const auto found = is.find(name);
+        if (found == is.end())
+            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is not there", first, name));
+        // What is encoded anew is not the same, but has as many frames.
+        const double ratio = static_cast<double>(found->second.size()) / static_cast<double>(bytes.size());
+        if (constexpr double least = 0.8; ratio < least || ratio > 1 / least)
+            throw Failure(fmt::format("killed after {} frames, and started again at frame {}: '{}' has {} bytes, and "
+                                      "{} if uninterrupted",
+                                      frames, first, name, found->second.size(), bytes.size()));
+    }
+    for (const auto &[name, bytes] : is)
+        if (!should.contains(name))
+            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is left over", first, name));
+}
+
+// ---- A full disk -----------------------------------------------------------------------------------
+
+// As on a full disk, no file of this process can grow beyond `bytes`. The error is another.
+class FullDisk {
+public:
+    explicit FullDisk(std::uint64_t bytes) {
+        std::signal(SIGXFSZ, SIG_IGN); // a full disk sends no signal
+        ::getrlimit(RLIMIT_FSIZE, &before_);
+        const rlimit small{bytes, before_.rlim_max};
+        ::setrlimit(RLIMIT_FSIZE, &small);
+    }
+    ~FullDisk() { ::setrlimit(RLIMIT_FSIZE, &before_); }
+    FullDisk(const FullDisk &) = delete;
+    FullDisk &operator=(const FullDisk &) = delete;
+
+private:
+    rlimit before_{};
+};
+
+void full_disk(Context &context) {
+    constexpr std::uint64_t frames = 6;
+    const Course course = course_of(context, frames);
+    std::uint64_t largest = 0;
+    for (const Files &files : course.after)
+        for (const auto &[name, bytes] : files)
+            largest = std::max<std::uint64_t>(largest, bytes.size());
+    SinkRun run(context, "full");
+    arhost_status status = ARHOST_STATUS_OK;
+    {
+        const FullDisk disk(largest / 2);
+        status = run.try_start();
+        for (std::uint64_t n = 0; n < frames && status == ARHOST_STATUS_OK; ++n)
+            status = run.try_write(SealedOutput({n}));
+        const arhost_status stopped = run.try_stop();
+        status = status == ARHOST_STATUS_OK ? stopped : status;
+    }
+    if (status == ARHOST_STATUS_OK)
+        throw Failure(fmt::format("a file of it that grows to {} bytes may have {}, but every call returned OK",
+                                  largest, largest / 2));
+    if (run.instance().host().last_error().empty())
+        throw Failure(fmt::format("where the disk takes no more it returned {} without a word", status_name(status)));
+    for (const auto &[name, bytes] : run.files())
+        if (const auto whole = course.end.find(name);
+            whole != course.end.end() && whole->second.starts_with(bytes) && !course.has_been(name, bytes))
+            throw Failure(fmt::format("where the disk took no more, '{}' is left with {} of {} bytes", name,
+                                      bytes.size(), whole->second.size()));
+}
+
+// ---- A slow disk -----------------------------------------------------------------------------------
+
+void slow_disk(Context &context) {
+    SlowDisk::under([&](SlowDisk &disk) {
+        require_files(context);
+        require_every_frame(context);
+        constexpr std::uint64_t frames = 3;
+        SinkRun run(context, "slow");
+        run.start();
+        Files before = run.files();
+        bool has_held_up = false;
+        for (std::uint64_t n = 0; n < frames; ++n) {
+            disk.hold_up_next_write();
+            run.write(n, n + 1);
+            Files after = run.files();
+            has_held_up = has_held_up || disk.has_held_up(); // at a frame that it drops there is nothing to hold up
+            if (!has_held_up)
+                throw Skip("it writes in a way that can't be held up: by memory maps, rings or another process");
+            if (after == before)
+                throw Failure(
+                    fmt::format("on a slow disk write of frame {} returned OK, but no file has changed", n));
+            before = std::move(after);
+        }
+        run.stop();
+    });
+}
+
+// ---- Speed -----------------------------------------------------------------------------------------
+
+void speed(Context &context) {
+    constexpr Size size{640, 480};
+    SinkRun run(context, "out");
+    run.start(0, size);
+    std::deque<SealedOutput> frames; // made before, since noise takes its time
+    for (std::uint64_t n = 0; n < 8; ++n)
+        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = size});
+    std::uint64_t next = 0;
+    const std::vector<double> ms = frame_times_ms([&] {
+        SealedOutput &frame = frames[next % frames.size()];
+        frame.change([&](arhost_record &record) { record.sequence = next; });
+        ++next;
+        return run.write(frame), true;
+    });
+    judge_speed(context, size.width, size.height, ms, 100);
+}
+
+template <void (*test)(Context &)> void of_files(Context &context) {
+    require_files(context);
+    test(context);
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_SINK;
+constexpr const char *gate = "sink.write", *same = "sink.files";
+constexpr Test tests[] = {
+    {"sink.start", "It starts and stops.", kind, "abi.create", 30s, start},
+    {"sink.write", "It takes frames that can't be written, and reads nothing behind them.", kind, "sink.start", 30s,
+     write},
+    {"sink.sizes", "It takes frames of one pixel, one row, one column, odd and usual sizes, or says why not.", kind,
+     gate, 60s, sizes},
+    {"sink.records", "It takes frames with any count of markers, without a camera, and with huge numbers.", kind,
+     gate, 30s, records},
+    {"sink.gaps", "It takes frames with gaps in their numbers.", kind, gate, 30s, gaps},
+    {"sink.idle", "Between frames idle does no harm.", kind, gate, 30s, idle},
+    {"sink.cancelled", "Cancelled before, start, write and stop return soon, OK or CANCELLED.", kind, gate, 30s,
+     cancelled},
+    {"sink.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate, 60s,
+     leaks},
+    {"sink.files", "Its frames become files. Unless they are the same in each run, runs are not compared.", kind,
+     gate, 30s, of_files<files>},
+    {"sink.start-again", "Once it has been stopped another instance starts, with the same files for the same frames.",
+     kind, same, 30s, of_files<start_again>},
+    {"sink.two-instances", "Two instances at work at a time do not mix their files.", kind, same, 30s,
+     of_files<two_instances>},
+    {"sink.stride", "Its files depend on pixels, not on what lies between rows.", kind, same, 30s, of_files<stride>},
+    {"sink.every-frame", "Once write has returned OK the frame is in a file.", kind, gate, 30s,
+     of_files<every_frame>},
+    {"sink.order", "Its frames are in order, each once: in a file, and in files by the number in their names.", kind,
+     same, 30s, of_files<order>},
+    {"sink.last-frame", "Its files at the end show the last frame.", kind, same, 30s, of_files<last_frame>},
+    {"sink.earlier-files", "Until its first frame it leaves an earlier run's files as they are.", kind, gate, 30s,
+     of_files<earlier_files>},
+    {"sink.no-place", "Where nothing can be written start says so.", kind, gate, 30s, of_files<no_place>},
+    {"sink.killed", "Killed at any moment it leaves no part of a file under the file's name.", kind, same, 60s,
+     of_files<killed>, true},
+    {"sink.restart", "Killed and started again, it keeps what was before and replaces the rest.", kind, gate, 60s,
+     of_files<restart>, true},
+    {"sink.full-disk", "Where the disk takes no more it says so, and leaves no part of a file.", kind, same, 60s,
+     of_files<full_disk>},
+    {"sink.slow-disk", "Where the disk takes its time the frame is in a file as well once write has returned OK.",
+     kind, "sink.every-frame", 60s, slow_disk},
+    {"sink.speed", "A small frame takes less than 100 ms on the median; a warning otherwise.", kind, gate, 120s,
+     speed},
+};
+
+} // namespace
+
+std::span<const Test> sink_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/source_run.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstring>
+
+namespace arhost::conformance {
+
+using ipc::Call;
+
+PlaneShape shape_of(const arhost_frame_format &format, std::uint32_t plane) {
+    switch (format.pixel_format) {
+    case ARHOST_PIXEL_FORMAT_RGB8:
+    case ARHOST_PIXEL_FORMAT_BGR8:
+        return {3 * format.width, format.height};
+    case ARHOST_PIXEL_FORMAT_YUYV:
+        return {2 * format.width, format.height};
+    case ARHOST_PIXEL_FORMAT_NV12:
+        return plane == 0 ? PlaneShape{format.width, format.height} : PlaneShape{format.width, format.height / 2};
+    case ARHOST_PIXEL_FORMAT_I420:
+        return plane == 0 ? PlaneShape{format.width, format.height} : PlaneShape{format.width / 2, format.height / 2};
+    default:
+        return {format.width, format.height};
+    }
+}
+
+std::string place_of(const arhost_frame_format &format, std::size_t index) {
+    std::uint32_t plane = 0;
+    PlaneShape shape = shape_of(format, plane);
+    while (index >= std::size_t{shape.row_bytes} * shape.rows) {
+        index -= std::size_t{shape.row_bytes} * shape.rows;
+        shape = shape_of(format, ++plane);
+    }
+    return fmt::format("plane {}, row {}, byte {}", plane, index / shape.row_bytes, index % shape.row_bytes);
+}
+
+Slot::Slot(std::size_t size) : size_(size), lines_((2 * guard_size + size + sizeof(Line) - 1) / sizeof(Line)) {
+    std::memset(lines_.front().bytes, guard, lines_.size() * sizeof(Line));
+}
+
+std::string Slot::damage() const {
+    const std::uint8_t *begin = lines_.front().bytes, *end = begin + lines_.size() * sizeof(Line);
+    for (const std::uint8_t *p = begin; p < data(); ++p)
+        if (*p != guard)
+            return fmt::format("{} bytes before the slot", data() - p);
+    for (const std::uint8_t *p = data() + size_; p < end; ++p)
+        if (*p != guard)
+            return fmt::format("byte {} of a slot of {}", p - data(), size_);
+    return {};
+}
+
+SourceRun::SourceRun(Context &context)
+    : library_(context.library), instance_(context.library),
+      functions_(*static_cast<const arhost_source *>(context.library.plugin().functions)) {
+    instance_->create_or_fail();
+}
+
+arhost_status SourceRun::try_start(const Wish &wish) {
+    stop();
+    if (!std::exchange(fresh_, false)) {
+        instance_.emplace(library_);
+        instance_->create_or_fail();
+    }
+    const arhost_source_setup setup{sizeof setup, 0, wish.first_sequence, wish.fps, wish.paced, wish.intrinsics};
+    properties_ = {};
+    properties_.struct_size = sizeof properties_;
+    properties_.format.struct_size = sizeof properties_.format;
+    properties_.intrinsics.struct_size = sizeof properties_.intrinsics;
+    next_ = wish.first_sequence;
+    const arhost_status status = in_call(library_.calls(), Call::start,
+                                         [&] { return functions_.start(instance_->get(), &setup, &properties_); });
+    started_ = status == ARHOST_STATUS_OK;
+    return status;
+}
+
+void SourceRun::accept(arhost_status started) {
+    instance_->expect_ok("start", started);
+    if (const std::string what = problem(); !what.empty())
+        throw Failure(what);
+    slot_.emplace(format().byte_size);
+}
+
+std::string SourceRun::problem() const {
+    const arhost_frame_format &f = properties_.format;
+    arhost_frame_format should = f;
+    if (f.pixel_format < ARHOST_PIXEL_FORMAT_GREY8 || f.pixel_format > ARHOST_PIXEL_FORMAT_I420)
+        return fmt::format("its pixel format is {}, which is none", f.pixel_format);
+    if (!arhost_frame_layout(&should))
+        return fmt::format("{}×{} is no size for its pixel format", f.width, f.height);
+    for (std::uint32_t plane = 0; plane < ARHOST_MAX_PLANES; ++plane)
+        if (f.stride[plane] != should.stride[plane] || f.offset[plane] != should.offset[plane])
+            return fmt::format(
+                "plane {} begins at byte {} and has a stride of {}; arhost_frame_layout says {} and {}", plane,
+                f.offset[plane], f.stride[plane], should.offset[plane], should.stride[plane]);
+    if (f.plane_count != should.plane_count || f.byte_size != should.byte_size ||
+        f.grey_offset != should.grey_offset || f.grey_stride != should.grey_stride)
+        return fmt::format("its slots have {} planes and {} bytes; arhost_frame_layout says {} and {}", f.plane_count,
+                           f.byte_size, should.plane_count, should.byte_size);
+    const bool is_yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
+    if (is_yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709))
+        return fmt::format("it has Y, U and V by the matrix {}, which is none", f.yuv_matrix);
+    if (is_yuv && (f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL))
+        return fmt::format("it has Y, U and V of the range {}, which is none", f.yuv_range);
+    if (!std::isfinite(f.fps) || f.fps < 0)
+        return fmt::format("it gives {} frames a second", f.fps);
+    return {};
+}
+
+void SourceRun::stop() {
+    if (std::exchange(started_, false))
+        in_call(library_.calls(), Call::stop, [&] { functions_.stop(instance_->get()); });
+}
+
+arhost_status SourceRun::try_read(bool filled) {
+    if (!filled)
+        std::memset(slot_->data(), 0, slot_->size());
+    arhost_frame_buffer buffer{};
+    buffer.struct_size = sizeof buffer;
+    buffer.format = &properties_.format;
+    for (std::uint32_t plane = 0; plane < format().plane_count; ++plane)
+        buffer.plane[plane] = slot_->data() + format().offset[plane];
+    buffer.grey = slot_->data() + format().grey_offset;
+    buffer.sequence = next_;
+    info_ = {};
+    info_.struct_size = sizeof info_;
+    const arhost_status status = in_call(library_.calls(), Call::per_frame,
+                                         [&] { return functions_.read(instance_->get(), &buffer, &info_); });
+    if (status == ARHOST_STATUS_OK)
+        next_ += std::uint64_t{1} + info_.skipped;
+    return status;
+}
+
+std::optional<Frame> SourceRun::read(bool filled) {
+    const arhost_status status = try_read(filled);
+    if (status == ARHOST_STATUS_END || status == ARHOST_STATUS_END_TRUNCATED)
+        return std::nullopt;
+    instance_->expect_ok("read", status);
+    return frame();
+}
+
+std::vector<Frame> SourceRun::read_up_to(std::size_t count) {
+    std::vector<Frame> frames;
+    while (frames.size() < count)
+        if (std::optional<Frame> frame = read())
+            frames.push_back(std::move(*frame));
+        else
+            break;
+    return frames;
+}
+
+Frame SourceRun::frame() const {
+    Frame frame{{}, info_};
+    for (std::uint32_t plane = 0; plane < format().plane_count; ++plane) {
+        const PlaneShape shape = shape_of(format(), plane);
+        for (std::uint32_t y = 0; y < shape.rows; ++y) {
+            const std::uint8_t *row =
+                slot_->data() + format().offset[plane] + std::size_t{format().stride[plane]} * y;
+            frame.pixels.insert(frame.pixels.end(), row, row + shape.row_bytes);
+        }
+    }
+    return frame;
+}
+
+} // namespace arhost::conformance

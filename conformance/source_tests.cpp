@@ -1,0 +1,496 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sources: frames as memory, their times, the end, and the same frames again.
+#include "conformance/cancelling.hpp"
+#include "conformance/frame_times.hpp"
+#include "conformance/process_usage.hpp"
+#include "conformance/source_run.hpp"
+#include "pixels/grey.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <iterator>
+#include <thread>
+
+namespace arhost::conformance {
+namespace {
+
+constexpr const char *is_live = "it is live: its frames are what the camera sees";
+
+// The two are the same frame: pixels and time.
+void expect_same(const SourceRun &run, const Frame &is, const Frame &should, const std::string &what) {
+    if (is.pixels.size() != should.pixels.size())
+        throw Failure(
+            fmt::format("{}: its pixels take {} bytes instead of {}", what, is.pixels.size(), should.pixels.size()));
+    const auto at = std::mismatch(is.pixels.begin(), is.pixels.end(), should.pixels.begin());
+    if (at.first != is.pixels.end())
+        throw Failure(fmt::format("{}: {} is {} instead of {}", what,
+                                  place_of(run.format(), static_cast<std::size_t>(at.first - is.pixels.begin())),
+                                  *at.first, *at.second));
+    if (is.info.capture_ns != should.info.capture_ns)
+        throw Failure(fmt::format("{}: its capture time is {} ns instead of {} ns", what, is.info.capture_ns,
+                                  should.info.capture_ns));
+}
+
+void expect_same(const SourceRun &run, const std::vector<Frame> &is, const std::vector<Frame> &should,
+                 const std::string &what) {
+    if (is.size() != should.size())
+        throw Failure(fmt::format("{}: there are {} frames instead of {}", what, is.size(), should.size()));
+    for (std::size_t i = 0; i < is.size(); ++i)
+        expect_same(run, is[i], should[i], fmt::format("{}: frame {}", what, i));
+}
+
+std::int64_t now_ns() {
+    timespec now{};
+    ::clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
+}
+
+bool is_refusal(arhost_status status) {
+    return status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION;
+}
+
+// At this rate, or at its own where it refuses that.
+void start_at(SourceRun &run, double fps, bool paced, std::uint64_t first = 0) {
+    const arhost_status status = run.try_start({first, fps, paced, nullptr});
+    run.accept(is_refusal(status) ? run.try_start({first, 0, paced, nullptr}) : status);
+}
+
+// ---- From start to stop ----------------------------------------------------------------------------
+
+void start(Context &context) {
+    SourceRun run(context);
+    const arhost_status status = run.try_start();
+    if (const char *const *needs = context.library.descriptor().needs; needs && *needs && status < 0)
+        throw Skip(fmt::format("it needs '{}', and {}", *needs, told("start", status, run.instance().host())));
+    run.accept(status);
+}
+
+void read(Context &context) {
+    SourceRun run(context);
+    run.start();
+    const std::optional<Frame> frame = run.read();
+    if (!frame)
+        throw Failure("it is at its end before its first frame");
+    if (frame->info.clock != ARHOST_CLOCK_MONOTONIC && frame->info.clock != ARHOST_CLOCK_MEDIA)
+        throw Failure(fmt::format("its clock is {}, which is none", frame->info.clock));
+}
+
+void start_again(Context &context) {
+    constexpr std::size_t count = 3;
+    SourceRun run(context);
+    run.start();
+    const std::vector<Frame> first = run.read_up_to(count);
+    run.start();
+    const std::vector<Frame> second = run.read_up_to(count);
+    if (second.empty())
+        throw Failure("started again, it is at its end before its first frame");
+    if (!run.is_live())
+        expect_same(run, second, first, "started again");
+}
+
+void leaks(Context &context) {
+    SourceRun run(context);
+    expect_no_leak([&](int frames) {
+        run.start();
+        for (int frame = 0; frame < frames && run.try_read() == ARHOST_STATUS_OK; ++frame) {
+        }
+        run.stop();
+    });
+}
+
+// ---- Memory ----------------------------------------------------------------------------------------
+
+void writes_every_pixel(Context &context) {
+    // A byte is as it was before by chance once in 256 times, so in all of these hardly ever.
+    constexpr int attempts = 6;
+    SourceRun run(context);
+    run.start();
+    std::vector<bool> kept, kept_grey;
+    bool has_grey = true;
+    for (int i = 0; i < attempts; ++i) {
+        Slot &slot = run.slot();
+        std::generate_n(slot.data(), slot.size(), [&] { return static_cast<std::uint8_t>(context.random() >> 24); });
+        const std::vector<std::uint8_t> before = run.frame().pixels, all(slot.data(), slot.data() + slot.size());
+        std::optional<Frame> frame = run.read(true);
+        if (!frame && i > 0) { // it is short: from its start again
+            run.start();
+            --i;
+            continue;
+        }
+        if (!frame)
+            throw Failure("it is at its end before its first frame");
+        kept.resize(before.size(), true);
+        for (std::size_t k = 0; k < before.size(); ++k)
+            kept[k] = kept[k] && frame->pixels[k] == before[k];
+        has_grey = has_grey && frame->info.has_grey;
+        kept_grey.resize(std::size_t{run.format().width} * run.format().height, true);
+        for (std::size_t k = 0; k < kept_grey.size(); ++k) {
+            const std::size_t at =
+                run.format().grey_offset + k / run.format().width * run.format().grey_stride + k % run.format().width;
+            kept_grey[k] = kept_grey[k] && run.slot().data()[at] == all[at];
+        }
+    }
+    if (const auto at = std::find(kept.begin(), kept.end(), true); at != kept.end())
+        throw Failure(fmt::format("in each of {} frames, {} of {} bytes keep what was there before, the first is {}",
+                                  attempts, std::count(kept.begin(), kept.end(), true), kept.size(),
+                                  place_of(run.format(), static_cast<std::size_t>(at - kept.begin()))));
+    if (has_grey && std::find(kept_grey.begin(), kept_grey.end(), true) != kept_grey.end())
+        throw Failure(fmt::format("it tells that it has written the grey plane, but {} of its {} bytes keep what was "
+                                  "there before",
+                                  std::count(kept_grey.begin(), kept_grey.end(), true), kept_grey.size()));
+}
+
+void writes_nothing_else(Context &context) {
+    SourceRun run(context);
+    run.start();
+    run.read_up_to(4);
+    if (const std::string damage = run.slot().damage(); !damage.empty())
+        throw Failure("it wrote " + damage);
+}
+
+void grey(Context &context) {
+    SourceRun run(context);
+    run.start();
+    const std::optional<Frame> frame = run.read();
+    const arhost_frame_format &format = run.format();
+    if (!frame || !frame->info.has_grey || format.grey_offset == 0)
+        throw Skip("it leaves the grey plane to arhost");
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
+    for (std::uint32_t i = 0; i < format.plane_count; ++i)
+        planes[i] = run.slot().data() + format.offset[i];
+    std::vector<std::uint8_t> should(std::size_t{format.grey_stride} * format.height);
+    fill_grey_reference(format, planes, should.data());
+    constexpr int tolerance = 3; // other roundings
+    for (std::uint32_t y = 0; y < format.height; ++y)
+        for (std::uint32_t x = 0; x < format.width; ++x) {
+            const std::size_t at = std::size_t{format.grey_stride} * y + x;
+            if (const int is = run.slot().data()[format.grey_offset + at]; std::abs(is - should[at]) > tolerance)
+                throw Failure(
+                    fmt::format("pixel ({}, {}): its grey is {}, and by its colour it is {}", x, y, is, should[at]));
+        }
+}
+
+// ---- Time ------------------------------------------------------------------------------------------
+
+void times(Context &context) {
+    constexpr std::size_t count = 20;
+    SourceRun run(context);
+    const std::int64_t begin_ns = now_ns();
+    run.start();
+    const std::vector<Frame> frames = run.read_up_to(count);
+    const std::int64_t end_ns = now_ns();
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const arhost_frame_info &info = frames[i].info;
+        if (info.clock != frames[0].info.clock)
+            throw Failure(fmt::format("frame {} has the clock {}, those before it had {}", i, info.clock,
+                                      frames[0].info.clock));
+        if (i > 0 && info.capture_ns < frames[i - 1].info.capture_ns)
+            throw Failure(fmt::format("frame {} is of {} ns, before the one before it, which is of {} ns", i,
+                                      info.capture_ns, frames[i - 1].info.capture_ns));
+        // A camera's exposure may have been long ago where frames wait in buffers.
+        constexpr std::int64_t buffered_ns = 10'000'000'000;
+        if (info.clock == ARHOST_CLOCK_MONOTONIC &&
+            (info.capture_ns < begin_ns - buffered_ns || info.capture_ns > end_ns))
+            throw Failure(fmt::format("frame {} was captured {:.1f} s after the source was started, by its time", i,
+                                      static_cast<double>(info.capture_ns - begin_ns) / 1e9));
+        if (info.clock == ARHOST_CLOCK_MEDIA && info.capture_ns < 0)
+            throw Failure(fmt::format("frame {} is of {} ns, before the beginning", i, info.capture_ns));
+    }
+    if (frames.size() < 2 || run.is_live() || run.format().fps == 0)
+        return;
+    double periods = 0; // those of skipped frames too
+    for (std::size_t i = 1; i < frames.size(); ++i)
+        periods += 1.0 + frames[i].info.skipped;
+    const double period_ns =
+        static_cast<double>(frames.back().info.capture_ns - frames.front().info.capture_ns) / periods;
+    // A film's frames need not be evenly spaced.
+    constexpr double factor = 4;
+    if (const double nominal_ns = 1e9 / run.format().fps;
+        period_ns > factor * nominal_ns || period_ns < nominal_ns / factor)
+        throw Failure(fmt::format("from frame to frame it is {:.3f} ms, and with its {} frames a second it should be "
+                                  "{:.3f} ms",
+                                  period_ns / 1e6, run.format().fps, nominal_ns / 1e6));
+}
+
+void rate(Context &context) {
+    SourceRun run(context);
+    if (run.is_live())
+        throw Skip(is_live);
+    std::string refused, reason;
+    bool given = false;
+    for (const double fps : {10.0, 48.0}) {
+        const arhost_status status = run.try_start({0, fps, false, nullptr});
+        if (is_refusal(status)) {
+            refused += fmt::format("{}{}", refused.empty() ? "" : " and ", fps);
+            reason = told("start", status, run.instance().host());
+            continue;
+        }
+        run.accept(status);
+        if (run.format().fps != fps)
+            throw Failure(
+                fmt::format("asked for {} frames a second, it says that it gives {}", fps, run.format().fps));
+        const std::vector<Frame> frames = run.read_up_to(4);
+        for (std::size_t i = 1; i < frames.size(); ++i) {
+            const double ms = static_cast<double>(frames[i].info.capture_ns - frames[i - 1].info.capture_ns) / 1e6;
+            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of the files' clocks
+                throw Failure(fmt::format(
+                    "asked for {} frames a second, frame {} comes {:.3f} ms after the one before", fps, i, ms));
+        }
+        given = true;
+    }
+    if (!given)
+        throw Skip(fmt::format("it refuses {} frames a second: {}", refused, reason));
+    if (!refused.empty())
+        context.note = fmt::format("it refuses {} frames a second", refused);
+}
+
+void late_reader(Context &context) {
+    SourceRun in_time(context), run(context);
+    if (run.is_live())
+        throw Skip(is_live);
+    constexpr double fps = 50;
+    start_at(run, fps, true);
+    std::vector<Frame> frames = run.read_up_to(2);
+    std::this_thread::sleep_for(200ms);
+    constexpr std::size_t count = 3;
+    std::vector<Frame> late = run.read_up_to(count);
+    std::move(late.begin(), late.end(), std::back_inserter(frames));
+    const std::size_t without_restart = frames.size();
+    if (run.can_seek() && late.size() == count) { // as after a death; not at its end
+        start_at(run, fps, true, run.next());
+        if (std::optional<Frame> frame = run.read())
+            frames.push_back(std::move(*frame));
+    }
+    start_at(in_time, fps, false);
+    std::optional<Frame> should = in_time.read();
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        while (should && should->info.capture_ns < frames[i].info.capture_ns)
+            should = in_time.read();
+        if (!should)
+            throw Failure(fmt::format("in mode live, read late, it gives a frame of {} ns, which without haste there "
+                                      "is not",
+                                      frames[i].info.capture_ns));
+        const bool is_restarted = i >= without_restart;
+        expect_same(run, frames[i], *should,
+                    is_restarted
+                        ? "in mode live, read late and started again behind the frames given and skipped, its "
+                          "first frame"
+                        : fmt::format("in mode live, read late, frame {}", i));
+    }
+}
+
+// ---- The end ---------------------------------------------------------------------------------------
+
+void end(Context &context) {
+    constexpr std::uint64_t most = 400; // frames to read
+    SourceRun run(context);
+    run.start();
+    const std::uint64_t count = run.properties().frame_count;
+    const std::uint64_t first = run.can_seek() && count > 3 ? count - 3 : 0;
+    if (run.is_live() || count == 0 || count - first > most)
+        throw Skip(run.is_live() ? is_live
+                   : count == 0  ? "it does not tell how many frames there are"
+                                 : "it has too many frames to read them all, and can't seek");
+    run.start({first, 0, false, nullptr});
+    for (std::uint64_t i = first; i < count; ++i)
+        if (!run.read())
+            throw Failure(fmt::format("it has {} frames, says start, but ends before frame {}", count, i));
+    const arhost_status status = run.try_read();
+    if (status != ARHOST_STATUS_END && status != ARHOST_STATUS_END_TRUNCATED)
+        throw Failure(fmt::format("it has {} frames, says start, but after them {}", count,
+                                  told("read", status, run.instance().host())));
+    for (int again = 0; again < 3; ++again)
+        if (const arhost_status then = run.try_read(); then != status)
+            throw Failure(fmt::format("at the end read returned {}, and asked again {}", status_name(status),
+                                      status_name(then)));
+}
+
+// ---- The same frames again -------------------------------------------------------------------------
+
+void deterministic(Context &context) {
+    constexpr std::size_t count = 4;
+    SourceRun run(context), other(context);
+    if (run.is_live())
+        throw Skip(is_live);
+    run.start();
+    const std::vector<Frame> first = run.read_up_to(count);
+    run.stop();
+    other.start();
+    expect_same(run, other.read_up_to(count), first, "in another instance");
+}
+
+void two_instances(Context &context) {
+    SourceRun first(context), second(context), alone(context);
+    if (first.is_live())
+        throw Skip(is_live);
+    alone.start();
+    const std::vector<Frame> should = alone.read_up_to(3);
+    alone.stop();
+    first.start();
+    second.start();
+    for (std::size_t i = 0; i < should.size(); ++i)
+        for (SourceRun *run : {&first, &second}) {
+            const std::optional<Frame> frame = run->read();
+            if (!frame)
+                throw Failure(fmt::format("of two instances that are read by turns, one ends before frame {}", i));
+            expect_same(*run, *frame, should[i], fmt::format("of two instances that are read by turns, frame {}", i));
+        }
+}
+
+void seek(Context &context) {
+    SourceRun run(context);
+    if (!run.can_seek())
+        throw Skip("ARHOST_CAPABILITY_SEEK is not declared");
+    run.start();
+    const std::vector<Frame> frames = run.read_up_to(8);
+    for (const std::size_t first : {std::size_t{1}, std::size_t{5}}) {
+        if (first >= frames.size())
+            continue;
+        run.start({first, 0, false, nullptr});
+        for (std::size_t i = first; i < std::min(first + 3, frames.size()); ++i) {
+            const std::optional<Frame> frame = run.read();
+            if (!frame)
+                throw Failure(fmt::format("started at frame {}, it ends before frame {}", first, i));
+            expect_same(run, *frame, frames[i], fmt::format("started at frame {}, frame {}", first, i));
+        }
+    }
+}
+
+// ---- Cancelling ------------------------------------------------------------------------------------
+
+void cancelled(Context &context) {
+    SourceRun running(context);
+    running.start();
+    running.instance().host().cancel();
+    const arhost_status status = running.try_read();
+    expect_ok_or_cancelled("read", status == ARHOST_STATUS_END ? ARHOST_STATUS_OK : status);
+    running.stop();
+    SourceRun starting(context);
+    starting.instance().host().cancel();
+    expect_ok_or_cancelled("start", starting.try_start());
+}
+
+void cancel_while_waiting(Context &context) {
+    SourceRun run(context);
+    constexpr double fps = 0.01; // the second frame is due in 100 s, long after this test's time
+    start_at(run, fps, true);
+    if (run.format().fps != fps)
+        context.note = fmt::format("it refuses {} frames a second: cancelled at its own {}", fps, run.format().fps);
+    expect_to_be_cancelled(context, run.instance().host(), "read", [&] { return run.try_read(); });
+}
+
+// ---- What it tells of its camera -------------------------------------------------------------------
+
+void intrinsics(Context &context) {
+    SourceRun run(context);
+    run.start();
+    if (!run.properties().has_intrinsics)
+        throw Skip("it does not know its camera");
+    const arhost_intrinsics &camera = run.properties().intrinsics;
+    const arhost_frame_format &format = run.format();
+    if (camera.width != format.width || camera.height != format.height)
+        throw Failure(fmt::format("its camera has {}×{} px and its frames {}×{}", camera.width, camera.height,
+                                  format.width, format.height));
+    if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
+        throw Failure(fmt::format("its focal lengths are {} and {} px", camera.fx, camera.fy));
+    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // outside of the frames is fine: they may be a part
+        throw Failure(fmt::format("its principal point is ({}, {})", camera.cx, camera.cy));
+    const std::uint32_t n = camera.coefficient_count;
+    const bool fits = (camera.distortion == ARHOST_DISTORTION_NONE && n == 0) ||
+                      (camera.distortion == ARHOST_DISTORTION_BROWN && (n == 4 || n == 5 || n == 8 || n == 12)) ||
+                      (camera.distortion == ARHOST_DISTORTION_FISHEYE && n == 4);
+    if (!fits)
+        throw Failure(fmt::format("its lens is of the kind {} with {} coefficients", camera.distortion, n));
+    for (std::uint32_t i = 0; i < n; ++i)
+        if (!std::isfinite(camera.coefficients[i]))
+            throw Failure(fmt::format("coefficient {} of its lens is not finite", i));
+}
+
+void truth(Context &context) {
+    SourceRun run(context);
+    run.start();
+    bool has_truth = false;
+    for (const Frame &frame : run.read_up_to(4)) {
+        if (!frame.info.has_truth)
+            continue;
+        has_truth = true;
+        const double *m = frame.info.true_mt; // column-major
+        if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
+            throw Failure(fmt::format("the last row of its true pose is {} {} {} {}, and must be 0 0 0 1", m[3], m[7],
+                                      m[11], m[15]));
+        double worst = 0;
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b) {
+                const double dot = m[4 * a] * m[4 * b] + m[4 * a + 1] * m[4 * b + 1] + m[4 * a + 2] * m[4 * b + 2];
+                worst = std::max(worst, std::abs(dot - (a == b)));
+            }
+        if (!(worst < 1e-9))
+            throw Failure(fmt::format("the rotation of its true pose is {:.2g} from an orthonormal one", worst));
+        if (!(m[14] < 0))
+            throw Failure(
+                fmt::format("the marker of its true pose is at z = {} mm; what the camera sees is before it, "
+                            "where z is negative",
+                            m[14]));
+    }
+    if (!has_truth)
+        throw Skip("it does not know the markers' poses");
+}
+
+void speed(Context &context) {
+    SourceRun run(context);
+    run.start();
+    const std::uint64_t count = run.properties().frame_count; // its end is no frame
+    std::uint64_t next = 0;
+    const std::vector<double> ms =
+        frame_times_ms([&] { return (count == 0 || next++ < count) && run.try_read() == ARHOST_STATUS_OK; });
+    if (ms.empty())
+        throw Skip("it gives no frame");
+    judge_speed(context, run.format().width, run.format().height, ms, 100);
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_SOURCE;
+constexpr const char *gate = "source.read";
+constexpr Test tests[] = {
+    {"source.start", "It starts with a format of the ABI's, laid out as the ABI says, and stops.", kind, "abi.create",
+     30s, start},
+    {"source.read", "It gives a frame and names its clock.", kind, "source.start", 30s, read},
+    {"source.deterministic", "Another instance gives the same frames at the same times; not of live ones.", kind,
+     gate, 30s, deterministic},
+    {"source.start-again", "Once it has been stopped another instance starts, and gives the same frames.", kind, gate,
+     30s, start_again},
+    {"source.two-instances", "Two instances that are read by turns give the frames of one alone; not of live ones.",
+     kind, "source.deterministic", 30s, two_instances},
+    {"source.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
+     120s, leaks},
+    {"source.writes-every-pixel", "Every pixel of a frame is written, whatever was there.", kind, gate, 30s,
+     writes_every_pixel},
+    {"source.writes-nothing-else", "No byte before or behind the slot is written.", kind, gate, 30s,
+     writes_nothing_else},
+    {"source.grey", "A grey plane that it writes is the frame's luma.", kind, gate, 30s, grey},
+    {"source.times", "Capture times never go back, and are about of the rate that it tells.", kind, gate, 30s, times},
+    {"source.rate", "One that is not live gives as many frames a second as it is asked for, or refuses.", kind, gate,
+     30s, rate},
+    {"source.late-reader", "In mode live a late reader gets the frames of their times, also after a restart.", kind,
+     "source.deterministic", 30s, late_reader},
+    {"source.end", "It has as many frames as it tells, and once at its end it stays there.", kind, gate, 60s, end},
+    {"source.seek", "Started at any frame, it gives the frames of an uninterrupted run.", kind, gate, 30s, seek},
+    {"source.cancelled", "Cancelled before, start and read return soon, OK or CANCELLED.", kind, gate, 20s,
+     cancelled},
+    {"source.cancel-while-waiting", "Cancelled while it waits for a frame, read returns within 2 s.", kind, gate, 20s,
+     cancel_while_waiting},
+    {"source.intrinsics", "The camera that it tells is one, and has the frames' size.", kind, gate, 20s, intrinsics},
+    {"source.truth", "The true pose that it tells is rigid and before the camera.", kind, gate, 20s, truth},
+    {"source.speed", "A frame takes less than 100 ms on the median; a warning otherwise.", kind, gate, 60s, speed},
+};
+
+} // namespace
+
+std::span<const Test> source_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/tracer.hpp"
+
+#include "base/unique_fd.hpp"
+
+#include <algorithm>
+#include <sys/mman.h>
+#include <tuple>
+
+namespace arhost::conformance {
+
+using ipc::Call;
+
+namespace {
+
+bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
+    return std::tie(a.width, a.height, a.distortion, a.fx, a.fy, a.cx, a.cy) ==
+               std::tie(b.width, b.height, b.distortion, b.fx, b.fy, b.cx, b.cy) &&
+           std::equal(std::begin(a.coefficients), std::end(a.coefficients), std::begin(b.coefficients));
+}
+
+} // namespace
+
+SealedScene::SealedScene(scene::ArenaBuilder builder) : memory_(nullptr), size_(builder.byte_size()) {
+    memory_ = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory_ == MAP_FAILED)
+        base::throw_errno("mmap of a scene");
+    const std::span<std::byte> bytes(static_cast<std::byte *>(memory_), size_);
+    std::move(builder).write(bytes);
+    if (const std::string problem = scene::validate(bytes); !problem.empty())
+        throw std::runtime_error("the test's scene is not valid: " + problem);
+    ::mprotect(memory_, size_, PROT_READ);
+}
+
+SealedScene::~SealedScene() {
+    if (memory_)
+        ::munmap(memory_, size_);
+}
+
+Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides)
+    : instance_(context.library, std::move(overrides)), scene_(std::move(builder)),
+      functions_(*static_cast<const arhost_raytracer *>(context.library.plugin().functions)) {
+    instance_.create_or_fail();
+}
+
+arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
+    stop();
+    const arhost_raytracer_setup setup{sizeof setup,   intrinsics.width, intrinsics.height, 0,
+                                       &scene_->get(), &intrinsics};
+    const arhost_status status =
+        in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
+    if (status == ARHOST_STATUS_OK)
+        started_ = intrinsics;
+    return status;
+}
+
+void Tracer::start(const arhost_intrinsics &intrinsics) {
+    instance_.expect_ok("start", try_start(intrinsics));
+}
+
+void Tracer::stop() {
+    if (std::exchange(started_, std::nullopt))
+        in_call(instance_.library().calls(), Call::stop, [&] { functions_.stop(instance_.get()); });
+}
+
+void Tracer::change_scene(scene::ArenaBuilder builder) {
+    stop();
+    scene_.emplace(std::move(builder));
+}
+
+arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
+                                 const arhost_motion *motion) {
+    const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
+    slot_ = picture; // of the same size as the one before, and so at its place
+    const arhost_image image = slot_->image();
+    info = {};
+    info.struct_size = sizeof info;
+    const auto begin = std::chrono::steady_clock::now();
+    const arhost_status status = in_call(instance_.library().calls(), Call::per_frame,
+                                         [&] { return functions_.render(instance_.get(), &request, &image, &info); });
+    took_ = std::chrono::steady_clock::now() - begin;
+    picture = *slot_;
+    return status;
+}
+
+Picture Tracer::render(const arhost_camera &camera, const arhost_motion *motion, std::uint8_t fill) {
+    if (!started_ || !same(*started_, camera.intrinsics))
+        start(camera.intrinsics);
+    Picture picture(camera.intrinsics.width, camera.intrinsics.height, fill);
+    instance_.expect_ok("render", try_render(camera, picture, info_, motion));
+    return picture;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A ray tracer at work on a scene.
+#pragma once
+
+#include "conformance/picture.hpp"
+#include "conformance/plugin_library.hpp"
+#include "conformance/scenes.hpp"
+#include "conformance/test.hpp"
+#include "scene/arena.hpp"
+
+#include <chrono>
+#include <optional>
+
+namespace arhost::conformance {
+
+// A scene in memory that can't be written, as the host's is: who tries, crashes.
+class SealedScene {
+public:
+    explicit SealedScene(scene::ArenaBuilder builder);
+    ~SealedScene();
+    SealedScene(SealedScene &&other) noexcept
+        : memory_(std::exchange(other.memory_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+    SealedScene &operator=(SealedScene &&) = delete;
+    const arhost_scene &get() const { return *static_cast<const arhost_scene *>(memory_); }
+
+private:
+    void *memory_;
+    std::size_t size_;
+};
+
+class Tracer {
+public:
+    Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides = {});
+    ~Tracer() { stop(); }
+    Tracer(const Tracer &) = delete;
+    Tracer &operator=(const Tracer &) = delete;
+
+    arhost_status try_start(const arhost_intrinsics &intrinsics);
+    void start(const arhost_intrinsics &intrinsics); // throws Failure unless it succeeds
+    void stop();
+    void change_scene(scene::ArenaBuilder builder); // stops
+    arhost_status try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
+                             const arhost_motion *motion = nullptr);
+
+    // Started if need be. Throws Failure unless it succeeds.
+    Picture render(const arhost_camera &camera, const arhost_motion *motion = nullptr, std::uint8_t fill = 0);
+
+    Instance &instance() { return instance_; }
+    const arhost_render_info &info() const { return info_; } // of the last render
+    std::chrono::nanoseconds took() const { return took_; }  // the last call of render
+
+private:
+    Instance instance_;
+    std::optional<SealedScene> scene_; // ends after a stop
+    const arhost_raytracer &functions_;
+    std::optional<arhost_intrinsics> started_;
+    std::optional<Picture> slot_; // where all images are written from start to stop
+    arhost_render_info info_{};
+    std::chrono::nanoseconds took_{};
+};
+
+} // namespace arhost::conformance

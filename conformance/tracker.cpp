@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "conformance/tracker.hpp"
+
+#include "base/unique_fd.hpp"
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <glm/trigonometric.hpp>
+
+#include <algorithm>
+#include <cstring>
+#include <sys/mman.h>
+#include <unistd.h>
+
+namespace arhost::conformance {
+
+using ipc::Call;
+
+GuardedMemory::GuardedMemory(std::size_t size) {
+    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    byte_size_ = (size + page - 1) / page * page + 2 * page;
+    void *address = ::mmap(nullptr, byte_size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (address == MAP_FAILED)
+        base::throw_errno("mmap");
+    pages_ = static_cast<std::byte *>(address);
+    data_ = pages_ + byte_size_ - page - size;
+    ::mprotect(pages_, page, PROT_NONE);
+    ::mprotect(pages_ + byte_size_ - page, page, PROT_NONE);
+}
+
+GuardedMemory::~GuardedMemory() {
+    ::munmap(pages_, byte_size_);
+}
+
+void GuardedMemory::seal() {
+    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    ::mprotect(pages_ + page, byte_size_ - 2 * page, PROT_READ);
+}
+
+arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_pixel_format pixel_format) {
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = pixel_format;
+    format.width = width;
+    format.height = height;
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT709;
+    format.yuv_range = ARHOST_YUV_RANGE_FULL;
+    format.fps = 30;
+    if (!arhost_frame_layout(&format))
+        throw std::runtime_error("the test's frame has no layout");
+    return format;
+}
+
+SealedFrame::SealedFrame(const Grey &image, arhost_pixel_format pixel_format, std::uint64_t filler)
+    : format_(format_of(image.width, image.height, pixel_format)), memory_(format_.byte_size) {
+    auto *bytes = reinterpret_cast<std::uint8_t *>(memory_.data());
+    std::mt19937_64 noise(filler);
+    std::generate_n(bytes, format_.byte_size, [&] { return static_cast<std::uint8_t>(noise()); });
+    const auto put = [&](std::uint64_t offset, std::uint32_t stride, std::uint32_t x, std::uint32_t y, int code) {
+        bytes[offset + std::uint64_t{stride} * y + x] = static_cast<std::uint8_t>(code);
+    };
+    for (std::uint32_t y = 0; y < image.height; ++y)
+        for (std::uint32_t x = 0; x < image.width; ++x) {
+            const int code = image.at(x, y);
+            put(format_.grey_offset, format_.grey_stride, x, y, code);
+            if (pixel_format == ARHOST_PIXEL_FORMAT_BGR8 || pixel_format == ARHOST_PIXEL_FORMAT_RGB8)
+                for (std::uint32_t channel = 0; channel < 3; ++channel)
+                    put(format_.offset[0], format_.stride[0], 3 * x + channel, y, code);
+            if (pixel_format == ARHOST_PIXEL_FORMAT_YUYV) {
+                put(format_.offset[0], format_.stride[0], 2 * x, y, code);
+                put(format_.offset[0], format_.stride[0], 2 * x + 1, y, 128);
+            }
+        }
+    memory_.seal();
+}
+
+arhost_frame SealedFrame::frame(std::uint64_t sequence, std::int64_t capture_ns) const {
+    const auto *bytes = reinterpret_cast<const std::uint8_t *>(memory_.data());
+    arhost_frame frame{};
+    frame.struct_size = sizeof frame;
+    frame.clock = ARHOST_CLOCK_MEDIA;
+    frame.format = &format_;
+    for (std::uint32_t i = 0; i < format_.plane_count; ++i)
+        frame.plane[i] = bytes + format_.offset[i];
+    frame.grey = bytes + format_.grey_offset;
+    frame.sequence = sequence;
+    frame.capture_ns = capture_ns;
+    return frame;
+}
+
+Tracker::Tracker(Context &context, Settings overrides)
+    : library_(context.library), overrides_(std::move(overrides)),
+      functions_(*static_cast<const arhost_tracker *>(context.library.plugin().functions)),
+      result_memory_(sizeof(arhost_tracker_result)) {
+    create();
+}
+
+void Tracker::create() {
+    instance_.emplace(library_, overrides_);
+    instance_->create_or_fail();
+}
+
+arhost_status Tracker::try_start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
+                                 arhost_pixel_format pixel_format) {
+    camera_ = camera;
+    listed_ = listed;
+    format_ = pixel_format;
+    std::vector<arhost_marker_config> markers;
+    markers.reserve(listed.size());
+    for (const Listed &marker : listed)
+        markers.push_back({sizeof(arhost_marker_config), marker.id, marker.side_mm});
+    const arhost_frame_format format = format_of(camera.width, camera.height, pixel_format);
+    return start_with(
+        {sizeof(arhost_tracker_setup), static_cast<std::uint32_t>(markers.size()), &format, &camera, markers.data()});
+}
+
+arhost_status Tracker::start_with(const arhost_tracker_setup &setup) {
+    stop();
+    if (!std::exchange(fresh_, false))
+        create();
+    const arhost_status status =
+        in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
+    started_ = status == ARHOST_STATUS_OK;
+    sequence_ = 0;
+    return status;
+}
+
+void Tracker::start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
+                    arhost_pixel_format pixel_format) {
+    instance_->expect_ok("start", try_start(camera, listed, pixel_format));
+}
+
+void Tracker::stop() {
+    if (std::exchange(started_, false))
+        in_call(library_.calls(), Call::stop, [&] { functions_.stop(instance_->get()); });
+}
+
+arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns) {
+    auto *result = new (result_memory_.data()) arhost_tracker_result{};
+    result->struct_size = sizeof *result;
+    const arhost_frame given = frame.frame(sequence, capture_ns);
+    return in_call(library_.calls(), Call::per_frame,
+                   [&] { return functions_.track(instance_->get(), &given, result); });
+}
+
+std::vector<arhost_marker> Tracker::records() const {
+    const auto &result = *reinterpret_cast<const arhost_tracker_result *>(result_memory_.data());
+    if (result.marker_count > ARHOST_MAX_MARKERS)
+        throw Failure(
+            fmt::format("it reports {} markers; {} are the most", result.marker_count, +ARHOST_MAX_MARKERS));
+    return {result.markers, result.markers + result.marker_count};
+}
+
+std::vector<arhost_marker> Tracker::seen() const {
+    std::vector<arhost_marker> all = records();
+    std::erase_if(all, [](const arhost_marker &marker) {
+        const bool is_smoothed = marker.state == ARHOST_MARKER_PREDICTED && marker.age_frames == 0;
+        return marker.state != ARHOST_MARKER_DETECTED && !is_smoothed;
+    });
+    return all;
+}
+
+std::vector<arhost_marker> Tracker::track(const SealedFrame &frame) {
+    instance_->expect_ok("track", try_track(frame, sequence_, static_cast<std::int64_t>(sequence_) * frame_ns));
+    ++sequence_;
+    return seen();
+}
+
+std::vector<arhost_marker> Tracker::look(const SealedFrame &frame) {
+    if (sequence_ > 0)
+        start(camera_, listed_, format_);
+    return track(frame);
+}
+
+// ---- Expectations ----------------------------------------------------------------------------------
+
+Pose pose_of(const arhost_marker &marker) {
+    return glm::make_mat4(marker.mt);
+}
+
+double angle_degrees(const Pose &a, const Pose &b) {
+    const glm::dmat3 between = glm::transpose(glm::dmat3(a)) * glm::dmat3(b);
+    return glm::degrees(std::acos(std::clamp((between[0][0] + between[1][1] + between[2][2] - 1) / 2, -1.0, 1.0)));
+}
+
+arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
+                         const Grey &image) {
+    if (found.size() != 1)
+        throw Failure(fmt::format("{}, {} markers are seen and must be one", where, found.size()))
+            .with("frame", image.picture());
+    if (found[0].id != id)
+        throw Failure(fmt::format("{}, marker {} is reported and {} is in view", where, found[0].id, id))
+            .with("frame", image.picture());
+    return found[0];
+}
+
+void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,
+                 const Grey &image) {
+    const Pose is = pose_of(marker);
+    const glm::dvec3 at = is[3], must = should[3];
+    const double off = glm::distance(at, must) / glm::length(must);
+    if (!(off <= bounds.share))
+        throw Failure(fmt::format("{}, marker {} is at ({:.2f}, {:.2f}, {:.2f}) mm and must be at ({:.2f}, {:.2f}, "
+                                  "{:.2f}): {:.2f} % of the distance off, {} % are allowed",
+                                  where, marker.id, at.x, at.y, at.z, must.x, must.y, must.z, 100 * off,
+                                  100 * bounds.share))
+            .with("frame", image.picture());
+    if (const double turned = angle_degrees(is, should); !(turned <= bounds.degrees))
+        throw Failure(fmt::format("{}, marker {} is turned by {:.2f}° against the truth; {}° are allowed", where,
+                                  marker.id, turned, bounds.degrees))
+            .with("frame", image.picture());
+}
+
+void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image) {
+    if (!found.empty())
+        throw Failure(fmt::format("{}, marker {} is seen", where, found[0].id)).with("frame", image.picture());
+}
+
+void expect_found(Tracker &tracker, const Placed &marker, const Grey &image, const Bounds &bounds,
+                  const std::string &where) {
+    expect_pose(expect_one(tracker.look(image), marker.print.id, where, image), marker.camera_from_marker, bounds,
+                where, image);
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A tracker at work on frames of printed markers.
+#pragma once
+
+#include "conformance/plugin_library.hpp"
+#include "conformance/prints.hpp"
+#include "conformance/scenes.hpp"
+#include "conformance/test.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace arhost::conformance {
+
+// Memory whose neighbours can be neither read nor written: before, up to a page's start, and behind.
+class GuardedMemory {
+public:
+    explicit GuardedMemory(std::size_t size);
+    ~GuardedMemory();
+    GuardedMemory(const GuardedMemory &) = delete;
+    GuardedMemory &operator=(const GuardedMemory &) = delete;
+    std::byte *data() const { return data_; }
+    void seal(); // from here on it can't be written
+
+private:
+    std::byte *pages_, *data_;
+    std::size_t byte_size_; // of the pages
+};
+
+// A frame in memory that can't be written. What is in no pixel is noise, chosen by `filler`.
+class SealedFrame {
+public:
+    SealedFrame(const Grey &image, arhost_pixel_format format, std::uint64_t filler = 1);
+    arhost_frame frame(std::uint64_t sequence, std::int64_t capture_ns) const;
+
+private:
+    arhost_frame_format format_;
+    GuardedMemory memory_;
+};
+
+arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_pixel_format format);
+
+struct Listed { // in the configuration
+    int id;
+    double side_mm;
+};
+
+// An instance is started once: another start makes another one.
+class Tracker {
+public:
+    explicit Tracker(Context &context, Settings overrides = {});
+    ~Tracker() { stop(); }
+    Tracker(const Tracker &) = delete;
+    Tracker &operator=(const Tracker &) = delete;
+
+    arhost_status try_start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
+                            arhost_pixel_format format = ARHOST_PIXEL_FORMAT_GREY8);
+    // Throws Failure unless it succeeds.
+    void start(const arhost_intrinsics &camera, const std::vector<Listed> &listed,
+               arhost_pixel_format format = ARHOST_PIXEL_FORMAT_GREY8);
+    arhost_status start_with(const arhost_tracker_setup &setup);
+    void stop();
+
+    arhost_status try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns);
+    std::vector<arhost_marker> records() const; // of the last track
+    std::vector<arhost_marker> seen() const;    // those of markers in the frame, whatever their pose is made of
+
+    // Those that it sees in the next frame, 30 a second. Throws Failure unless it succeeds.
+    std::vector<arhost_marker> track(const SealedFrame &frame);
+    std::vector<arhost_marker> track(const Grey &image) {
+        return track(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8));
+    }
+    // In a frame that is the first since start, and so has no history to smooth with.
+    std::vector<arhost_marker> look(const SealedFrame &frame);
+    std::vector<arhost_marker> look(const Grey &image) { return look(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8)); }
+
+    Instance &instance() { return *instance_; }
+
+private:
+    void create();
+
+    PluginLibrary &library_;
+    Settings overrides_;
+    std::optional<Instance> instance_;
+    const arhost_tracker &functions_;
+    GuardedMemory result_memory_;
+    bool fresh_ = true, started_ = false;
+    arhost_intrinsics camera_{}; // as it was last started
+    std::vector<Listed> listed_;
+    arhost_pixel_format format_ = ARHOST_PIXEL_FORMAT_GREY8;
+    std::uint64_t sequence_ = 0; // of the next frame
+};
+
+inline constexpr std::int64_t frame_ns = 33'333'333;
+
+// A wide camera, whose frames of one byte a pixel end and begin with pages.
+inline arhost_intrinsics wide_camera() {
+    return pinhole(320, 256, 300);
+}
+
+// ---- Expectations ----------------------------------------------------------------------------------
+
+struct Bounds {
+    double degrees; // of the rotation
+    double share;   // of the distance, for the translation
+};
+inline constexpr Bounds roughly{3, 0.02};
+
+double angle_degrees(const Pose &a, const Pose &b);
+Pose pose_of(const arhost_marker &marker);
+
+// The one marker that is seen, and where it must be.
+arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
+                         const Grey &image);
+void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,
+                 const Grey &image);
+void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image);
+// By a tracker that has been started for it.
+void expect_found(Tracker &tracker, const Placed &marker, const Grey &image, const Bounds &bounds,
+                  const std::string &where);
+
+} // namespace arhost::conformance

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which markers are found, in good frames and bad ones, and what is none.
+#include "conformance/tracker.hpp"
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace arhost::conformance {
+namespace {
+
+constexpr double side_mm = 80;
+
+std::vector<Listed> listed(std::span<const Print> prints, double side = side_mm) {
+    std::vector<Listed> all;
+    all.reserve(prints.size());
+    for (const Print &print : prints)
+        all.push_back({print.id, side});
+    return all;
+}
+
+// What a sensor adds, normally distributed by Box and Muller's method.
+Grey noisy(const Grey &image, double sigma, Context &context) {
+    return filled(image.width, image.height, [&](auto x, auto y) {
+        const double radius = std::sqrt(-2 * std::log(1 - context.uniform(0, 1)));
+        return static_cast<int>(
+            std::lround(image.at(x, y) + sigma * radius * std::cos(context.uniform(0, 2 * std::numbers::pi))));
+    });
+}
+
+// ---- Bad frames ------------------------------------------------------------------------------------
+
+// The first print at several poses, its image made worse by `change`: found, and where it is.
+template <class Change> void expect_found_in(Context &context, const std::string &where, Change &&change) {
+    const Print print = prints_of(context.prints).front();
+    Tracker tracker(context);
+    tracker.start(wide_camera(), {{print.id, side_mm}});
+    for (const Pose &at : {tilted({0, 0, -230}, 30, 20, 0), tilted({35, -20, -270}, 40, 140, 100),
+                           tilted({-40, 25, -250}, 25, 260, 200)}) {
+        const Placed marker{print, side_mm, at};
+        expect_found(tracker, marker, change(draw(wide_camera(), marker)), roughly, where);
+    }
+}
+
+void blur(Context &context) {
+    expect_found_in(context, "blurred by 1.5 px", [](const Grey &image) { return blurred(image, 1.5); });
+}
+
+void noise(Context &context) {
+    expect_found_in(context, "in noise of 7 codes", [&](const Grey &image) { return noisy(image, 7, context); });
+}
+
+void exposure(Context &context) {
+    struct Light {
+        const char *what;
+        double gain, offset, slope; // codes are gain · code + offset, times 1 ± slope from left to right
+    };
+    for (const Light &light :
+         {Light{"in the dark, codes up to 66", 0.3, 0, 0}, Light{"overexposed", 1.35, 0, 0},
+          Light{"behind haze, codes 133 to 199", 0.35, 122, 0}, Light{"lit from the side", 0.8, 0, 0.45}})
+        expect_found_in(context, light.what, [&](const Grey &image) {
+            return filled(image.width, image.height, [&](auto x, auto y) {
+                const double side = 2.0 * x / image.width - 1;
+                return static_cast<int>(
+                    std::lround((light.gain * image.at(x, y) + light.offset) * (1 + light.slope * side)));
+            });
+        });
+}
+
+void occlusion(Context &context) {
+    const Print print = prints_of(context.prints).front();
+    const Placed marker{print, side_mm, tilted({5, 5, -230}, 30, 40, 20)};
+    const Grey whole = draw(wide_camera(), marker);
+    const auto hidden = corners_of(wide_camera(), marker);
+    Tracker tracker(context);
+    tracker.start(wide_camera(), {{print.id, side_mm}});
+    for (std::size_t corner = 0; corner < hidden.size(); ++corner)
+        for (const double radius : {5.0, 14.0, 30.0})
+            for (const int code : {ink_code, background_code, paper_code}) {
+                const std::string where =
+                    fmt::format("with corner {} under a disc of {} px and code {}", corner, radius, code);
+                const Grey image = filled(whole.width, whole.height, [&](auto x, auto y) {
+                    return glm::distance(glm::dvec2(x, y), hidden[corner]) < radius ? code : whole.at(x, y);
+                });
+                for (const arhost_marker &found : tracker.look(image))
+                    expect_pose(found, marker.camera_from_marker, {5, 0.03}, where, image);
+            }
+}
+
+void recall(Context &context) {
+    constexpr int count = 20, least = 19;
+    const Print print = prints_of(context.prints).front();
+    Tracker tracker(context);
+    tracker.start(wide_camera(), {{print.id, side_mm}});
+    int found = 0;
+    std::optional<Grey> missed;
+    for (int i = 0; i < count; ++i) {
+        const double distance = context.uniform(170, 480);
+        const glm::dvec3 centre(context.uniform(-0.2, 0.2) * distance, context.uniform(-0.12, 0.12) * distance,
+                                -distance);
+        const Placed marker{print, side_mm,
+                            tilted(centre, context.uniform(0, 50), context.uniform(0, 360), context.uniform(0, 360))};
+        const Grey image = draw(wide_camera(), marker);
+        const std::vector<arhost_marker> markers = tracker.look(image);
+        if (markers.empty()) {
+            missed = image;
+            continue;
+        }
+        ++found;
+        const glm::dvec3 is = pose_of(markers[0])[3];
+        if (!(glm::distance(is, centre) < 0.1 * distance))
+            throw Failure(fmt::format("a marker is reported {:.0f} mm beside the only one, {:.0f} mm away",
+                                      glm::distance(is, centre), distance))
+                .with("frame", image.picture());
+    }
+    context.note = fmt::format("{} of {} found", found, count);
+    if (found < least)
+        throw Failure(fmt::format("of {} frames with a marker 50 to 140 px wide, it is found in {}; {} are the least",
+                                  count, found, least))
+            .with("a frame where it is not found", missed->picture());
+}
+
+// ---- Several markers -------------------------------------------------------------------------------
+
+// Each print in a quarter of the image, with sides of their own.
+struct Group {
+    explicit Group(Context &context) {
+        std::vector<Print> prints = prints_of(context.prints);
+        if (prints.size() < 3)
+            throw Skip("it takes three prints");
+        prints.resize(std::min<std::size_t>(prints.size(), 4), prints[0]);
+        const glm::dvec3 places[] = {{-62, 45, -250}, {62, 45, -250}, {62, -48, -260}, {-62, -48, -240}};
+        for (std::size_t i = 0; i < prints.size(); ++i) {
+            const double side = 50 + 5.0 * static_cast<double>(i);
+            markers.push_back({prints[i], side,
+                               tilted(places[i], 25, 80.0 * static_cast<double>(i), 50.0 * static_cast<double>(i))});
+        }
+    }
+    std::vector<Placed> markers;
+};
+
+void several(Context &context) {
+    const Group group(context);
+    const Grey image = draw(wide_camera(), group.markers);
+    Tracker tracker(context);
+    for (const bool backwards : {false, true}) {
+        std::vector<Placed> order = group.markers;
+        if (backwards)
+            std::ranges::reverse(order);
+        std::vector<Listed> list;
+        list.reserve(order.size());
+        for (const Placed &marker : order)
+            list.push_back({marker.print.id, marker.side_mm});
+        tracker.start(wide_camera(), list);
+        const std::vector<arhost_marker> found = tracker.look(image);
+        if (found.size() != order.size())
+            throw Failure(fmt::format("of {} markers in view {} are seen", order.size(), found.size()))
+                .with("frame", image.picture());
+        for (std::size_t i = 0; i < order.size(); ++i) {
+            if (found[i].id != order[i].print.id)
+                throw Failure(fmt::format("record {} is of marker {}; in the order of the list it must be of {}", i,
+                                          found[i].id, order[i].print.id))
+                    .with("frame", image.picture());
+            expect_pose(found[i], order[i].camera_from_marker, roughly, "among others", image);
+        }
+    }
+}
+
+void unlisted(Context &context) {
+    const Group group(context);
+    const Grey image = draw(wide_camera(), group.markers);
+    Tracker tracker(context);
+    tracker.start(wide_camera(), {{group.markers[1].print.id, group.markers[1].side_mm}});
+    expect_one(tracker.look(image), group.markers[1].print.id, "with others in view that are not listed", image);
+}
+
+void seen_twice(Context &context) {
+    const Print print = prints_of(context.prints).front();
+    const Placed twice[] = {{print, 60, tilted({-55, 10, -250}, 20, 40)},
+                            {print, 60, tilted({60, -10, -260}, 25, 120)}};
+    const Grey image = draw(wide_camera(), twice);
+    Tracker tracker(context);
+    tracker.start(wide_camera(), {{print.id, 60}});
+    expect_one(tracker.look(image), print.id, "with the same print seen twice", image);
+}
+
+void mirrored(Context &context) {
+    const std::vector<Print> prints = prints_of(context.prints);
+    Tracker tracker(context);
+    tracker.start(wide_camera(), listed(prints));
+    for (const Print &print : prints) {
+        const Grey image = draw(wide_camera(), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
+        expect_none(tracker.look(image), "of a mirrored print", image);
+    }
+}
+
+// ---- Nothing to be found ---------------------------------------------------------------------------
+
+void no_marker(Context &context) {
+    const std::vector<Print> prints = prints_of(context.prints);
+    Tracker tracker(context);
+    tracker.start(wide_camera(), listed(prints));
+    const auto expect_nothing = [&](const std::string &what, const auto &code) {
+        const Grey image = filled(320, 256, code);
+        expect_none(tracker.look(image), "in " + what, image);
+    };
+    for (const int grey : {0, 255, 128})
+        expect_nothing(fmt::format("an image of code {}", grey), [&](auto, auto) { return grey; });
+    expect_nothing("noise", [&](auto, auto) { return static_cast<int>(context.random() & 255); });
+    expect_nothing("a gradient", [](auto x, auto y) { return static_cast<int>(x / 4 + y / 2); });
+    expect_nothing("a chessboard", [](auto x, auto y) { return (x / 24 + y / 24) % 2 ? ink_code : paper_code; });
+    expect_nothing("stripes", [](auto x, auto y) { return (x + y / 3) / 10 % 2 ? ink_code : paper_code; });
+    expect_nothing("a black square",
+                   [](auto x, auto y) { return x > 90 && x < 210 && y > 60 && y < 180 ? ink_code : paper_code; });
+    expect_nothing("a frame", [](auto x, auto y) {
+        const bool outer = x > 90 && x < 210 && y > 60 && y<180, inner = x> 105 && x < 195 && y > 75 && y < 165;
+        return outer && !inner ? ink_code : paper_code;
+    });
+    Grey clutter = filled(320, 256, [](auto, auto) { return background_code; });
+    for (int i = 0; i < 60; ++i) {
+        const auto x0 = static_cast<std::uint32_t>(context.uniform(0, 280)),
+                   y0 = static_cast<std::uint32_t>(context.uniform(0, 220));
+        const auto x1 = x0 + static_cast<std::uint32_t>(context.uniform(4, 40)),
+                   y1 = y0 + static_cast<std::uint32_t>(context.uniform(4, 36));
+        const auto code = static_cast<std::uint8_t>(context.uniform(0, 255));
+        for (std::uint32_t y = y0; y < y1; ++y)
+            std::fill(&clutter.at(x0, y), &clutter.at(x0, y) + (x1 - x0), code);
+    }
+    expect_none(tracker.look(clutter), "among rectangles", clutter);
+}
+
+// ---- Sizes and layouts -----------------------------------------------------------------------------
+
+void sizes(Context &context) {
+    struct Size {
+        std::uint32_t width, height;
+    };
+    const std::vector<Print> prints = prints_of(context.prints);
+    for (const Size &size :
+         {Size{1, 1}, {2, 3}, {7, 7}, {8, 8}, {13, 12}, {1, 300}, {300, 1}, {33, 9}, {16, 16}, {65, 47}}) {
+        Tracker tracker(context);
+        const arhost_status status = tracker.try_start(pinhole(size.width, size.height, 100), listed(prints));
+        if (status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION)
+            continue;
+        tracker.instance().expect_ok(fmt::format("for frames of {}×{}, start", size.width, size.height).c_str(),
+                                     status);
+        for (const bool flat : {true, false}) {
+            const Grey image = filled(size.width, size.height, [&](auto, auto) {
+                return flat ? 0 : static_cast<int>(context.random() & 255);
+            });
+            expect_none(tracker.look(image),
+                        fmt::format("in {} of {}×{}", flat ? "black" : "noise", size.width, size.height), image);
+        }
+    }
+}
+
+void stride(Context &context) {
+    // Rows of 331 px are 384 bytes apart.
+    const arhost_intrinsics camera = pinhole(331, 247, 300);
+    const Placed marker{prints_of(context.prints).front(), side_mm, tilted({15, 10, -240}, 30, 70, 30)};
+    const Grey image = draw(camera, marker);
+    Tracker tracker(context);
+    tracker.start(camera, {{marker.print.id, side_mm}});
+    for (const std::uint64_t filler : {1, 2}) {
+        const arhost_marker found = expect_one(tracker.look(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8, filler)),
+                                               marker.print.id, "in rows with bytes between them", image);
+        expect_pose(found, marker.camera_from_marker, roughly, "in rows with bytes between them", image);
+    }
+}
+
+void formats(Context &context) {
+    const std::pair<const char *, arhost_pixel_format> formats[] = {{"RGB8", ARHOST_PIXEL_FORMAT_RGB8},
+                                                                    {"BGR8", ARHOST_PIXEL_FORMAT_BGR8},
+                                                                    {"YUYV", ARHOST_PIXEL_FORMAT_YUYV},
+                                                                    {"NV12", ARHOST_PIXEL_FORMAT_NV12},
+                                                                    {"I420", ARHOST_PIXEL_FORMAT_I420}};
+    const Placed marker{prints_of(context.prints).front(), side_mm, tilted({15, 10, -240}, 30, 70, 30)};
+    const Grey image = draw(wide_camera(), marker);
+    for (const auto &[name, format] : formats) {
+        Tracker tracker(context);
+        tracker.start(wide_camera(), {{marker.print.id, side_mm}}, format);
+        const std::string where = fmt::format("in a frame of {}", name);
+        const arhost_marker found =
+            expect_one(tracker.look(SealedFrame(image, format)), marker.print.id, where, image);
+        expect_pose(found, marker.camera_from_marker, roughly, where, image);
+    }
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
+constexpr const char *gate = "tracker.track", *pose_gate = "tracker.millimetres";
+constexpr Test tests[] = {
+    {"tracker.blur", "A print is found in a blur of 1.5 px, and where it is: to 3° and 2 % of the distance.", kind,
+     pose_gate, 20s, blur},
+    {"tracker.noise", "A print is found in noise of 7 codes, and where it is: to 3° and 2 % of the distance.", kind,
+     pose_gate, 20s, noise},
+    {"tracker.exposure",
+     "A print is found in the dark, overexposed, behind haze and lit from the side, and where it is.", kind,
+     pose_gate, 20s, exposure},
+    {"tracker.occlusion", "A print with a hidden corner is not found, or where it is: to 5° and 3 % of the distance.",
+     kind, pose_gate, 20s, occlusion},
+    {"tracker.recall", "Of 20 random views of a print 50 to 140 px wide, 19 are found and none elsewhere.", kind,
+     pose_gate, 30s, recall},
+    {"tracker.several", "Each of several markers has its own id, side and pose, in the order of the list.", kind,
+     pose_gate, 20s, several},
+    {"tracker.unlisted", "A marker that is not listed is not reported.", kind, gate, 20s, unlisted},
+    {"tracker.seen-twice", "A marker that is seen twice has one record.", kind, gate, 20s, seen_twice},
+    {"tracker.mirrored", "A mirrored print is not found.", kind, gate, 20s, mirrored},
+    {"tracker.no-marker", "In black, white, noise and clutter nothing is found.", kind, gate, 20s, no_marker},
+    {"tracker.sizes", "Images of one pixel, one row, one column and small ones are refused, or nothing is found.",
+     kind, gate, 20s, sizes},
+    {"tracker.stride", "What lies between the rows does not count.", kind, pose_gate, 20s, stride},
+    {"tracker.formats", "Of colour frames the grey plane is read, wherever it is.", kind, pose_gate, 20s, formats},
+};
+
+} // namespace
+
+std::span<const Test> tracker_image_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

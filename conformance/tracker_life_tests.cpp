@@ -1,0 +1,428 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A tracker's life from start to stop, what it refuses, what its records say, and that a frame is tracked for itself.
+#include "conformance/cancelling.hpp"
+#include "conformance/frame_times.hpp"
+#include "conformance/process_usage.hpp"
+#include "conformance/tracker.hpp"
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace arhost::conformance {
+namespace {
+
+constexpr double side_mm = 80;
+
+Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25, 40, 15)) {
+    return {prints_of(context.prints).front(), side_mm, at};
+}
+
+// A tracker that has been started with that print alone.
+struct Started {
+    explicit Started(Context &context, Settings overrides = {})
+        : marker(first_print(context)), tracker(context, std::move(overrides)) {
+        tracker.start(wide_camera(), {{marker.print.id, side_mm}});
+    }
+    Grey at(const Pose &where) const { return draw(wide_camera(), Placed{marker.print, side_mm, where}); }
+
+    Placed marker;
+    Tracker tracker;
+};
+
+// Where a new instance that has seen nothing else finds it.
+Pose found_by_new(Context &context, const arhost_intrinsics &camera, const Placed &marker, const Grey &image) {
+    Tracker tracker(context);
+    tracker.start(camera, {{marker.print.id, marker.side_mm}});
+    return pose_of(expect_one(tracker.track(image), marker.print.id, "to a new instance", image));
+}
+
+void start(Context &context) {
+    Started started(context);
+}
+
+void track(Context &context) {
+    Started started(context);
+    const Grey image = started.at(pose({0, 0, -250}));
+    expect_one(started.tracker.track(image), started.marker.print.id, "facing the camera", image);
+}
+
+// ---- What it refuses -------------------------------------------------------------------------------
+
+void unknown_id(Context &context) {
+    Tracker tracker(context);
+    for (const int id : {-1, std::numeric_limits<int>::max()})
+        if (const arhost_status status = tracker.try_start(wide_camera(), {{id, side_mm}});
+            status != ARHOST_STATUS_ERROR_CONFIGURATION)
+            throw Failure(fmt::format("with marker {}, which no dictionary has, start returned {}; it must be "
+                                      "CONFIGURATION",
+                                      id, status_name(status)));
+}
+
+void unusable_lens(Context &context) {
+    const Print print = prints_of(context.prints).front();
+    Tracker tracker(context);
+    const auto expect_refused = [&](const char *what, const arhost_intrinsics &camera) {
+        if (const arhost_status status = tracker.try_start(camera, {{print.id, side_mm}});
+            status != ARHOST_STATUS_ERROR_CONFIGURATION && status != ARHOST_STATUS_ERROR_UNSUPPORTED)
+            throw Failure(fmt::format("with {}, start returned {}; it must be CONFIGURATION or UNSUPPORTED", what,
+                                      status_name(status)));
+    };
+    const auto lens = [](arhost_distortion model, std::uint32_t count) {
+        arhost_intrinsics camera = wide_camera();
+        camera.distortion = model;
+        camera.coefficient_count = count;
+        return camera;
+    };
+    expect_refused("a distortion model of number 99", lens(99, 4));
+    expect_refused("Brown's model with 3 coefficients", lens(ARHOST_DISTORTION_BROWN, 3));
+    expect_refused("a fisheye lens with 5 coefficients", lens(ARHOST_DISTORTION_FISHEYE, 5));
+}
+
+void cancelled(Context &context) {
+    Started running(context);
+    running.tracker.instance().host().cancel();
+    const SealedFrame frame(running.at(running.marker.camera_from_marker), ARHOST_PIXEL_FORMAT_GREY8);
+    expect_ok_or_cancelled("track", running.tracker.try_track(frame, 0, 0));
+    Tracker starting(context);
+    starting.instance().host().cancel();
+    expect_ok_or_cancelled("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
+}
+
+// ---- Again and again -------------------------------------------------------------------------------
+
+void start_again(Context &context) {
+    Started started(context);
+    started.tracker.track(started.at(started.marker.camera_from_marker));
+    const Placed marker{prints_of(context.prints).back(), side_mm / 2, tilted({-12, 8, -150}, 30, 100)};
+    const arhost_intrinsics camera = pinhole(240, 200, 250);
+    const Grey image = draw(camera, marker);
+    started.tracker.start(camera, {{marker.print.id, marker.side_mm}});
+    expect_one(started.tracker.track(image), marker.print.id, "stopped, and started with another camera and marker",
+               image);
+}
+
+void leaks(Context &context) {
+    const Placed marker = first_print(context);
+    const arhost_intrinsics camera = pinhole(192, 160, 180);
+    const Grey image = draw(camera, marker);
+    Tracker tracker(context);
+    expect_no_leak([&](int frames) {
+        tracker.start(camera, {{marker.print.id, side_mm}});
+        for (int frame = 0; frame < frames; ++frame)
+            tracker.track(image);
+        tracker.stop();
+    });
+}
+
+void longer_structs(Context &context) {
+    struct Longer {
+        arhost_marker_config known;
+        std::uint64_t unknown[2];
+    };
+    const std::vector<Print> prints = prints_of(context.prints);
+    if (prints.size() < 2)
+        throw Skip("it takes two prints");
+    const std::uint64_t garbage = 0xa5a5a5a5a5a5a5a5;
+    std::vector<Longer> listed;
+    listed.reserve(2);
+    for (const Print &print : {prints[1], prints[0]})
+        listed.push_back({{sizeof(Longer), print.id, side_mm}, {garbage, garbage}});
+    const arhost_intrinsics camera = wide_camera();
+    const arhost_frame_format format = format_of(camera.width, camera.height, ARHOST_PIXEL_FORMAT_GREY8);
+    Tracker tracker(context);
+    tracker.instance().expect_ok(
+        "with markers of a longer struct_size, start",
+        tracker.start_with({sizeof(arhost_tracker_setup), 2, &format, &camera, &listed[0].known}));
+    const Placed marker = first_print(context);
+    const Grey image = draw(camera, marker);
+    constexpr const char *where = "listed with a longer struct_size";
+    expect_pose(expect_one(tracker.track(image), marker.print.id, where, image),
+                found_by_new(context, camera, marker, image), roughly, where, image);
+}
+
+// ---- Sameness --------------------------------------------------------------------------------------
+
+bool same_bytes(const arhost_marker &a, const arhost_marker &b) {
+    return std::ranges::equal(std::as_bytes(std::span(&a, 1)), std::as_bytes(std::span(&b, 1)));
+}
+
+void expect_same(std::span<const arhost_marker> is, std::span<const arhost_marker> should, const std::string &where) {
+    if (is.size() != should.size())
+        throw Failure(
+            fmt::format("{}, the same frame has {} records and must have {}", where, is.size(), should.size()));
+    for (std::size_t i = 0; i < is.size(); ++i)
+        if (!same_bytes(is[i], should[i]))
+            throw Failure(fmt::format("{}, the same frame gives another record of marker {}: its place differs by "
+                                      "{:.3g} mm, its first corner by {:.3g} px",
+                                      where, should[i].id, glm::distance(pose_of(is[i])[3], pose_of(should[i])[3]),
+                                      std::hypot(is[i].corners_px[0][0] - should[i].corners_px[0][0],
+                                                 is[i].corners_px[0][1] - should[i].corners_px[0][1])));
+}
+
+Grey without_print() {
+    return filled(320, 256, [](auto, auto) { return background_code; });
+}
+
+void deterministic(Context &context) {
+    Started one(context), other(context);
+    const Grey here = one.at(one.marker.camera_from_marker), beside = one.at(tilted({-15, 20, -280}, 30, 70, 30));
+    const Grey gone = without_print();
+    std::vector<arhost_marker> before;
+    int number = 0;
+    for (const Grey *image : {&here, &here, &here, &beside, &gone, &here}) {
+        const std::string frame = fmt::format("in frame {}", ++number);
+        one.tracker.track(*image);
+        other.tracker.track(*image);
+        const std::vector<arhost_marker> records = one.tracker.records();
+        expect_same(other.tracker.records(), records, frame + " of another instance");
+        if (number == 2 || number == 3)
+            if (const arhost_marker &is = expect_one(one.tracker.seen(), one.marker.print.id, frame, *image);
+                is.state == ARHOST_MARKER_DETECTED)
+                expect_same(records, before, frame);
+        before = records;
+    }
+}
+
+void threads(Context &context) {
+    const arhost_option_descriptor *option = context.library.option("threads");
+    if (!option || option->type != ARHOST_OPTION_INTEGER)
+        throw Skip("it has no integer option 'threads'");
+    Started one(context, {{"threads", "1"}});
+    const Grey image = one.at(one.marker.camera_from_marker);
+    const std::vector<arhost_marker> alone = one.tracker.track(image);
+    for (const char *count : {"2", "3"})
+        expect_same(Started(context, {{"threads", count}}).tracker.track(image), alone,
+                    fmt::format("on {} threads", count));
+}
+
+arhost_marker told_anew(Context &context, const Started &started, const Grey &image) {
+    Started other(context);
+    return expect_one(other.tracker.track(image), started.marker.print.id, "to a new instance", image);
+}
+
+// What it has just told of this frame is what a new instance tells, unless it is smoothed.
+void expect_as_new(Context &context, const Started &started, const Grey &image, const std::string &when) {
+    const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
+    const arhost_marker should = told_anew(context, started, image);
+    if (is.state == ARHOST_MARKER_DETECTED && should.state == ARHOST_MARKER_DETECTED)
+        expect_same({&is, 1}, {&should, 1}, when);
+}
+
+void frames_before(Context &context) {
+    Started started(context);
+    const Pose here = started.marker.camera_from_marker, there = tilted({-60, 40, -320}, 45, 200, 120);
+    const Grey empty = without_print();
+    const auto expect_at = [&](const Pose &where, const char *when) {
+        const Grey image = started.at(where);
+        started.tracker.track(image);
+        expect_as_new(context, started, image, when);
+    };
+    expect_at(here, "in the first frame");
+    expect_at(there, "elsewhere in the next frame");
+    expect_none(started.tracker.track(empty), "taken away", empty);
+    expect_none(started.tracker.track(empty), "taken away", empty);
+    expect_at(here, "there again");
+}
+
+void settles(Context &context) {
+    constexpr int moving = 10, still = 60; // arhost/tracker.h
+    Started started(context);
+    const Grey elsewhere = started.at(tilted({-60, 40, -320}, 45, 200, 120)),
+               image = started.at(started.marker.camera_from_marker);
+    for (int i = 0; i < moving; ++i)
+        started.tracker.track(elsewhere);
+    for (int i = 0; i < still; ++i)
+        started.tracker.track(image);
+    const std::string when = fmt::format("standing still for {} frames", still);
+    const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
+    if (is.state == ARHOST_MARKER_DETECTED)
+        return; // of this frame alone
+    expect_pose(is, pose_of(told_anew(context, started, image)), roughly, when, image);
+}
+
+void out_of_order(Context &context) {
+    struct Stamp {
+        const char *what;
+        std::uint64_t sequence;
+        std::int64_t capture_ns;
+    };
+    Started started(context);
+    const Pose places[] = {started.marker.camera_from_marker, tilted({-30, 30, -300}, 30, 130)};
+    const Grey images[] = {started.at(places[0]), started.at(places[1])};
+    std::size_t count = 0;
+    for (const Stamp &stamp :
+         {Stamp{"in the first frame", 0, 0}, Stamp{"in the second frame", 1, frame_ns},
+          Stamp{"in the same frame once more", 1, frame_ns}, Stamp{"after 7 dropped frames", 9, 9 * frame_ns},
+          Stamp{"in a frame of 4 frames ago", 5, 5 * frame_ns},
+          Stamp{"in another frame of the same time", 6, 5 * frame_ns},
+          Stamp{"after an hour", 108'000, 108'000 * frame_ns}, Stamp{"in the sequence's first frame again", 0, 0}}) {
+        const Grey &image = images[count++ % 2];
+        started.tracker.instance().expect_ok(fmt::format("{}, track", stamp.what).c_str(),
+                                             started.tracker.try_track(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8),
+                                                                       stamp.sequence, stamp.capture_ns));
+        expect_as_new(context, started, image, stamp.what);
+    }
+}
+
+// ---- Records ---------------------------------------------------------------------------------------
+
+constexpr double orthonormal = 1e-9; // arhost/tracker.h
+
+// What keeps a matrix from being a rigid motion, as the end of a sentence; empty: nothing.
+std::string not_rigid(const double *m, double tolerance) {
+    if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
+        return "is not finite";
+    if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
+        return fmt::format("has the last row ({}, {}, {}, {}), which must be (0, 0, 0, 1)", m[3], m[7], m[11], m[15]);
+    const glm::dvec3 axis[] = {{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j)
+            if (const double off = glm::dot(axis[i], axis[j]) - (i == j ? 1 : 0); !(std::abs(off) <= tolerance))
+                return fmt::format("has a rotation that is {:.3g} off orthonormal; {} are allowed", std::abs(off),
+                                   tolerance);
+    if (glm::dot(glm::cross(axis[0], axis[1]), axis[2]) < 0)
+        return "mirrors: its determinant is −1";
+    return "";
+}
+
+template <class Check> void of_several_poses(Context &context, Check &&check) {
+    Started started(context);
+    for (const Pose &at :
+         {pose({0, 0, -250}), tilted({40, 30, -300}, 50, 20, 90), tilted({-60, -20, -280}, 40, 250, 200)}) {
+        const Grey image = started.at(at);
+        const arhost_marker marker =
+            expect_one(started.tracker.look(image), started.marker.print.id, "in view", image);
+        if (const std::string problem = check(marker); !problem.empty())
+            throw Failure("the record's " + problem).with("frame", image.picture());
+    }
+}
+
+void rigid(Context &context) {
+    of_several_poses(context, [](const arhost_marker &marker) {
+        const std::string problem = not_rigid(marker.mt, orthonormal);
+        return problem.empty() ? "" : "mt " + problem;
+    });
+}
+
+void record(Context &context) {
+    of_several_poses(context, [](const arhost_marker &marker) -> std::string {
+        if (marker.struct_size != sizeof marker)
+            return fmt::format("struct_size is {} and must be {}", marker.struct_size, sizeof marker);
+        const auto *end = static_cast<const char *>(std::memchr(marker.family, 0, sizeof marker.family));
+        if (!end || end == marker.family)
+            return end ? "family is empty" : "family does not end within its 32 bytes";
+        if (marker.age_frames != 0)
+            return fmt::format("age_frames is {} in a frame where it is seen, and must be 0", marker.age_frames);
+        if (!(marker.reprojection_px >= 0 && marker.reprojection_px <= 1))
+            return fmt::format("reprojection_px is {} and must be from 0 to 1 in a sharp frame",
+                               marker.reprojection_px);
+        if (!(marker.ambiguity >= 0 && marker.ambiguity <= 1))
+            return fmt::format("ambiguity is {} and must be from 0 to 1", marker.ambiguity);
+        const double *other = marker.mt_alternative;
+        if (std::any_of(other, other + 16, [](double value) { return value != 0; }))
+            if (const std::string problem = not_rigid(other, orthonormal); !problem.empty())
+                return "mt_alternative " + problem;
+        return "";
+    });
+}
+
+// What it tells of a marker that is not in view, if it tells of it.
+void not_seen(Context &context) {
+    constexpr std::uint32_t seen_for = 3, gone_for = 12;
+    Started started(context);
+    const Grey here = started.at(started.marker.camera_from_marker), gone = without_print();
+    bool told = false;
+    for (int time = 0; time < 2; ++time) {
+        std::vector<arhost_marker> last, last_seen;
+        for (std::uint32_t i = 0; i < seen_for; ++i) {
+            started.tracker.track(here);
+            last = last_seen = started.tracker.records();
+            if (const arhost_marker is = expect_one(last, started.marker.print.id, "in view", here);
+                is.age_frames != 0)
+                throw Failure(fmt::format("seen, it has age_frames {} and must have 0", is.age_frames));
+        }
+        for (std::uint32_t age = 1; age <= gone_for; ++age) {
+            started.tracker.track(gone);
+            const std::vector<arhost_marker> records = started.tracker.records();
+            if (records.empty())
+                continue;
+            told = true;
+            const std::string when = fmt::format("{} frames after it was last seen", age);
+            const arhost_marker is = expect_one(records, started.marker.print.id, when, gone);
+            if (is.state != ARHOST_MARKER_PREDICTED && is.state != ARHOST_MARKER_LOST)
+                throw Failure(fmt::format("{}, its state is {}; it must be PREDICTED or LOST", when, is.state));
+            if (is.age_frames != age)
+                throw Failure(fmt::format("{}, its age_frames is {}", when, is.age_frames));
+            if (const std::string problem = not_rigid(is.mt, orthonormal); !problem.empty())
+                throw Failure(fmt::format("{}, its mt {}", when, problem));
+            if (is.state == ARHOST_MARKER_LOST && !std::equal(is.mt, is.mt + 16, last[0].mt) &&
+                !std::equal(is.mt, is.mt + 16, last_seen[0].mt))
+                throw Failure(fmt::format("{}, it is LOST, and its mt is not the last one that was known", when));
+            last = records;
+        }
+    }
+    if (!told)
+        throw Skip("it tells nothing of markers that it does not see");
+}
+
+// ---- Speed -----------------------------------------------------------------------------------------
+
+void speed(Context &context) {
+    const arhost_intrinsics camera = pinhole(640, 480, 600);
+    const Placed marker = first_print(context);
+    const SealedFrame frame(draw(camera, marker), ARHOST_PIXEL_FORMAT_GREY8);
+    Tracker tracker(context);
+    tracker.start(camera, {{marker.print.id, side_mm}});
+    tracker.track(frame);
+    judge_speed(context, camera.width, camera.height, frame_times_ms([&] { return tracker.track(frame), true; }), 50);
+}
+
+constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
+constexpr const char *gate = "tracker.track";
+constexpr Test tests[] = {
+    {"tracker.start", "It starts with a camera and a marker, and stops.", kind, "abi.create", 30s, start},
+    {"tracker.track",
+     "It finds a print that faces the camera, in a frame that is read-only and has no readable byte around.", kind,
+     "tracker.start", 30s, track},
+    {"tracker.start-again", "Once it has been stopped another instance starts, with another camera and marker.", kind,
+     gate, 30s, start_again},
+    {"tracker.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
+     60s, leaks},
+    {"tracker.unknown-id", "An id that no dictionary has is refused as CONFIGURATION.", kind, gate, 20s, unknown_id},
+    {"tracker.unusable-lens", "A lens of no model, or with too many coefficients for it or too few, is refused.",
+     kind, gate, 20s, unusable_lens},
+    {"tracker.longer-structs", "It steps through the markers by their struct_size.", kind, gate, 20s, longer_structs},
+    {"tracker.cancelled", "Cancelled before, start and track return soon, OK or CANCELLED.", kind, gate, 20s,
+     cancelled},
+    {"tracker.record", "A record is whole: size, family, age 0, error and ambiguity within their ranges.", kind, gate,
+     20s, record},
+    {"tracker.rigid", "A pose is finite, orthonormal to 1e-9, with determinant 1 and last row 0 0 0 1.", kind, gate,
+     20s, rigid},
+    {"tracker.deterministic", "The same frames give the same bytes in another instance, and a DETECTED one again.",
+     kind, gate, 20s, deterministic},
+    {"tracker.threads", "Any number of threads gives the same result.", kind, gate, 20s, threads},
+    {"tracker.frames-before", "What is DETECTED is in this frame, and of this frame alone, whatever came before.",
+     kind, "tracker.deterministic", 20s, frames_before},
+    {"tracker.not-seen", "What is not in view is left out, or PREDICTED or LOST, with its age and a rigid pose.",
+     kind, "tracker.frames-before", 20s, not_seen},
+    {"tracker.settles", "A print that stands still is told where it is within 60 frames, smoothed or not.", kind,
+     gate, 30s, settles},
+    {"tracker.out-of-order", "Dropped, repeated and older frames are tracked like others.", kind,
+     "tracker.deterministic", 20s, out_of_order},
+    {"tracker.speed", "A frame of 640×480 takes less than 50 ms on the median; a warning otherwise.", kind, gate, 60s,
+     speed},
+};
+
+} // namespace
+
+std::span<const Test> tracker_life_tests() {
+    return tests;
+}
+
+} // namespace arhost::conformance

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What comes of a test.
+#pragma once
+
+#include "ipc/channel.hpp"
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace arhost::conformance {
+
+enum class Verdict {
+    pass = 1,
+    fail,
+    crashed, // by a signal, or it ended the process
+    timeout,
+    skip, // a capability is not declared, or a test that this one needs has not passed
+    warn, // slow
+    error // of the suite: nothing is known of the plugin
+};
+inline constexpr std::array<std::string_view, 8> verdict_texts = {"",        "pass", "fail", "crashed",
+                                                                  "timeout", "skip", "warn", "error"};
+inline std::string_view to_text(Verdict verdict) {
+    return verdict_texts[static_cast<std::size_t>(verdict)];
+}
+
+// An image for the report.
+struct Exhibit {
+    std::string label;
+    std::string png; // base64
+    unsigned width = 0, height = 0;
+};
+
+struct Result {
+    std::string test;
+    Verdict verdict = Verdict::error;
+    std::string message; // one sentence; empty: there is nothing to say
+    double seconds = 0;
+    std::vector<Exhibit> exhibits{};
+    std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the exhibits
+    ipc::Json facts = ipc::Json::object();                // of abi.load: the descriptor
+};
+
+} // namespace arhost::conformance

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/json_abi.hpp"
+
+#include "base/text.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+namespace arhost::ipc {
+namespace {
+
+std::string text_or_empty(const char *text) {
+    return text ? text : "";
+}
+
+// A string of a message, of a sane length.
+std::string text_of(const Json &json, const char *key) {
+    std::string text = json.at(key).get<std::string>();
+    if (text.size() > max_text_size)
+        throw std::runtime_error(std::string("the descriptor's '") + key + "' has " + std::to_string(text.size()) +
+                                 " bytes, and " + std::to_string(max_text_size) + " are the most");
+    return text;
+}
+
+// The worker's side of max_device_text_size. Of an endless text no more is read than decides where it is cut.
+std::string device_text(const char *text) {
+    constexpr std::size_t longest_character = 4;
+    return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
+                                  max_device_text_size)
+                : std::string();
+}
+
+double finite(const Json &json, const char *key) {
+    const double value = json.at(key).get<double>();
+    if (!std::isfinite(value))
+        throw std::runtime_error(std::string("'") + key + "' is not finite");
+    return value;
+}
+
+} // namespace
+
+std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor) {
+    std::vector<const arhost_option_descriptor *> all;
+    for (std::uint32_t i = 0; i < descriptor.option_count; ++i)
+        all.push_back(reinterpret_cast<const arhost_option_descriptor *>(
+            reinterpret_cast<const std::byte *>(descriptor.options) +
+            std::size_t{i} * descriptor.options->struct_size));
+    return all;
+}
+
+Json to_json(const arhost_descriptor &d) {
+    Json options = Json::array();
+    for (const arhost_option_descriptor *o : options_of(d)) {
+        Json option = {{"key", text_or_empty(o->key)},
+                       {"type", o->type},
+                       {"minimum", o->minimum},
+                       {"maximum", o->maximum},
+                       {"help", text_or_empty(o->help)}};
+        if (o->default_value)
+            option["default"] = o->default_value;
+        option["choices"] = Json::array();
+        for (const char *const *choice = o->choices; choice && *choice; ++choice)
+            option["choices"].push_back(*choice);
+        options.push_back(std::move(option));
+    }
+    Json needs = Json::array();
+    for (const char *const *need = d.needs; need && *need; ++need)
+        needs.push_back(*need);
+    return {{"kind", d.kind},
+            {"id", text_or_empty(d.id)},
+            {"name", text_or_empty(d.name)},
+            {"version", text_or_empty(d.version)},
+            {"vendor", text_or_empty(d.vendor)},
+            {"licence", text_or_empty(d.licence)},
+            {"description", text_or_empty(d.description)},
+            {"capabilities", d.capabilities},
+            {"options", std::move(options)},
+            {"needs", std::move(needs)}};
+}
+
+PluginDescription description_from_json(const Json &json) {
+    PluginDescription d;
+    d.kind = json.at("kind").get<arhost_kind>();
+    if (d.kind < ARHOST_KIND_SOURCE || d.kind > ARHOST_KIND_SINK)
+        throw std::runtime_error("the descriptor's kind is " + std::to_string(d.kind) + ", which is none");
+    d.id = text_of(json, "id");
+    d.name = text_of(json, "name");
+    d.version = text_of(json, "version");
+    d.vendor = text_of(json, "vendor");
+    d.licence = text_of(json, "licence");
+    d.description = text_of(json, "description");
+    d.capabilities = json.at("capabilities").get<std::uint32_t>();
+    for (const Json &need : json.at("needs"))
+        d.needs.push_back(need.get<std::string>());
+    for (const Json &o : json.at("options")) {
+        OptionDeclaration option;
+        option.key = text_of(o, "key");
+        option.type = o.at("type").get<arhost_option_type>();
+        if (option.type < ARHOST_OPTION_BOOL || option.type > ARHOST_OPTION_OUTPUT_PATH)
+            throw std::runtime_error("the option '" + option.key + "' has no valid type");
+        if (o.contains("default"))
+            option.default_value = text_of(o, "default");
+        option.minimum = finite(o, "minimum");
+        option.maximum = finite(o, "maximum");
+        for (const Json &choice : o.at("choices"))
+            option.choices.push_back(choice.get<std::string>());
+        option.help = text_of(o, "help");
+        d.options.push_back(std::move(option));
+    }
+    return d;
+}
+
+Json to_json(const arhost_device &device) {
+    return {{"index", device.index},
+            {"kind", device.kind},
+            {"is_default", device.is_default != 0},
+            {"name", device_text(device.name)},
+            {"uuid", device_text(device.uuid)},
+            {"abilities", device_text(device.abilities)}};
+}
+constexpr std::size_t longest_device_text = max_device_text_size + std::string_view("…").size();
+// A message holds them all, should each byte of a text be a quotation mark, which JSON escapes.
+static_assert(max_devices * (3 * 2 * longest_device_text + 128) < Channel::max_message_size);
+
+DeviceList devices_from_json(const Json &message) {
+    const auto text_of = [](const Json &json, const char *key) {
+        std::string text = json.at(key).get<std::string>();
+        if (text.size() > longest_device_text)
+            throw std::runtime_error(std::string("a device's '") + key + "' is too long");
+        return text;
+    };
+    DeviceList list;
+    if (message.at("devices").size() > max_devices)
+        throw std::runtime_error("there are too many devices");
+    for (const Json &d : message.at("devices")) {
+        DeviceDescription device;
+        device.index = d.at("index").get<std::uint32_t>();
+        device.kind = d.at("kind").get<arhost_device_kind>();
+        device.is_default = d.at("is_default").get<bool>();
+        device.name = text_of(d, "name");
+        device.uuid = text_of(d, "uuid");
+        device.abilities = text_of(d, "abilities");
+        list.devices.push_back(std::move(device));
+    }
+    list.left_out = message.at("left_out").get<std::uint64_t>();
+    return list;
+}
+
+Json to_json(const std::vector<OptionValue> &options) {
+    Json json = Json::array();
+    for (const OptionValue &o : options)
+        json.push_back(
+            {{"key", o.key}, {"type", o.type}, {"integer", o.integer}, {"real", o.real}, {"text", o.text}});
+    return json;
+}
+
+std::vector<OptionValue> options_from_json(const Json &json) {
+    std::vector<OptionValue> options;
+    for (const Json &o : json)
+        options.push_back({o.at("key").get<std::string>(), o.at("type").get<arhost_option_type>(),
+                           o.at("integer").get<std::int64_t>(), o.at("real").get<double>(),
+                           o.at("text").get<std::string>()});
+    return options;
+}
+
+Json to_json(const arhost_intrinsics &i) {
+    return {{"width", i.width},
+            {"height", i.height},
+            {"fx", i.fx},
+            {"fy", i.fy},
+            {"cx", i.cx},
+            {"cy", i.cy},
+            {"distortion", i.distortion},
+            {"coefficients", std::vector<double>(i.coefficients, i.coefficients + i.coefficient_count)}};
+}
+
+arhost_intrinsics intrinsics_from_json(const Json &json) {
+    arhost_intrinsics i{};
+    i.struct_size = sizeof i;
+    i.width = json.at("width").get<std::uint32_t>();
+    i.height = json.at("height").get<std::uint32_t>();
+    i.fx = finite(json, "fx");
+    i.fy = finite(json, "fy");
+    i.cx = finite(json, "cx");
+    i.cy = finite(json, "cy");
+    i.distortion = json.at("distortion").get<arhost_distortion>();
+    const auto coefficients = json.at("coefficients").get<std::vector<double>>();
+    if (i.fx <= 0 || i.fy <= 0 || i.width < 1 || i.height < 1 || i.distortion < ARHOST_DISTORTION_NONE ||
+        i.distortion > ARHOST_DISTORTION_FISHEYE || coefficients.size() > ARHOST_MAX_DISTORTION)
+        throw std::runtime_error("the camera's intrinsics are out of range");
+    i.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
+    std::copy(coefficients.begin(), coefficients.end(), i.coefficients);
+    return i;
+}
+
+Json to_json(const arhost_frame_format &f) {
+    return {{"pixel_format", f.pixel_format}, {"width", f.width},         {"height", f.height},
+            {"yuv_matrix", f.yuv_matrix},     {"yuv_range", f.yuv_range}, {"fps", f.fps}};
+}
+
+arhost_frame_format format_from_json(const Json &json) {
+    arhost_frame_format f{};
+    f.struct_size = sizeof f;
+    f.pixel_format = json.at("pixel_format").get<arhost_pixel_format>();
+    f.width = json.at("width").get<std::uint32_t>();
+    f.height = json.at("height").get<std::uint32_t>();
+    f.yuv_matrix = json.at("yuv_matrix").get<arhost_yuv_matrix>();
+    f.yuv_range = json.at("yuv_range").get<arhost_yuv_range>();
+    f.fps = finite(json, "fps");
+    const bool yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
+    if (f.fps < 0 || f.fps > 100'000 ||
+        (yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709 ||
+                 f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL)) ||
+        !arhost_frame_layout(&f))
+        throw std::runtime_error("the frame format is not valid: pixel format " + std::to_string(f.pixel_format) +
+                                 ", " + std::to_string(f.width) + "x" + std::to_string(f.height) + " px, " +
+                                 std::to_string(f.fps) + " fps");
+    return f;
+}
+
+Json to_json(const SlotLayout &layout) {
+    return {{"slot_size", layout.slot_size}, {"count", layout.count}};
+}
+
+SlotLayout layout_from_json(const Json &json) {
+    return {json.at("slot_size").get<std::uint64_t>(), json.at("count").get<std::uint32_t>()};
+}
+
+const char *to_text(arhost_kind kind) {
+    switch (kind) {
+    case ARHOST_KIND_SOURCE:
+        return "source";
+    case ARHOST_KIND_TRACKER:
+        return "tracker";
+    case ARHOST_KIND_RAYTRACER:
+        return "raytracer";
+    case ARHOST_KIND_SINK:
+        return "sink";
+    default:
+        return "unknown kind";
+    }
+}
+
+const char *device_kind_text(arhost_device_kind kind) {
+    switch (kind) {
+    case ARHOST_DEVICE_DISCRETE_GPU:
+        return "discrete GPU";
+    case ARHOST_DEVICE_INTEGRATED_GPU:
+        return "integrated GPU";
+    case ARHOST_DEVICE_VIRTUAL_GPU:
+        return "virtual GPU";
+    case ARHOST_DEVICE_CPU:
+        return "CPU";
+    default:
+        return "other device";
+    }
+}
+
+const char *status_text(arhost_status status) {
+    switch (status) {
+    case ARHOST_STATUS_OK:
+        return "ok";
+    case ARHOST_STATUS_END:
+        return "end";
+    case ARHOST_STATUS_END_TRUNCATED:
+        return "end, cut short";
+    case ARHOST_STATUS_ERROR_INVALID_ARGUMENT:
+        return "invalid argument";
+    case ARHOST_STATUS_ERROR_CONFIGURATION:
+        return "configuration error";
+    case ARHOST_STATUS_ERROR_UNSUPPORTED:
+        return "not supported";
+    case ARHOST_STATUS_ERROR_IO:
+        return "input/output error";
+    case ARHOST_STATUS_ERROR_OUT_OF_MEMORY:
+        return "out of memory";
+    case ARHOST_STATUS_ERROR_DEVICE_LOST:
+        return "device lost";
+    case ARHOST_STATUS_ERROR_CANCELLED:
+        return "cancelled";
+    case ARHOST_STATUS_ERROR_INTERNAL:
+        return "internal error";
+    default:
+        return "status out of range";
+    }
+}
+
+} // namespace arhost::ipc

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Memory shared between processes: anonymous memfds, each with one writer, sealed so that no peer can
+// resize it under a reader or map it writable once its writer has.
+//
+// Life of a memfd that a worker writes: the host creates it (size fixed by seals), sends it, the worker
+// maps it writable and acknowledges, the host seals it against further writers, and only then hands it
+// to readers. What the host writes it maps and seals at once.
+#pragma once
+
+#include "base/unique_fd.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace arhost::ipc {
+
+// A mapping of a whole memfd.
+class Mapping {
+public:
+    Mapping() = default;
+    Mapping(std::byte *address, std::size_t size) : address_(address), size_(size) {}
+    ~Mapping();
+    Mapping(Mapping &&other) noexcept
+        : address_(std::exchange(other.address_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+    Mapping &operator=(Mapping &&other) noexcept {
+        std::swap(address_, other.address_);
+        std::swap(size_, other.size_);
+        return *this;
+    }
+
+    std::span<std::byte> bytes() const { return {address_, size_}; }
+    explicit operator bool() const { return address_ != nullptr; }
+    // The mapping as a T, which must fit. T is trivially copyable or made of atomics, and starts as zeros.
+    template <class T> T &as() const { return *reinterpret_cast<T *>(address_); }
+
+private:
+    std::byte *address_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+enum class Access { read_only, read_write };
+
+class SharedMemory {
+public:
+    SharedMemory() = default;
+    // Zeros, sealed against growing and shrinking. `name` shows up in /proc for debugging.
+    static SharedMemory create(const char *name, std::size_t size);
+    // One that came from a peer. Throws where it is no memfd or could still be resized by the peer.
+    static SharedMemory adopt(base::UniqueFd fd);
+    // One that a peer has finished, has sealed or not: sealed here against everything. Throws where a
+    // writable mapping still exists.
+    static SharedMemory adopt_and_freeze(base::UniqueFd fd);
+
+    Mapping map(Access access) const;
+    // No new writable mapping and no write(2) from now on; those that exist stay.
+    void seal_future_writes() const;
+
+    int fd() const { return fd_.get(); }
+    std::size_t size() const { return size_; }
+    explicit operator bool() const { return static_cast<bool>(fd_); }
+
+private:
+    SharedMemory(base::UniqueFd fd, std::size_t size) : fd_(std::move(fd)), size_(size) {}
+    base::UniqueFd fd_;
+    std::size_t size_ = 0;
+};
+
+// Slots of equal size in one memfd, each 64 KiB aligned so that no two share a (large) page or line.
+struct SlotLayout {
+    std::uint64_t slot_size = 0; // bytes used of each slot
+    std::uint32_t count = 0;
+
+    static constexpr std::uint64_t alignment = 64 * 1024;
+    std::uint64_t stride() const { return (slot_size + alignment - 1) / alignment * alignment; }
+    std::uint64_t byte_size() const { return stride() * count; }
+    std::span<std::byte> slot(const Mapping &mapping, std::uint32_t index) const {
+        return mapping.bytes().subspan(stride() * index, slot_size);
+    }
+};
+
+} // namespace arhost::ipc

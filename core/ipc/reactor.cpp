@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/reactor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <sys/epoll.h>
+#include <utility>
+
+namespace arhost::ipc {
+
+void Reactor::Registration::cancel() {
+    if (reactor_)
+        reactor_->remove(id_);
+    reactor_ = nullptr;
+}
+
+Reactor::Reactor() : epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")) {}
+
+Reactor::Registration Reactor::watch(int fd, Callback callback) {
+    const std::uint64_t id = next_id_++;
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = id;
+    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0)
+        base::throw_errno("epoll_ctl");
+    watches_[id] = {fd, std::make_shared<Callback>(std::move(callback))};
+    return Registration(this, id);
+}
+
+Reactor::Registration Reactor::at(Clock::time_point when, Callback callback) {
+    const std::uint64_t id = next_id_++;
+    deadlines_.emplace(when, Deadline{id, std::move(callback)});
+    return Registration(this, id);
+}
+
+void Reactor::remove(std::uint64_t id) {
+    if (const auto found = watches_.find(id); found != watches_.end()) {
+        ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, found->second.fd, nullptr);
+        watches_.erase(found);
+        return;
+    }
+    std::erase_if(deadlines_, [id](const auto &entry) { return entry.second.id == id; });
+}
+
+void Reactor::run_once() {
+    using std::chrono::milliseconds;
+    // Short, so that a halt of this process shows as time beyond what was asked for.
+    constexpr milliseconds slice{100};
+    std::optional<milliseconds> timeout;
+    if (!deadlines_.empty()) {
+        // Rounded up: waking just before a deadline would spin.
+        const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - Clock::now());
+        timeout = std::clamp(left, milliseconds(0), slice);
+    }
+    take_events(timeout);
+    if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
+        take_events(milliseconds(0)); // what came while this process was halted came in time
+    while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
+        auto due = deadlines_.extract(deadlines_.begin());
+        due.mapped().callback();
+    }
+}
+
+void Reactor::take_events(std::optional<std::chrono::milliseconds> timeout) {
+    std::array<epoll_event, 32> events;
+    const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
+                                   timeout ? static_cast<int>(timeout->count()) : -1);
+    if (count < 0 && errno != EINTR)
+        base::throw_errno("epoll_wait");
+    postpone_by_halt(timeout);
+    for (int i = 0; i < count; ++i) {
+        const std::uint64_t id = events[static_cast<std::size_t>(i)].data.u64; // a copy: epoll_event is packed
+        // A callback may have removed this one; its id is never given out again.
+        const auto found = watches_.find(id);
+        if (found == watches_.end())
+            continue;
+        const std::shared_ptr<Callback> callback = found->second.callback;
+        (*callback)();
+    }
+}
+
+// Time that this process did not run counts for no deadline: others may not have run either.
+void Reactor::postpone_by_halt(std::optional<std::chrono::milliseconds> timeout) {
+    constexpr std::chrono::milliseconds noticeable{50}; // above what a busy machine delays
+    const Clock::time_point now = Clock::now(), before = std::exchange(looked_, now);
+    if (!timeout) // nothing was due, and any time is well spent
+        return;
+    const auto halt = now - before - *timeout;
+    if (halt < noticeable)
+        return;
+    std::multimap<Clock::time_point, Deadline> postponed;
+    for (auto &[when, deadline] : deadlines_)
+        postponed.emplace_hint(postponed.end(), when + halt, std::move(deadline));
+    deadlines_ = std::move(postponed);
+}
+
+} // namespace arhost::ipc

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One epoll for everything that the host waits for: doorbells, control channels, deaths (pidfds), signals
+// and deadlines. Single-threaded.
+#pragma once
+
+#include "base/unique_fd.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+
+namespace arhost::ipc {
+
+class Reactor {
+public:
+    using Clock = std::chrono::steady_clock;
+    using Callback = std::function<void()>;
+
+    // Ends a watch or a deadline when it goes out of scope. It may do so inside any callback.
+    class Registration {
+    public:
+        Registration() = default;
+        ~Registration() { cancel(); }
+        Registration(Registration &&other) noexcept { *this = std::move(other); }
+        Registration &operator=(Registration &&other) noexcept {
+            std::swap(reactor_, other.reactor_);
+            std::swap(id_, other.id_);
+            return *this;
+        }
+        void cancel();
+        bool active() const { return reactor_ != nullptr; }
+
+    private:
+        friend class Reactor;
+        Registration(Reactor *reactor, std::uint64_t id) : reactor_(reactor), id_(id) {}
+        Reactor *reactor_ = nullptr;
+        std::uint64_t id_ = 0;
+    };
+
+    Reactor();
+
+    // Calls back while `fd` is readable or hung up. The fd stays open until the registration ends.
+    [[nodiscard]] Registration watch(int fd, Callback callback);
+    // Calls back once.
+    [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
+
+    // Waits until something happens, and handles it. What has come in counts before a deadline does, and time
+    // in which this process did not run (Ctrl-Z, a frozen container) counts for none.
+    void run_once();
+
+private:
+    struct Watch {
+        int fd;
+        std::shared_ptr<Callback> callback;
+    };
+    struct Deadline {
+        std::uint64_t id;
+        Callback callback;
+    };
+    void remove(std::uint64_t id);
+    void take_events(std::optional<std::chrono::milliseconds> timeout);
+    void postpone_by_halt(std::optional<std::chrono::milliseconds> timeout);
+
+    base::UniqueFd epoll_;
+    std::uint64_t next_id_ = 1;
+    std::map<std::uint64_t, Watch> watches_;
+    std::multimap<Clock::time_point, Deadline> deadlines_;
+    Clock::time_point looked_ = Clock::now(); // when the last wait for events ended
+};
+
+} // namespace arhost::ipc

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/wake.hpp"
+
+#include <climits>
+#include <ctime>
+#include <linux/futex.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+
+namespace arhost::ipc {
+namespace {
+
+// std::atomic::wait uses private futexes, which do not reach another process: the system call itself.
+long futex(const std::atomic<std::uint32_t> &word, int operation, std::uint32_t value, const timespec *timeout) {
+    static_assert(sizeof(word) == sizeof(std::uint32_t));
+    return ::syscall(SYS_futex, reinterpret_cast<const std::uint32_t *>(&word), operation, value, timeout, nullptr,
+                     0);
+}
+
+void pause_cpu() {
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#endif
+}
+
+} // namespace
+
+void wake(WakeWord &word) {
+    // SYNC POINT with wake_count: what was pushed before is visible to who sees the new count. The
+    // kernel's futex re-reads the word under its own lock, so a sleeper either sees it or is woken.
+    word.count.fetch_add(1, std::memory_order_release);
+    futex(word.count, FUTEX_WAKE, INT_MAX, nullptr);
+}
+
+// SYNC POINT with wake: pairs with its release increment.
+std::uint32_t wake_count(const WakeWord &word) {
+    return word.count.load(std::memory_order_acquire);
+}
+
+bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanoseconds timeout,
+                   std::chrono::nanoseconds spin) {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
+    while (wake_count(word) == seen && Clock::now() - begin < spin)
+        pause_cpu();
+    while (wake_count(word) == seen) {
+        const auto left =
+            std::chrono::duration_cast<std::chrono::nanoseconds>(begin + timeout - Clock::now()).count();
+        if (left <= 0)
+            return false;
+        const timespec relative{left / 1'000'000'000, left % 1'000'000'000};
+        // Returns at once (EAGAIN) where the word is no longer `seen`; a signal (EINTR) just loops.
+        futex(word.count, FUTEX_WAIT, seen, &relative);
+    }
+    return true;
+}
+
+DoorbellPair make_doorbell() {
+    int ends[2];
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        base::throw_errno("socketpair for a doorbell");
+    return {base::UniqueFd(ends[0]), base::UniqueFd(ends[1])};
+}
+
+void ring_doorbell(int worker_end) {
+    // A full buffer means that the bell is ringing already.
+    (void)::send(worker_end, "!", 1, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+int drain_doorbell(int host_end) {
+    char bytes[4096];
+    const ssize_t count = ::recv(host_end, bytes, sizeof bytes, MSG_DONTWAIT);
+    if (count > 0)
+        return static_cast<int>(count);
+    if (count == 0)
+        return -1;
+    return errno == EAGAIN || errno == EINTR ? 0 : -1;
+}
+
+} // namespace arhost::ipc

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/access.hpp"
+
+#include "base/file_identity.hpp"
+
+#include <cstdlib>
+
+namespace arhost::run_config {
+namespace {
+
+namespace fs = std::filesystem;
+using base::real_path;
+
+// Outputs are written beside their place and then renamed, so their folder it is; a link's target's too.
+void let_write(sandbox::Policy &policy, const fs::path &file) {
+    policy.writable.push_back(file.parent_path());
+    if (const fs::path folder = real_path(file).parent_path(); folder != policy.writable.back())
+        policy.writable.push_back(folder);
+}
+
+void add_reads(sandbox::Policy &policy, const yaml::Node &paths) {
+    std::error_code ignored;
+    for (const yaml::Node &path : paths.items()) {
+        policy.readable.push_back(path.input_path());
+        if (!fs::exists(policy.readable.back(), ignored))
+            path.fail("there is no file or folder '" + policy.readable.back().string() +
+                      "', or it can't be reached; mend the path, or leave it out");
+    }
+}
+
+void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
+    std::error_code ignored;
+    for (const yaml::Node &folder : folders.items()) {
+        policy.writable.push_back(folder.output_path());
+        if (!fs::is_directory(policy.writable.back(), ignored))
+            folder.fail("there is no folder '" + policy.writable.back().string() +
+                        "', or it can't be reached; name a folder, and make it first (mkdir -p)");
+    }
+}
+
+void add_environment(sandbox::Policy &policy, const yaml::Node &variables) {
+    for (const yaml::Node &variable : variables.items()) {
+        const std::string name = variable.text();
+        if (!sandbox::is_variable(name))
+            variable.fail("must be a variable's name alone; its value is the one that arhost is started with");
+        policy.environment.insert(name);
+    }
+}
+
+} // namespace
+
+std::optional<yaml::Node> path_of(const yaml::Node &component) {
+    const auto path = component.find("path"), options = component.find("options");
+    return path || !options || !options->is_map() ? path : options->find("path");
+}
+
+sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
+    sandbox::Policy policy;
+    if (const auto allow = node.find("allow"))
+        for (const yaml::Node &what : allow->items())
+            policy.allow.insert(what.choice(sandbox::allowances));
+    if (const auto reads = node.find("reads"))
+        add_reads(policy, *reads);
+    if (const auto writes = node.find("writes"))
+        add_writes(policy, *writes);
+    if (const auto environment = node.find("environment"))
+        add_environment(policy, *environment);
+    if (const auto path = path_of(node); path && is_output)
+        let_write(policy, path->output_path());
+    else if (path)
+        sandbox::let_read_files(policy, path->input_path());
+    if (const auto options = node.find("options"); options && options->is_map())
+        for (const auto &[key, value] : options->entries())
+            if (value.is_scalar() && key != "path")
+                sandbox::let_read(policy, value.input_path());
+    return policy;
+}
+
+std::string warning_of_output(const yaml::Node &path, const std::string &plugin) {
+    const fs::path file = path.output_path(), folder = real_path(file).parent_path();
+    const char *home = std::getenv("HOME");
+    for (const fs::path &precious : {real_path(home ? home : "/"), real_path(".")})
+        if (sandbox::holds(folder, precious))
+            return path.where() + ": " + path.path() + ": '" + plugin + "' can write all of '" + folder.string() +
+                   "' and what is below; give it a folder of its own, as in 'path: output/" +
+                   file.filename().string() + "'";
+    return "";
+}
+
+} // namespace arhost::run_config

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/configuration.hpp"
+
+#include "camera/calibration.hpp"
+#include "run_config/access.hpp"
+#include "run_config/options.hpp"
+#include "run_config/schema.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+#include <set>
+
+namespace arhost::run_config {
+namespace {
+
+// The table's default of a key that holds a whole number.
+std::int64_t default_of(std::string_view path) {
+    const std::string_view text = key_at(path).default_value;
+    std::int64_t value = 0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+}
+
+std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum,
+                                std::int64_t maximum) {
+    const std::string_view name = path.substr(path.rfind('.') == std::string_view::npos ? 0 : path.rfind('.') + 1);
+    const auto found = map.find(name);
+    return found ? found->integer(minimum, maximum) : default_of(path);
+}
+
+constexpr std::int64_t longest_ms = 3'600'000;
+
+supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
+    supervise::RestartLimits limits;
+    if (!node)
+        return limits;
+    node->allow_keys(keys_of("restart"));
+    limits.proven_after_frames =
+        static_cast<std::uint32_t>(integer_or_default(*node, "restart.proven_after_frames", 1, 1'000'000));
+    limits.quarantine_after =
+        static_cast<std::uint32_t>(integer_or_default(*node, "restart.quarantine_after", 1, 1'000'000));
+    limits.first_delay =
+        std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, longest_ms));
+    limits.longest_delay =
+        std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, longest_ms));
+    return limits;
+}
+
+// What all components share.
+struct Shared {
+    PluginPath plugin_path;
+    supervise::RestartLimits restart;
+    sandbox::Mode sandbox;
+};
+
+ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
+    if (const auto conform = node.find("conform"); conform && schema_path == "outputs[]")
+        conform->fail("an output gives nothing back that could be looked at in a run; try its plugin by "
+                      "'arhost conform PLUGIN.so' (docs/conformance.md)");
+    node.allow_keys(keys_of(schema_path));
+    ComponentConfiguration component{
+        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {},
+        false};
+    if (const auto fallback = node.find("fallback"))
+        component.plugins.push_back(shared.plugin_path.resolve(*fallback));
+    // "options:" with nothing behind it is an empty map.
+    if (component.options && component.options->is_null())
+        component.options.reset();
+    component.limits.frame =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, longest_ms));
+    component.limits.start =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, longest_ms));
+    component.limits.stop =
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, longest_ms));
+    component.limits.restart = shared.restart;
+    component.policy = access_of(node, schema_path == "outputs[]");
+    component.policy.mode = shared.sandbox;
+    component.policy.memory_bytes =
+        static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
+    if (component.policy.memory_bytes && component.policy.allows("gpu"))
+        node.require("memory_mb")
+            .fail("can't be kept with 'allow: [gpu]', as drivers map what they like; leave one of the two out");
+    if (const auto conform = node.find("conform"))
+        component.conform = conform->boolean();
+    return component;
+}
+
+TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared) {
+    TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}, 0};
+    const yaml::Node markers = node.require("markers");
+    std::set<std::int64_t> ids;
+    for (const yaml::Node &marker : markers.items()) {
+        marker.allow_keys(keys_of("tracker.markers[]"));
+        const yaml::Node id = marker.require("id");
+        const std::int64_t number = id.integer(0, std::numeric_limits<std::int32_t>::max());
+        if (!ids.insert(number).second)
+            id.fail("the marker " + std::to_string(number) + " is listed twice; keep one of them");
+        tracker.markers.push_back({sizeof(arhost_marker_config), static_cast<std::int32_t>(number),
+                                   marker.require("side_mm").real(0.01, 1e6)});
+    }
+    if (tracker.markers.empty() || tracker.markers.size() > ARHOST_MAX_MARKERS)
+        markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) +
+                     " markers, as in [{id: 0, side_mm: 80}]");
+    tracker.hold_frames = static_cast<std::uint32_t>(integer_or_default(node, "tracker.hold_frames", 0, 1'000'000));
+    return tracker;
+}
+
+FilesInUse files_read_by(const Configuration &configuration) {
+    FilesInUse files;
+    const yaml::Node &root = configuration.node;
+    files.read(std::filesystem::absolute(root.file()));
+    const auto camera = root.find("camera");
+    for (const auto &node : {root.find("trajectory"), camera ? camera->find("file") : std::nullopt})
+        if (node)
+            files.read(node->input_path());
+    const auto read_all_of = [&](const ComponentConfiguration &component) {
+        for (const auto *paths : {&component.plugins, &component.policy.readable})
+            std::for_each(paths->begin(), paths->end(), [&](const auto &path) { files.read(path); });
+    };
+    if (configuration.source) {
+        read_all_of(*configuration.source);
+        if (const auto path = path_of(configuration.source->node))
+            files.read_numbered(path->input_path()); // whose pattern stands for more than the folder above
+    }
+    if (configuration.tracker)
+        read_all_of(*configuration.tracker);
+    if (configuration.raytracer) {
+        read_all_of(*configuration.raytracer);
+        files.read(configuration.raytracer->scene);
+    }
+    std::for_each(configuration.outputs.begin(), configuration.outputs.end(), read_all_of);
+    return files;
+}
+
+} // namespace
+
+std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
+                                          const ComponentConfiguration &component, std::size_t candidate) {
+    const bool configured = candidate == 0;
+    if (plugin.kind != kind)
+        component.node.require(configured ? "plugin" : "fallback")
+            .fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a " + ipc::to_text(kind));
+    for (const std::string &need : plugin.needs)
+        if (component.policy.mode != sandbox::Mode::none && !component.policy.allows(need))
+            component.node.require(configured ? "plugin" : "fallback")
+                .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox keeps from it: add 'allow: [" +
+                      need + "]' to " + component.node.path() + " (docs/security.md)");
+    return resolve_options(plugin, configured ? component.options : std::nullopt, component.path, component.node);
+}
+
+Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins) {
+    root.allow_keys(keys_of(""));
+    if (const yaml::Node version = root.require("version"); version.integer() != 1)
+        version.fail("must be 1: this arhost reads no other version");
+
+    std::vector<std::filesystem::path> folders;
+    if (const auto node = root.find("plugin_path"))
+        for (const yaml::Node &folder : node->items())
+            folders.push_back(folder.input_path());
+    Configuration configuration{.node = root};
+    if (const auto node = root.find("sandbox"))
+        configuration.sandbox = sandbox::mode_of(node->choice(sandbox::modes));
+    const Shared shared{PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
+                        configuration.sandbox};
+
+    const auto trajectory_node = root.find("trajectory");
+    if (trajectory_node)
+        configuration.trajectory = camera::read_trajectory(trajectory_node->input_path());
+    if (const auto node = trajectory_node ? root.find("source") : root.require("source")) {
+        configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
+        if (const auto fps = node->find("fps")) {
+            configuration.source->fps = fps->real(0, 10'000);
+            if (configuration.source->fps > 0 && configuration.source->fps < 1e-6) // a period is in ns, 64 bits
+                fps->fail("must be 0, for the source's own, or 1e-06 to 10000, is " + fps->text());
+        }
+    }
+    if (const auto mode = root.find("mode"))
+        configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
+    if (configuration.mode == Mode::live && !configuration.source)
+        root.require("mode").fail("live needs a 'source' that sets the pace; without one a trajectory is traced "
+                                  "in lockstep");
+    configuration.frames =
+        static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
+    if (const auto node = root.find("camera")) {
+        node->allow_keys(keys_of("camera"));
+        configuration.camera = camera::parse_camera(*node);
+        configuration.camera_node = node;
+    }
+    if (const auto &trajectory = configuration.trajectory) {
+        const std::uint64_t end = trajectory->end();
+        configuration.frames = configuration.frames ? std::min(configuration.frames, end) : end;
+        if (!configuration.camera) {
+            configuration.camera = trajectory->intrinsics.value_or(camera::dissertation_camera({800, 600}));
+            configuration.camera_node = trajectory_node;
+        }
+    }
+    if (const auto node = root.find("tracker")) {
+        configuration.tracker = parse_tracker(*node, shared);
+        if (!configuration.source)
+            node->fail("a tracker needs a 'source' that gives it frames");
+    }
+    if (const auto node = root.find("raytracer")) {
+        const yaml::Node scene = node->require("scene");
+        configuration.raytracer =
+            RaytracerConfiguration{parse_component(*node, "raytracer", shared), scene.input_path(), scene};
+        if (!configuration.tracker && !configuration.trajectory)
+            node->fail("a ray tracer needs a 'tracker' or a 'trajectory' that tells where the camera is");
+        if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
+            scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
+    }
+    if (const auto node = root.find("coordinates")) {
+        node->allow_keys(keys_of("coordinates"));
+        configuration.coordinates = camera::parse_coordinates(*node);
+    }
+    if (const auto node = root.find("outputs"))
+        for (const yaml::Node &output : node->items())
+            configuration.outputs.push_back(parse_component(output, "outputs[]", shared));
+    configuration.files = files_read_by(configuration);
+    for (const ComponentConfiguration &output : configuration.outputs)
+        if (const auto path = path_of(output.node)) {
+            configuration.files.write(*path);
+            const std::filesystem::path &plugin = output.plugins.front();
+            if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
+                continue; // arhost's own are trusted that far
+            if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
+                configuration.warnings.push_back(warning);
+        }
+    if (const auto node = root.find("live")) {
+        node->allow_keys(keys_of("live"));
+        configuration.max_latency =
+            std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
+    }
+    for (const auto &[key, file] :
+         {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
+        if (const auto node = root.find(key)) {
+            *file = base::real_path(node->text()); // of a link, which is not to be replaced, where it leads to
+            std::error_code error;
+            const auto type = std::filesystem::status(**file, error).type();
+            using enum std::filesystem::file_type;
+            if (type != regular && type != not_found && type != character)
+                node->fail("'" + node->text() + "' is no regular file, or can't be reached; choose another path");
+            if (type != character) // /dev/null takes both
+                configuration.files.write(*node);
+        }
+    if (!configuration.source && !configuration.raytracer)
+        trajectory_node->fail("a trajectory needs a 'source', which it gives cameras to, or a 'raytracer', which "
+                              "traces it alone");
+    return configuration;
+}
+
+} // namespace arhost::run_config

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/options.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace arhost::run_config {
+namespace {
+
+ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node) {
+    ipc::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
+    const bool bounded = declared.minimum != 0 || declared.maximum != 0;
+    const auto as_integer = [](double bound) { return static_cast<std::int64_t>(std::clamp(bound, -9e18, 9e18)); };
+    switch (declared.type) {
+    case ARHOST_OPTION_BOOL:
+        value.integer = node.boolean();
+        break;
+    case ARHOST_OPTION_INTEGER:
+        value.integer =
+            bounded ? node.integer(as_integer(declared.minimum), as_integer(declared.maximum)) : node.integer();
+        break;
+    case ARHOST_OPTION_REAL:
+        value.real = bounded ? node.real(declared.minimum, declared.maximum) : node.real();
+        break;
+    case ARHOST_OPTION_INPUT_PATH:
+        value.text = node.input_path().string();
+        break;
+    case ARHOST_OPTION_OUTPUT_PATH:
+        value.text = node.output_path().string();
+        break;
+    default:
+        if (declared.choices.empty()) {
+            value.text = node.text();
+        } else {
+            const std::vector<std::string_view> choices(declared.choices.begin(), declared.choices.end());
+            value.text = node.choice(choices);
+        }
+    }
+    return value;
+}
+
+// A default that the plugin declares badly is the plugin's fault, and is reported as such.
+ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {
+    if (declared.default_value->empty())
+        return {declared.key, declared.type, 0, 0.0, ""};
+    const yaml::Node node =
+        yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
+    return value_of(declared, node);
+}
+
+} // namespace
+
+std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
+                                              const std::optional<yaml::Node> &options,
+                                              const std::optional<yaml::Node> &path, const yaml::Node &owner) {
+    std::vector<std::string_view> keys;
+    for (const ipc::OptionDeclaration &declared : plugin.options)
+        keys.push_back(declared.key);
+    if (options)
+        options->allow_keys(keys);
+    if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
+        path->fail(plugin.id + " takes no path");
+
+    std::vector<ipc::OptionValue> values;
+    for (const ipc::OptionDeclaration &declared : plugin.options) {
+        std::optional<yaml::Node> given = options ? options->find(declared.key) : std::nullopt;
+        if (declared.key == "path" && path) {
+            if (given)
+                given->fail("the path stands beside 'plugin' already; keep one of them");
+            given = path;
+        }
+        if (given)
+            values.push_back(value_of(declared, *given));
+        else if (declared.default_value)
+            values.push_back(default_of(declared, plugin.id));
+        else
+            owner.fail(plugin.id + " needs '" + declared.key + "': " + declared.help);
+    }
+    return values;
+}
+
+} // namespace arhost::run_config

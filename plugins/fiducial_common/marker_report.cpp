@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marker_report.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <tuple>
+
+namespace arhost::planar {
+namespace {
+
+struct Located {
+    Sighting sighting;
+    PlanarPose pose;
+};
+
+// A total order, so that the choice depends on neither the detector's order nor its threads.
+bool is_better(const Located &a, const Located &b) {
+    const auto key = [](const Located &l) {
+        const cv::Point2d &corner = l.sighting.corners_px[0];
+        return std::tuple(-l.sighting.quality, l.pose.best.reprojection_px, corner.x, corner.y);
+    };
+    return key(a) < key(b);
+}
+
+arhost_marker record(const Located &located, int id, const std::string &family) {
+    arhost_marker marker{};
+    marker.struct_size = sizeof marker;
+    marker.id = id;
+    family.copy(marker.family, ARHOST_MAX_FAMILY - 1);
+    marker.state = ARHOST_MARKER_DETECTED;
+    for (int i = 0; i < 4; ++i) {
+        marker.corners_px[i][0] = located.sighting.corners_px[i].x;
+        marker.corners_px[i][1] = located.sighting.corners_px[i].y;
+    }
+    std::ranges::copy(located.pose.best.mt, marker.mt);
+    if (located.pose.alternative)
+        std::ranges::copy(located.pose.alternative->mt, marker.mt_alternative);
+    marker.reprojection_px = located.pose.best.reprojection_px;
+    marker.ambiguity = located.pose.ambiguity;
+    return marker;
+}
+
+} // namespace
+
+MarkerReport::MarkerReport(const arhost_tracker_setup &setup, const std::string &family, std::size_t id_count)
+    : lens_(*setup.intrinsics), family_(family) {
+    if (setup.marker_count < 1 || setup.marker_count > ARHOST_MAX_MARKERS)
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::to_string(setup.marker_count) +
+                                                             " markers are listed; list 1 to " +
+                                                             std::to_string(ARHOST_MAX_MARKERS));
+    for (std::uint32_t i = 0; i < setup.marker_count; ++i) {
+        const arhost_marker_config &marker = listed_marker(setup, i);
+        const std::string name = "marker id " + std::to_string(marker.id);
+        if (marker.id < 0 || static_cast<std::size_t>(marker.id) >= id_count)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          name + " is not in " + family + ", whose ids are 0 to " + std::to_string(id_count - 1));
+        if (std::ranges::find(ids_, marker.id) != ids_.end())
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name + " is listed twice");
+        if (!(marker.side_mm > 0) || !std::isfinite(marker.side_mm))
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name +
+                                                                 " has no usable side_mm; give the side of its black "
+                                                                 "square in millimetres");
+        ids_.push_back(marker.id);
+        sides_mm_.push_back(marker.side_mm);
+    }
+}
+
+void MarkerReport::write(std::span<const Sighting> sightings, arhost_tracker_result &result) const {
+    std::vector<std::optional<Located>> best(ids_.size());
+    for (const Sighting &sighting : sightings) {
+        const auto pose = planar_pose(sighting.corners_px, lens_, sides_mm_.at(sighting.listed));
+        if (!pose)
+            continue;
+        std::optional<Located> &held = best[sighting.listed];
+        const Located found{sighting, *pose};
+        if (!held || is_better(found, *held))
+            held = found;
+    }
+    result.marker_count = 0;
+    for (std::size_t i = 0; i < best.size(); ++i)
+        if (best[i])
+            result.markers[result.marker_count++] = record(*best[i], ids_[i], family_);
+}
+
+} // namespace arhost::planar

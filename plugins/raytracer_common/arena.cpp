@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raytracer_common/arena.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace arhost::view {
+
+bool is_identity(const float *world_from_object) {
+    constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    return std::equal(identity, identity + 12, world_from_object);
+}
+
+Cofactors::Cofactors(const float *m) {
+    for (int column = 0; column < 3; ++column) {
+        const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
+        for (int row = 0; row < 3; ++row) {
+            const int i = (row + 1) % 3, j = (row + 2) % 3;
+            of[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
+        }
+    }
+    determinant = m[0] * of[0] + m[1] * of[1] + m[2] * of[2];
+}
+
+void Cofactors::put_normal_transform(float *to) const {
+    double largest = 0;
+    for (const double value : of)
+        largest = std::max(largest, std::abs(value));
+    for (const double value : of)
+        *to++ = static_cast<float>(value / (determinant < 0 ? -largest : largest));
+}
+
+} // namespace arhost::view

@@ -1,0 +1,597 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The program about the tests: what it reports, how, and with which exit status.
+#include "conform_run.hpp"
+
+#include <gmock/gmock.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <thread>
+
+namespace arhost::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string rt_embree = ARHOST_PLUGIN_DIRECTORY "/rt_embree.so";
+
+TEST(Conform, ListsTheTestsThatAPatternMatches) {
+    ConformRun run;
+    EXPECT_EQ(run.run({"--list", "--only", "raytracer.*-alpha"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("raytracer.miss-alpha "));
+    EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
+}
+
+TEST(Conform, SaysWhatIsWrongWithNumbersAndHowToSeeItAgain) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("miss_alpha_1").string();
+    EXPECT_EQ(run.run({plugin, "--only", "raytracer.miss-alpha", "--seed", "7", "--set", "samples=2"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("pixel (0, 0): no ray hit, alpha is 1 and must be 0"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("arhost conform " + plugin + " --only raytracer.miss-alpha --seed 7 --set samples=2"));
+}
+
+TEST(Conform, NamesTheSignalAndTheCall) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("crash_in_render").string(), "--only", "raytracer.render"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.render\n         SIGSEGV in render"));
+}
+
+TEST(Conform, SkipsWhatNeedsATestThatHasNotPassed) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string()}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("raytracer.start\n         needs abi.create, which has not passed"));
+}
+
+TEST(Conform, RunsWhatATestNeedsWithoutAWord) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.miss-alpha"}), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
+    EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string(), "--only", "abi.longer-options"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("crashed  abi.create\n"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n         needs abi.create, which has not "));
+}
+
+TEST(Conform, TellsInOnePlaceWhatCantBeLoaded) {
+    ConformRun run;
+    run.write("text.so", "no library");
+    EXPECT_EQ(run.run({"text.so", "--only", "abi.longer-options"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("fail     abi.load\n"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n"));
+}
+
+TEST(Conform, ErrsWhereNoTestRan) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("no test"));
+}
+
+TEST(Conform, ErrsWhereTheReferenceIsMissing) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", "none.so"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("none.so' is not there; give --reference FILE"));
+}
+
+// What is wrong with the reference is no plugin's fault.
+TEST(Conform, ErrsWhereTheReferenceCantBeComparedWith) {
+    ConformRun run;
+    run.write("text.so", "no library");
+    const std::string crashing = run.link_wrong("crash_in_render").string();
+    for (const auto &[reference, why] :
+         {std::pair<std::string, std::string>{ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
+                                              "tracker_aruco.so' is a tracker and must be a ray tracer"},
+          {"text.so", "text.so' can't be used, by abi.load: "},
+          {crashing, "can't be used, by raytracer.render: SIGSEGV in render"}}) {
+        EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
+                           ARHOST_PLUGIN_DIRECTORY}),
+                  2);
+        EXPECT_THAT(run.output(), HasSubstr("error    raytracer.reference\n"));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+    }
+}
+
+TEST(Conform, TellsHowToRunATestAgainAsItWasRun) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("no_licence").string(), reference = run.link_wrong("none").string();
+    EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", ARHOST_PLUGIN_DIRECTORY, "--reference",
+                       reference, "--timeout-factor", "2.5"}),
+              1);
+    EXPECT_THAT(run.output(),
+                HasSubstr("again: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
+                          ARHOST_PLUGIN_DIRECTORY + " --reference " + reference + " --timeout-factor 2.5\n"));
+}
+
+TEST(Conform, RefusesOptionsThatMakeNoSense) {
+    const std::array<std::array<std::string, 3>, 13> wrong = {
+        {{"--timeout-factor", "nan", "'nan' must be a number from 0.001 to 1000"},
+         {"--timeout-factor", "1e300", "'1e300' must be a number from 0.001 to 1000"},
+         {"--seed", "99999999999999999999", "must be a whole number from 0 to 18446744073709551615"},
+         {"--seed", "-1", "must be a whole number from 0 to"},
+         {"--reads", "", "does not exist"},
+         {"--reads", "nowhere", "does not exist: nowhere"},
+         {"--reference", "", "the name is empty"},
+         {"--json", "", "the name is empty"},
+         {"--print", "1=", "must be ID=FILE"},
+         {"--print", "99999999999=a.png", "must be ID=FILE"},
+         {"--environment", "A=B", "'A=B' must be a variable's name alone"},
+         {"--environment", "A B", "'A B' must be a variable's name alone"},
+         {"--environment", "", "must be a variable's name alone"}}};
+    for (const auto &[option, value, why] : wrong) {
+        ConformRun run;
+        EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, value}), 2) << option << " " << value;
+        EXPECT_THAT(run.output(), HasSubstr(option));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+        EXPECT_THAT(run.output(), Not(HasSubstr("abi.load")));
+    }
+}
+
+TEST(Conform, SeesBeforeTheRunWhetherItsReportsCanBeWritten) {
+    ConformRun run;
+    std::filesystem::create_directory(run.path("folder"));
+    for (const auto &[file, why] : {std::pair<std::string, std::string>{"none/page", "No such file"},
+                                    {"folder", "can't write folder: it is a folder"}})
+        for (const std::string option : {"--json", "--junit", "--html"}) {
+            EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, file}), 2);
+            EXPECT_THAT(run.output(), HasSubstr(why));
+            EXPECT_THAT(run.output(), Not(HasSubstr("abi.load")));
+        }
+}
+
+bool has_unfinished_file(const ConformRun &run) {
+    const std::filesystem::directory_iterator files(run.path("."));
+    return std::any_of(begin(files), end(files), [](const auto &file) { return file.path().extension() == ".tmp"; });
+}
+
+TEST(Conform, WritesNoTwoReportsToOneFile) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "report", "--html", "./report"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("can't write ./report: another report is written there"));
+    EXPECT_FALSE(has_unfinished_file(run));
+}
+
+TEST(Conform, WritesAReportWhereALinkLeads) {
+    ConformRun run;
+    run.write("target.json", "earlier");
+    std::filesystem::create_symlink("target.json", run.path("link.json"));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "link.json"}), 0);
+    EXPECT_TRUE(std::filesystem::is_symlink(run.path("link.json")));
+    EXPECT_EQ(run.json("target.json").at("exit_status"), 0);
+}
+
+TEST(Conform, KeepsAnEarlierReportUntilThereIsANewOne) {
+    ConformRun run;
+    run.write("results.json", "earlier");
+    EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*", "--json", "results.json"}), 2);
+    EXPECT_EQ(run.read("results.json"), "earlier");
+    EXPECT_FALSE(has_unfinished_file(run));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "results.json"}), 0);
+    EXPECT_EQ(run.json("results.json").at("exit_status"), 0);
+    EXPECT_FALSE(has_unfinished_file(run));
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "/dev/stdout"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("\"exit_status\": 0"));
+}
+
+TEST(Conform, WritesNoReportOverWhatItReads) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("none").string();
+    run.write("print.png", "no picture");
+    std::filesystem::create_hard_link(run.path("print.png"), run.path("other.png"));
+    for (const std::vector<std::string> &report : {std::vector<std::string>{"--json", plugin},
+                                                   {"--junit", rt_embree},
+                                                   {"--html", "print.png", "--print", "1=print.png"},
+                                                   {"--html", "other.png", "--reads", "print.png"}}) {
+        std::vector<std::string> arguments = {plugin, "--only", "abi.load", "--reference", rt_embree};
+        arguments.insert(arguments.end(), report.begin(), report.end());
+        EXPECT_EQ(run.run(arguments), 2) << report[1];
+        EXPECT_THAT(run.output(), HasSubstr("can't write " + report[1] + ": it is a file that this run reads"));
+    }
+    EXPECT_EQ(run.read("print.png"), "no picture");
+}
+
+TEST(Conform, IsNotWellWhereItsWordsCanNotBeWritten) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("standard output can't be written: No space left on device"));
+}
+
+TEST(Conform, SaysSoWhereTheListCanNotBeWritten) {
+    ConformRun run;
+    run.start({"--list"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("No space left on device"));
+}
+
+TEST(Conform, EndsAsItShouldWhereNobodyCanBeTold) {
+    for (const char *stream : {"/dev/full", "pipe"}) {
+        ConformRun run;
+        run.start({"nosuch.so"}, [&] {
+            int ends[2];
+            if (stream != std::string("pipe") || ::pipe2(ends, O_CLOEXEC) != 0)
+                ::dup2(::open("/dev/full", O_WRONLY), STDERR_FILENO);
+            else
+                ::dup2(ends[1], STDERR_FILENO); // whose other end is shut by exec
+        });
+        EXPECT_EQ(run.wait(), 2) << stream;
+    }
+}
+
+// A pipe that is full and that nobody reads.
+TEST(Conform, IsEndedBySignalsWhereNobodyReadsIt) {
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
+        ConformRun run;
+        std::filesystem::create_directory(run.path("tmp"));
+        int ends[2];
+        ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+        ::fcntl(ends[1], F_SETPIPE_SZ, 4096);
+        ASSERT_EQ(::write(ends[1], std::string(4096, ' ').data(), 4096), 4096);
+        run.start({run.link_wrong("none").string(), "--only", "abi.create", "--json", "results.json", "--environment",
+                   "ARHOST_TELLS_DESCRIPTORS"},
+                  [&] {
+                      ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
+                      ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                      ::dup2(ends[1], stream);
+                      std::signal(SIGTERM, SIG_DFL);
+                  });
+        while (run.running() && std::filesystem::is_empty(run.path("tmp"))) // a test runs: signals are taken
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(500)); // and by now it has something to say
+        ::kill(run.pid(), SIGTERM);
+        EXPECT_EQ(run.wait(), 128 + SIGTERM);
+        EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+        EXPECT_FALSE(run.exists("results.json"));
+        EXPECT_FALSE(has_unfinished_file(run));
+        ::close(ends[0]);
+        ::close(ends[1]);
+    }
+}
+
+TEST(Conform, RefusesToRunWhereAPluginWouldBeBlamed) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] {
+        const rlimit few{16, 16};
+        ::setrlimit(RLIMIT_NOFILE, &few);
+    });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("16 files may be open at once, and "));
+    EXPECT_THAT(run.output(), HasSubstr("raise it: ulimit -n "));
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::setenv("TMPDIR", "/no/such/folder", 1); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that is there"));
+    std::filesystem::create_directory(run.path("caf\xe9"));
+    run.start({rt_embree, "--only", "abi.load"}, [&] { ::setenv("TMPDIR", run.path("caf\xe9").c_str(), 1); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("is no UTF-8, as what a plugin is given must be"));
+}
+
+TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
+    ConformRun run;
+    run.start({rt_embree, "--only", "abi.load"}, [] { ::signal(SIGCHLD, SIG_IGN); });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
+// ---- What a plugin gets, leaves behind, and says ---------------------------------------------------
+
+TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
+    ConformRun run;
+    run.write("secret.txt", "secret");
+    run.start({run.link_wrong("none").string(), "--only", "abi.create", "--environment", "ARHOST_TELLS_DESCRIPTORS"},
+              [] {
+                  ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                  const int secret = ::open("secret.txt", O_RDWR);
+                  ::dup2(secret, STDIN_FILENO);
+                  ::dup2(secret, 9);
+              });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("0 is /dev/null"));
+    EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
+}
+
+// The process that rt_hangs_beside_a_process has started.
+pid_t process_beside(const ConformRun &run) {
+    const std::string before = "process ";
+    for (int i = 0; i < 5000; ++i) {
+        const std::string output = run.output();
+        if (const std::size_t at = output.find(before);
+            at != std::string::npos && output.find('\n', at) < output.size())
+            return std::stoi(output.substr(at + before.size()));
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    throw std::runtime_error("it has started none: " + run.output());
+}
+
+TEST(Conform, EndsWhatATestHasStarted) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
+                       "processes"}), // and not less patience: what comes before it must end in time
+              1);
+    EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
+    EXPECT_FALSE(is_alive(process_beside(run)));
+}
+
+TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        ConformRun run;
+        std::filesystem::create_directory(run.path("tmp"));
+        run.start({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow", "processes",
+                   "--json", "results.json"},
+                  [&] {
+                      ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
+                      std::signal(signal, SIG_DFL); // whatever this test's parent has it at
+                  });
+        const pid_t process = process_beside(run);
+        EXPECT_TRUE(is_alive(process));
+        EXPECT_FALSE(std::filesystem::is_empty(run.path("tmp")));
+        ::kill(run.pid(), signal);
+        EXPECT_EQ(run.wait(), 128 + signal);
+        EXPECT_THAT(run.output(), HasSubstr("interrupted after 1 of 2 tests\n"));
+        EXPECT_FALSE(is_alive(process));
+        EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+        EXPECT_FALSE(run.exists("results.json"));
+        EXPECT_FALSE(has_unfinished_file(run));
+    }
+}
+
+TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("floods_descriptor_3").string(), "--only", "abi.create"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: more than 32 MiB"));
+    EXPECT_EQ(run.run({run.link_wrong("writes_to_descriptor_3").string(), "--only", "abi.create"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: '{} {"));
+}
+
+TEST(Conform, FailsDescriptorsThatAHostCantTake) {
+    const std::array<std::array<std::string, 3>, 4> wrong = {
+        {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes, and 4096 are the most"},
+         {"many_options", "abi.load", "bytes as JSON, and 130048 are the most: fewer options"},
+         {"option_without_key", "abi.load", "its option 1 has no key"},
+         {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
+    for (const auto &[defect, test, why] : wrong) {
+        ConformRun run;
+        EXPECT_EQ(run.run({run.link_wrong(defect).string(), "--only", "abi.*"}), 1);
+        EXPECT_THAT(run.output(), HasSubstr("fail     " + test));
+        EXPECT_THAT(run.output(), HasSubstr(why));
+    }
+}
+
+TEST(Conform, ShowsAPluginsWordsWithoutTheirControlCharacters) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("create_fails").string(), "--only", "abi.create", "--junit", "junit.xml",
+                       "--html", "page.html"}),
+              1);
+    EXPECT_THAT(run.output(), HasSubstr("create returned UNSUPPORTED: no [2J \ufffd<&\n"));
+    for (const std::string file : {"junit.xml", "page.html"})
+        EXPECT_THAT(run.read(file), HasSubstr("create returned UNSUPPORTED: no [2J \ufffd&lt;&amp;"));
+}
+
+TEST(Conform, ShowsPathsWithoutTheirControlCharacters) {
+    ConformRun run;
+    run.write("a\x1b[2J\xff/text.so", "no library");
+    EXPECT_EQ(run.run({"a\x1b[2J\xff/text.so", "--junit", "junit.xml", "--html", "page.html"}), 1);
+    for (const std::string &shown : {run.output(), run.read("junit.xml"), run.read("page.html")}) {
+        EXPECT_THAT(shown, HasSubstr("a [2J\ufffd/text.so: can't be loaded"));
+        EXPECT_THAT(shown, HasSubstr("a\\x1b[2J\\xff/text.so")); // in the command, for the shell
+        EXPECT_THAT(shown, Not(HasSubstr("\x1b")));
+        EXPECT_THAT(shown, Not(HasSubstr("\xff")));
+    }
+}
+
+TEST(Conform, ErrsOnAPluginThatIsNotThere) {
+    ConformRun run;
+    EXPECT_EQ(run.run({"nothing.so"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'nothing.so'"));
+}
+
+TEST(Conform, ErrsOnAnOptionThatThePluginHasNot) {
+    ConformRun run;
+    EXPECT_EQ(run.run({rt_embree, "--only", "abi.create", "--set", "sampels=2"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("sampels"));
+}
+
+TEST(Conform, FailsAFileThatIsNoPlugin) {
+    ConformRun run;
+    std::ofstream(run.path("text.so")) << "no library";
+    EXPECT_EQ(run.run({"text.so"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("can't be loaded"));
+}
+
+TEST(Conform, PassesTheTrackers) {
+    for (const std::string name : {"tracker_apriltag", "tracker_aruco"}) {
+        ConformRun run;
+        EXPECT_EQ(
+            run.run({ARHOST_PLUGIN_DIRECTORY "/" + name + ".so", "--timeout-factor", "3", "--json", "results.json"}),
+            0)
+            << run.output();
+        const nlohmann::json report = run.json("results.json");
+        EXPECT_THAT(report.at("results"), testing::SizeIs(testing::Gt(40)));
+    }
+}
+
+TEST(Conform, SaysWhichFunctionIsMissing) {
+    const std::array<std::array<std::string, 3>, 4> lacking = {{{"rt", "render", "a ray tracer"},
+                                                                {"tracker", "track", "a tracker"},
+                                                                {"source", "read", "a source"},
+                                                                {"sink", "write", "a sink"}}};
+    for (const auto &[kind, function, owner] : lacking) {
+        ConformRun run;
+        EXPECT_EQ(run.run({run.link_wrong("no_" + function, kind).string()}), 1);
+        EXPECT_THAT(run.output(),
+                    HasSubstr("its function '" + function + "' is NULL, which " + owner + " must have"));
+    }
+}
+
+TEST(Conform, TellsHowLongAFrameTakesWhereItIsSoonEnoughToo) {
+    ConformRun run;
+    run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--timeout-factor", "3", "--only", "tracker.speed",
+             "--json", "results.json", "--html", "page.html"});
+    const auto measured = testing::ContainsRegex("640×480: p50 [0-9.]+ ms, p99 [0-9.]+ ms, of [0-9]+ frames");
+    EXPECT_THAT(run.output(), measured);
+    EXPECT_THAT(run.json("results.json").at("results")[0].at("message").get<std::string>(), measured);
+    EXPECT_THAT(run.read("page.html"), measured);
+}
+
+TEST(Conform, RunsTheTestsOfThePluginsKindAlone) {
+    ConformRun run;
+    run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--only", "*.start", "--json", "results.json"});
+    const nlohmann::json report = run.json("results.json");
+    ASSERT_EQ(report.at("results").size(), 1u);
+    EXPECT_EQ(report.at("results")[0].at("test"), "tracker.start");
+}
+
+// Of tag36h11, which is none of the suite's own.
+void write_tag_0(const std::filesystem::path &file) {
+    std::string cells = "########"
+                        "#..#.#.#"
+                        "##...#.#"
+                        "##..####"
+                        "#.#.####"
+                        "##.#..##"
+                        "####.###"
+                        "########";
+    std::ranges::replace(cells, '#', '\0');
+    std::ranges::replace(cells, '.', '\xff');
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = png.height = 8;
+    png.format = PNG_FORMAT_GRAY;
+    ASSERT_TRUE(png_image_write_to_file(&png, file.c_str(), 0, cells.data(), 0, nullptr));
+}
+
+TEST(Conform, DrawsTheMarkersThatAreGiven) {
+    ConformRun run;
+    write_tag_0(run.path("tag.png"));
+    const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so", tag = run.path("tag.png");
+    EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.*s"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("pass     tracker.corners"));
+    EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("it takes three prints"));
+    EXPECT_EQ(run.run({tracker, "--print", "5=" + tag, "--only", "tracker.track"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("0 markers are seen and must be one"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("again: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
+}
+
+TEST(Conform, ErrsOnAMarkerThatCantBeRead) {
+    ConformRun run;
+    const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
+    EXPECT_EQ(run.run({tracker, "--print", "one=tag.png"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("--print one=tag.png: must be ID=FILE"));
+    EXPECT_EQ(run.run({tracker, "--print", "1=none.png", "--only", "tracker.track"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("none.png"));
+}
+
+TEST(Conform, SkipsWhatNeedsADeviceThatIsNotThere) {
+    ConformRun run;
+    EXPECT_EQ(
+        run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--allow", "video", "--set", "device=/dev/arhost-none"}),
+        0);
+    EXPECT_THAT(run.output(), HasSubstr("skip     source.start\n         it needs 'video', and start returned "));
+    EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
+}
+
+TEST(Conform, SkipsWhatMakesAnInstanceWhereANeedIsNotAllowed) {
+    ConformRun run;
+    const std::string camera = ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so";
+    EXPECT_EQ(run.run({camera}), 0);
+    const std::string why = "it needs 'video', which the sandbox keeps from it: give --allow video";
+    EXPECT_THAT(run.output(), HasSubstr("pass     abi.descriptor"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.create\n         " + why));
+    EXPECT_THAT(run.output(), HasSubstr("skip     source.seek\n         " + why));
+    EXPECT_EQ(run.run({camera, "--only", "abi.create", "--sandbox", "none"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("pass     abi.create"));
+    EXPECT_EQ(run.run({camera, "--allow", "vidoe"}), 2);
+}
+
+TEST(Conform, PutsThePluginIntoTheSandboxOfARun) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("opens_a_socket", "source").string();
+    EXPECT_EQ(run.run({plugin, "--only", "source.start", "--reads", "/srv"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("no socket: Operation not permitted"));
+    EXPECT_THAT(run.output(), HasSubstr("--only source.start --seed 1 --reads /srv\n"));
+    for (const std::vector<std::string> &options :
+         {std::vector<std::string>{"--allow", "network"}, {"--sandbox", "none"}}) {
+        std::vector<std::string> arguments = {plugin, "--only", "source.start"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        EXPECT_EQ(run.run(arguments), 0) << run.output();
+    }
+}
+
+TEST(Conform, LetsAPluginWriteIntoItsTestsFolderAlone) {
+    ConformRun run;
+    const std::string plugin = run.link_wrong("caches_beside_its_library", "sink").string();
+    const std::filesystem::path cache = run.path("sink_caches_beside_its_library.cache");
+    EXPECT_EQ(run.run({plugin, "--only", "sink.start"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("can't write " + cache.string()));
+    EXPECT_FALSE(std::filesystem::exists(cache));
+    EXPECT_EQ(run.run({plugin, "--only", "sink.start", "--sandbox", "none"}), 0);
+    EXPECT_TRUE(std::filesystem::exists(cache));
+}
+
+TEST(Conform, NamesTheNeedThatIsUnknown) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost can't allow; what a plugin may need "
+                                        "is video, usb, gpu, display, network, processes"));
+}
+
+TEST(Conform, LeavesNothingOfASinksFilesBehind) {
+    ConformRun run;
+    std::filesystem::create_directory(run.path("tmp"));
+    run.link_wrong("crash_in_stop", "sink");
+    run.start({"sink_crash_in_stop.so", "--only", "sink.w*", "--set", "path=out/frame"},
+              [&] { ::setenv("TMPDIR", run.path("tmp").c_str(), 1); });
+    EXPECT_EQ(run.wait(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("SIGSEGV in stop"));
+    EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
+    EXPECT_FALSE(std::filesystem::exists(run.path("out")));
+}
+
+TEST(Conform, BlamesNoSinkForAFullDisk) {
+    ConformRun run;
+    run.start({ARHOST_PLUGIN_DIRECTORY "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"}, [] {
+        const rlimit full{1 << 20, 1 << 20}; // as far as a process can see
+        ::setrlimit(RLIMIT_FSIZE, &full);
+    });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("error    sink.start\n"));
+    EXPECT_THAT(run.output(), HasSubstr("has no room for 16 MiB: File too large; free some, or set TMPDIR"));
+}
+
+TEST(Conform, BlamesASinkThatLeavesNoDescriptor) {
+    ConformRun run;
+    run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks", "--jobs", "1"}, [] {
+        const rlimit few{100, 100}; // gone after the warm-up
+        ::setrlimit(RLIMIT_NOFILE, &few);
+    });
+    EXPECT_EQ(run.wait(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("fail     sink.leaks\n"));
+}
+
+TEST(Conform, WritesAPageThatShowsTheWrongPixel) {
+    ConformRun run;
+    run.run({run.link_wrong("bgra").string(), "--only", "raytracer.reference", "--html", "page.html"});
+    const std::string page = run.read("page.html");
+    EXPECT_THAT(page, HasSubstr("<figcaption>rendered</figcaption>"));
+    EXPECT_THAT(page, HasSubstr("<figcaption>reference</figcaption>"));
+    EXPECT_THAT(page, HasSubstr("src=\"data:image/png;base64,iVBORw0KGgo"));
+    EXPECT_THAT(page, HasSubstr("<i style=\"left:"));
+    EXPECT_THAT(page, Not(HasSubstr("http")));
+}
+
+TEST(Conform, WritesJUnitForContinuousIntegration) {
+    ConformRun run;
+    run.run({run.link_wrong("no_licence").string(), "--only", "abi.*", "--junit", "junit.xml"});
+    const std::string xml = run.read("junit.xml");
+    EXPECT_THAT(xml, HasSubstr("tests=\"12\" failures=\"1\" errors=\"0\" skipped=\"0\""));
+    EXPECT_THAT(xml, HasSubstr("<testcase classname=\"abi\" name=\"descriptor\""));
+    EXPECT_THAT(xml, HasSubstr("<failure type=\"fail\" message=\"the descriptor's licence is empty\">"));
+}
+
+} // namespace
+} // namespace arhost::test

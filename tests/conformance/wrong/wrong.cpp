@@ -1,0 +1,547 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every wrong ray tracer at once: rt_embree with the one defect that this library's file name tells, so
+// rt_bgra.so, a link to it, has red and blue exchanged. A name that is no defect's has none.
+#include "defect.hpp"
+
+#include <arhost/arhost.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace {
+
+using namespace arhost::test;
+
+// ---- The ray tracer that is spoilt ------------------------------------------------------------------
+
+struct AtEnds {
+    AtEnds() {
+        if (has("crash_in_constructor"))
+            crash();
+    }
+    ~AtEnds() {
+        if (has("crash_at_exit"))
+            crash();
+    }
+} at_ends;
+
+const arhost_plugin &embree() {
+    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/rt_embree.so");
+    return plugin;
+}
+const arhost_raytracer &embree_functions() {
+    return *static_cast<const arhost_raytracer *>(embree().functions);
+}
+
+using SceneCopy = std::unique_ptr<std::byte, decltype(&std::free)>;
+
+struct Wrong {
+    arhost_instance *real = nullptr;
+    const arhost_host *host = nullptr;
+    bool was_started = false, is_tiny = false;
+    unsigned users = 0;
+    std::int64_t threads = 0;              // the option
+    std::vector<std::uint8_t> last;        // image
+    SceneCopy scene{nullptr, &std::free};  // spoilt
+    arhost_instance *glass_only = nullptr; // shadows_add: another instance, and its scene
+    SceneCopy glass_scene{nullptr, &std::free};
+};
+Wrong &wrong(arhost_instance *instance) {
+    return *reinterpret_cast<Wrong *>(instance);
+}
+
+// ---- What is asked, spoilt ---------------------------------------------------------------------------
+
+arhost_intrinsics spoil(arhost_intrinsics in) {
+    if (has("half_a_pixel")) {
+        in.cx += 0.5;
+        in.cy += 0.5;
+    }
+    if (has("focal_1_percent"))
+        in.fx *= 1.01, in.fy *= 1.01;
+    if (has("square_pixels"))
+        in.fy = in.fx;
+    if (has("centred_principal_point")) {
+        in.cx = (in.width - 1) / 2.0;
+        in.cy = (in.height - 1) / 2.0;
+    }
+    if (has("no_lens")) {
+        in.distortion = ARHOST_DISTORTION_NONE;
+        in.coefficient_count = 0;
+    }
+    if (has("tangential_swapped") && in.distortion == ARHOST_DISTORTION_BROWN)
+        std::swap(in.coefficients[2], in.coefficients[3]);
+    return in;
+}
+
+arhost_camera spoil(arhost_camera camera) {
+    camera.intrinsics = spoil(camera.intrinsics);
+    if (has("flipped_z"))
+        for (double *vector : {camera.eye, camera.look_at, camera.up})
+            vector[2] = -vector[2];
+    if (has("metres"))
+        for (double *vector : {camera.eye, camera.look_at})
+            std::for_each_n(vector, 3, [](double &x) { x /= 1000; });
+    if (has("look_at_is_a_direction"))
+        for (int i = 0; i < 3; ++i)
+            camera.look_at[i] += camera.eye[i];
+    if (has("small_world"))
+        camera.eye[2] = std::min(camera.eye[2], 1e5);
+    if (has("own_up")) {
+        const std::array<double, 3> y = {0, 1, 0};
+        std::copy(y.begin(), y.end(), camera.up);
+    }
+    return camera;
+}
+
+// ---- What is answered, spoilt ------------------------------------------------------------------------
+
+struct Pixels {
+    const arhost_image &image;
+    std::uint8_t *at(std::uint32_t x, std::uint32_t y) const {
+        return image.rgba + std::size_t{image.stride} * y + std::size_t{4} * x;
+    }
+    template <class Function> void each(Function &&function) const {
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            for (std::uint32_t x = 0; x < image.width; ++x)
+                function(at(x, y));
+    }
+    void replace_alpha(int from, int to) const {
+        each([&](std::uint8_t *p) { p[3] = p[3] == from ? static_cast<std::uint8_t>(to) : p[3]; });
+    }
+    template <class Function> void each_colour(Function &&function) const {
+        each([&](std::uint8_t *p) {
+            for (int channel = 0; channel < 3; ++channel)
+                p[channel] = static_cast<std::uint8_t>(std::lround(255 * function(p[channel] / 255.0, p[3] / 255.0)));
+        });
+    }
+};
+
+void spoil(const Pixels &pixels) {
+    const arhost_image &image = pixels.image;
+    if (has("miss_alpha_1"))
+        pixels.replace_alpha(0, 1);
+    if (has("opaque_background"))
+        pixels.replace_alpha(0, 255);
+    if (has("hit_alpha_254"))
+        pixels.replace_alpha(255, 254);
+    if (has("shadow_alpha_154"))
+        pixels.replace_alpha(153, 154);
+    if (has("one_shadow_class"))
+        pixels.replace_alpha(77, 153);
+    if (has("own_shadow_alphas")) {
+        pixels.replace_alpha(204, 153);
+        pixels.replace_alpha(51, 77);
+    }
+    if (has("no_shadows"))
+        pixels.each([](std::uint8_t *p) { p[3] = p[3] == 255 ? 255 : 0; });
+    if (has("green_shadows"))
+        pixels.each([](std::uint8_t *p) { p[1] = p[3] == 153 || p[3] == 77 ? 30 : p[1]; });
+    if (has("bgra"))
+        pixels.each([](std::uint8_t *p) { std::swap(p[0], p[2]); });
+    if (has("premultiplied"))
+        pixels.each_colour([](double colour, double alpha) { return colour * alpha; });
+    if (has("dark"))
+        pixels.each_colour([](double colour, double) { return 0.8 * colour; });
+    if (has("pale"))
+        pixels.each_colour([](double colour, double) { return colour > 0 ? 0.5 + 0.5 * colour : 0; });
+    if (has("linear_codes"))
+        pixels.each_colour([](double colour, double) { return std::pow(colour, 2.2); });
+    if (has("gamma_2_2"))
+        pixels.each_colour([](double c, double) {
+            return std::pow(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4), 1 / 2.2);
+        });
+    if (has("flipped_rows"))
+        for (std::uint32_t y = 0; y < image.height / 2; ++y)
+            std::swap_ranges(pixels.at(0, y), pixels.at(0, y) + std::size_t{4} * image.width,
+                             pixels.at(0, image.height - 1 - y));
+    if (has("mirrored_columns"))
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            for (std::uint32_t x = 0; x < image.width / 2; ++x)
+                std::swap_ranges(pixels.at(x, y), pixels.at(x, y) + 4, pixels.at(image.width - 1 - x, y));
+    if (has("writes_behind"))
+        std::memset(pixels.at(0, image.height - 1) + image.stride, 0, 4);
+    if (has("writes_before"))
+        image.rgba[-1] = 0;
+    if (has("writes_padding"))
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            std::memset(pixels.at(image.width, y), 0, 4);
+}
+
+// ---- The plugin --------------------------------------------------------------------------------------
+
+Wrong *only = nullptr; // one_instance: the one that lives
+
+// In a session of its own and nobody's child.
+void start_a_process() {
+    if (::fork() != 0)
+        return;
+    ::setsid();
+    if (::fork() != 0)
+        ::_exit(0);
+    ::dprintf(STDERR_FILENO, "process %d\n", ::getpid());
+    hang();
+}
+
+arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
+                     arhost_instance **instance) {
+    if (has("crash_in_create"))
+        crash();
+    if (has("hang_in_create"))
+        hang();
+    if (has("hangs_beside_a_process")) {
+        start_a_process();
+        hang();
+    }
+    if (std::getenv("ARHOST_TELLS_DESCRIPTORS"))
+        for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+            std::error_code closed; // the folder's own
+            ::dprintf(STDERR_FILENO, "%s is %s\n", entry.path().filename().c_str(),
+                      std::filesystem::read_symlink(entry, closed).c_str());
+        }
+    if (has("writes_to_descriptor_3"))
+        (void)!::write(3, "{}\n", 3);
+    if (has("tells_its_own_verdict")) {
+        constexpr std::string_view told =
+            R"({"test": "abi.create", "verdict": "brilliant", "message": "", "seconds": 0,)"
+            R"( "facts": {}, "images": []})"
+            "\n";
+        (void)!::write(3, told.data(), told.size());
+        ::_exit(0);
+    }
+    if (has("refuses_unknown_options") && count > embree().descriptor->option_count) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "there is no such option");
+        return ARHOST_STATUS_ERROR_CONFIGURATION;
+    }
+    if (has("floods_descriptor_3"))
+        for (const std::vector<char> zeros(1 << 16, '0');;)
+            (void)!::write(3, zeros.data(), zeros.size());
+    if (has("no_instance"))
+        return ARHOST_STATUS_OK;
+    if (has("create_fails")) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "no\x1b[2J\n\xff<&");
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
+    }
+    if (has("needs_an_extension") && *static_cast<const int *>(host->get_extension(host, "arhost.host.depth/1")) == 0)
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
+    if (has("leaks_memory"))
+        leak_memory(1 << 18);
+    if (has("leaks_descriptors"))
+        (void)::dup(0);
+    if (has("leaves_a_thread"))
+        std::thread(hang).detach();
+    if (has("cancelled_create_is_internal") && host->cancelled(host))
+        return ARHOST_STATUS_ERROR_INTERNAL;
+    if (has("one_instance") && only) {
+        ++only->users;
+        *instance = reinterpret_cast<arhost_instance *>(only);
+        return ARHOST_STATUS_OK;
+    }
+    auto *made = new Wrong;
+    const arhost_status status = embree().create(host, options, count, &made->real);
+    if (has("shadows_add"))
+        embree().create(host, options, count, &made->glass_only);
+    made->host = host;
+    made->users = 1;
+    made->threads = arhost_find_option(options, count, "threads")->integer;
+    if (has("steps_by_its_own_size"))
+        for (std::uint32_t i = 0; i < count; ++i)
+            if (options[i].key == std::string_view("threads"))
+                made->threads = options[i].integer;
+    only = made;
+    *instance = reinterpret_cast<arhost_instance *>(made);
+    return status;
+}
+
+void destroy(arhost_instance *instance) {
+    if (has("crash_in_destroy"))
+        crash();
+    Wrong &self = wrong(instance);
+    if (--self.users > 0)
+        return;
+    embree().destroy(self.real);
+    if (self.glass_only)
+        embree().destroy(self.glass_only);
+    only = nullptr;
+    delete &self;
+}
+
+template <class T> std::span<const T> view(const arhost_scene &scene, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset), buffer.count};
+}
+bool has_degenerate_triangle(const arhost_scene &scene) {
+    using Triangle = std::array<std::uint32_t, 3>;
+    for (const auto &geometry : view<arhost_geometry>(scene, scene.geometries))
+        for (const Triangle &t : view<Triangle>(scene, geometry.indices))
+            if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
+                return true;
+    return false;
+}
+
+SceneCopy make_copy(const arhost_scene &scene) {
+    SceneCopy copy(static_cast<std::byte *>(std::aligned_alloc(64, (scene.byte_size + 63) / 64 * 64)), &std::free);
+    std::memcpy(copy.get(), &scene, scene.byte_size);
+    return copy;
+}
+arhost_scene &scene_in(const SceneCopy &copy) {
+    return *reinterpret_cast<arhost_scene *>(copy.get());
+}
+
+// A sphere is before the camera, less than a millimetre off.
+bool is_near(const Wrong &self, const arhost_camera &camera) {
+    const arhost_scene &scene = scene_in(self.scene);
+    for (const auto &geometry : view<arhost_geometry>(scene, scene.geometries))
+        if (geometry.type == ARHOST_GEOMETRY_SPHERES)
+            for (const auto &s : view<std::array<float, 4>>(scene, geometry.positions)) {
+                const double distance =
+                    std::hypot(s[0] - camera.eye[0], s[1] - camera.eye[1], s[2] - camera.eye[2]) - double{s[3]};
+                if (distance > 0 && distance < 1)
+                    return true;
+            }
+    return false;
+}
+
+template <class T> std::span<T> view(arhost_scene &scene, const arhost_buffer &buffer) {
+    const auto seen = view<T>(std::as_const(scene), buffer);
+    return {const_cast<T *>(seen.data()), seen.size()};
+}
+
+void spoil(arhost_scene &scene) {
+    const auto geometries = view<arhost_geometry>(scene, scene.geometries);
+    const auto objects = view<arhost_object>(scene, scene.objects);
+    if (has("knows_8_objects"))
+        scene.objects.count = std::min(scene.objects.count, 8u);
+    if (has("knows_256_objects"))
+        scene.objects.count = std::min(scene.objects.count, 256u);
+    if (has("materials_by_object"))
+        for (std::uint32_t i = 0; i < objects.size(); ++i)
+            objects[i].material = std::min(i, scene.materials.count - 1);
+    if (has("indices_of_16_bits"))
+        for (const arhost_geometry &geometry : geometries)
+            for (auto &triangle : view<std::array<std::uint32_t, 3>>(scene, geometry.indices))
+                for (std::uint32_t &index : triangle)
+                    index &= 0xffff;
+    if (has("normals_like_points")) // by the inverse's transpose these come out as if they were turned like points
+        for (const arhost_object &object : objects) {
+            const float *m = object.world_from_object;
+            for (auto &normal : view<std::array<float, 3>>(scene, geometries[object.geometry].normals)) {
+                std::array<float, 3> turned{}, back{};
+                for (std::size_t i = 0; i < 9; ++i)
+                    turned[i % 3] += m[i] * normal[i / 3];
+                for (std::size_t i = 0; i < 9; ++i)
+                    back[i / 3] += m[i] * turned[i % 3];
+                normal = back;
+            }
+        }
+}
+
+// Of the scene's virtual objects the others are far below.
+void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
+    self.glass_scene = make_copy(*setup.scene);
+    arhost_scene *scene = &scene_in(self.glass_scene);
+    const auto materials = view<arhost_material>(*scene, scene->materials);
+    for (arhost_object &object : view<arhost_object>(*scene, scene->objects))
+        if (object.role == ARHOST_ROLE_VIRTUAL && materials[object.material].model != ARHOST_MATERIAL_GLASS)
+            object.world_from_object[11] -= 1e6f;
+    setup.scene = scene;
+    embree_functions().start(self.glass_only, &setup);
+}
+
+arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *setup) {
+    if (has("crash_in_start"))
+        crash();
+    if (has("hang_in_start"))
+        hang();
+    if (has("writes_into_scene"))
+        const_cast<arhost_scene *>(setup->scene)->max_depth = 1;
+    if (has("crash_on_degenerate") && has_degenerate_triangle(*setup->scene))
+        crash();
+    if (has("starts_once") && std::exchange(wrong(instance).was_started, true))
+        return ARHOST_STATUS_ERROR_INTERNAL;
+    const arhost_intrinsics intrinsics = spoil(*setup->intrinsics);
+    arhost_raytracer_setup spoilt = *setup;
+    spoilt.intrinsics = &intrinsics;
+    Wrong &self = wrong(instance);
+    SceneCopy copy = make_copy(*setup->scene);
+    spoil(scene_in(copy));
+    spoilt.scene = &scene_in(copy);
+    self.is_tiny = spoilt.scene->bounds_max[0] - spoilt.scene->bounds_min[0] < 1;
+    if (self.glass_only)
+        start_glass_only(self, spoilt);
+    const arhost_status status = embree_functions().start(self.real, &spoilt);
+    self.scene = std::move(copy); // only now the one before may go
+    return status;
+}
+
+arhost_status render(arhost_instance *instance, const arhost_render_request *request, const arhost_image *image,
+                     arhost_render_info *info) {
+    Wrong &self = wrong(instance);
+    if (has("crash_in_render"))
+        crash();
+    if (has("hang_in_render"))
+        hang();
+    if (has("exits_in_render"))
+        std::exit(0);
+    if (has("crash_on_nan") && std::isnan(request->camera.eye[0]))
+        crash();
+    if (has("slow") && image->width >= 640)
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    if (has("deaf_while_it_renders") && image->width > 1000)
+        std::this_thread::sleep_for(std::chrono::seconds(8)); // 2 are allowed, times the patience
+    if (has("leaks_descriptors_in_render"))
+        (void)::dup(0);
+    if (has("leaks_memory_in_render"))
+        leak_memory(4096);
+    if (has("cancelled_is_internal") && self.host->cancelled(self.host))
+        return ARHOST_STATUS_ERROR_INTERNAL;
+
+    arhost_render_request spoilt = *request;
+    spoilt.camera = spoil(request->camera);
+    if (has("near_plane") && is_near(self, spoilt.camera))
+        spoilt.camera.eye[2] -= 1; // it looks along -z
+    const arhost_moved_object nowhere{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
+    const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
+    if (has("no_motion") && request->motion)
+        spoilt.motion = &still;
+    const Pixels pixels{*image};
+    std::vector<std::array<std::uint8_t, 4>> before;
+    pixels.each([&](const std::uint8_t *p) { before.push_back({p[0], p[1], p[2], p[3]}); });
+    arhost_status status = embree_functions().render(self.real, &spoilt, image, info);
+    if (has("accepts_parallel_up") && status == ARHOST_STATUS_ERROR_INVALID_ARGUMENT) {
+        spoilt.camera.up[0] += 1;
+        status = embree_functions().render(self.real, &spoilt, image, info);
+    }
+    if (status != ARHOST_STATUS_OK)
+        return status;
+
+    spoil(pixels);
+    if (has("nothing_tiny") && self.is_tiny)
+        pixels.each([](std::uint8_t *p) { p[3] = 0; });
+    if (has("unwritten_pixel"))
+        std::copy(before.back().begin(), before.back().end(), pixels.at(image->width - 1, image->height - 1));
+    if (has("unwritten_misses")) {
+        auto old = before.begin();
+        pixels.each([&](std::uint8_t *p) {
+            if (p[3] == 0)
+                std::copy(old->begin(), old->end(), p);
+            ++old;
+        });
+    }
+    if (has("nondeterministic")) {
+        static std::atomic<unsigned> images{0};
+        const unsigned noise = images++ & 1;
+        pixels.each([&](std::uint8_t *p) { p[1] = static_cast<std::uint8_t>(p[3] == 255 ? p[1] ^ noise : p[1]); });
+    }
+    if (has("depends_on_threads") && self.threads == 2)
+        pixels.each_colour([](double colour, double) { return std::min(1.0, colour + 0.02); });
+    if (has("stale_image")) {
+        const std::size_t size = std::size_t{image->stride} * (image->height - 1) + std::size_t{4} * image->width;
+        std::vector<std::uint8_t> now(image->rgba, image->rgba + size);
+        if (self.last.size() == size)
+            for (std::uint32_t y = 0; y < image->height; ++y)
+                std::copy_n(self.last.begin() + static_cast<std::ptrdiff_t>(image->stride) * y, 4 * image->width,
+                            pixels.at(0, y));
+        self.last = std::move(now);
+    }
+    if (self.glass_only) {
+        std::vector<std::uint8_t> bytes(std::size_t{image->stride} * image->height);
+        arhost_image other = *image;
+        other.rgba = bytes.data();
+        embree_functions().render(self.glass_only, &spoilt, &other, info);
+        for (std::uint32_t y = 0; y < image->height; ++y)
+            for (std::uint32_t x = 0; x < image->width; ++x)
+                if (std::uint8_t *ours = pixels.at(x, y); ours[3] == 153 && Pixels{other}.at(x, y)[3] == 77)
+                    ours[3] = 153 + 77;
+        info->has_region = 0;
+    }
+    if (has("small_region") && info->region_width > 4)
+        info->region_width -= 4;
+    if (has("region_beyond_image"))
+        info->region_width = image->width + 1;
+    if (has("device_time_since_boot"))
+        info->device_time_ns =
+            static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+    return has("status_0") ? 0 : status;
+}
+
+void stop(arhost_instance *instance) {
+    if (has("crash_in_stop"))
+        crash();
+    embree_functions().stop(wrong(instance).real);
+    if (wrong(instance).glass_only)
+        embree_functions().stop(wrong(instance).glass_only);
+}
+
+const void *get_extension(const char *) {
+    return has("any_extension") ? &own_name() : nullptr;
+}
+
+const arhost_plugin &spoilt_plugin() {
+    static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop};
+    static std::vector<arhost_option_descriptor> options(
+        embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
+    static arhost_descriptor descriptor = *embree().descriptor;
+    descriptor.id = has("id_unlike_file") ? "rt_other" : own_name().c_str();
+    if (has("default_out_of_range"))
+        options[0].default_value = "257";
+    if (has("no_licence"))
+        descriptor.licence = "";
+    if (has("description_is_no_utf8"))
+        descriptor.description = "Bas\xe9";
+    static const std::string long_name(5'000'000, 'x');
+    if (has("long_name"))
+        descriptor.name = long_name.c_str();
+    if (has("option_without_key"))
+        options[1].key = nullptr;
+    if (has("many_options"))
+        options.resize(5000, options[0]); // of one key: it is their number that matters
+    descriptor.options = options.data();
+    descriptor.option_count = static_cast<std::uint32_t>(options.size());
+    static constexpr const char *unknown[] = {"bluetooth", nullptr};
+    if (has("needs_what_is_unknown"))
+        descriptor.needs = unknown;
+    if (has("other_kinds_capability"))
+        descriptor.capabilities |= ARHOST_CAPABILITY_LIVE;
+    if (has("unknown_capability"))
+        descriptor.capabilities |= 1u << 31;
+    static bool was_asked = false;
+    if (has("withdraws_a_capability") && std::exchange(was_asked, true))
+        descriptor.capabilities &= ~ARHOST_CAPABILITY_LENS_DISTORTION;
+    static const arhost_plugin plugin = {
+        sizeof plugin, &descriptor, &functions, create, destroy, has("no_get_extension") ? nullptr : get_extension};
+    return plugin;
+}
+
+arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    if (has("crash_in_negotiate"))
+        crash();
+    if ((offer->struct_size < sizeof *offer && !has("reads_past_short_offer")) ||
+        (answer->struct_size < sizeof *answer && !has("writes_past_short_answer")))
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
+    if (offer->oldest_abi_version > ARHOST_ABI_VERSION && !has("accepts_any_version"))
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
+    answer->abi_version = offer->oldest_abi_version;
+    answer->plugin = &spoilt_plugin();
+    return ARHOST_STATUS_OK;
+}
+
+} // namespace
+
+extern "C" {
+#ifdef EXPORTS_MORE
+ARHOST_EXPORT int leaked_symbol = 1;
+#endif
+extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+}

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every wrong sink at once: one that puts each frame into a file of its own and a line about it into another, and
+// has the one defect that this library's file name tells.
+#include "defect.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+namespace {
+
+using namespace arhost;
+using namespace arhost::test;
+namespace fs = std::filesystem;
+
+Failure full(const std::string &file) {
+    return Failure(ARHOST_STATUS_ERROR_IO, "can't write " + file + ": " + std::strerror(errno));
+}
+
+// With nothing in memory but what write(2) has not taken.
+void put(const std::string &file, const std::string &bytes, int flags) {
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
+    if (fd < 0)
+        throw full(file);
+    std::string_view left = bytes;
+    bool failed = false;
+    while (!left.empty() && !failed) {
+        const ssize_t count = ::write(fd, left.data(), left.size());
+        failed = count < 0;
+        if (failed && has("hangs_on_a_full_disk"))
+            hang();
+        if (failed && has("crash_on_a_full_disk"))
+            crash();
+        left.remove_prefix(failed ? 0 : static_cast<std::size_t>(count));
+    }
+    ::close(fd);
+    if (failed && !has("hides_a_full_disk"))
+        throw full(file);
+}
+
+std::string line_of(const arhost_record &record) {
+    std::ostringstream line;
+    line << record.sequence << ' ' << record.capture_ns << ' ' << record.overlay << ' '
+         << (record.has_camera ? record.camera.eye[2] : 0);
+    for (std::uint32_t i = 0; i < record.marker_count; ++i)
+        line << ' ' << record.markers[i].id;
+    return line.str() + "\n";
+}
+
+std::string shared_path; // of mixes_instances
+bool is_in_use = false;
+
+class Files {
+public:
+    Files(const Host &host, const Options &options) : host_(host), path_(options.text("path")) {}
+    ~Files() {
+        if (has("crash_after_a_failed_start") && is_starting_)
+            crash();
+    }
+    Files(const Files &) = delete;
+    Files &operator=(const Files &) = delete;
+
+    void start(const arhost_sink_setup &setup) {
+        if (has("crash_in_start"))
+            crash();
+        if (has("hang_in_start"))
+            hang();
+        is_starting_ = true;
+        if (has("starts_once") && std::exchange(is_in_use, true))
+            throw Failure(ARHOST_STATUS_ERROR_IO, "the file is busy");
+        if (has("start_cancelled_is_internal") && host_.cancelled())
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "what now?");
+        if (has("caches_beside_its_library"))
+            put(own_file().replace_extension(".cache"), "sizes", O_TRUNC);
+        if (has("refuses_odd_sizes_without_a_word") && setup.width % 2)
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "");
+        if (has("leaks_descriptors_in_start"))
+            (void)::dup(0);
+        shared_path = path_;
+        fresh_ = setup.first_sequence == 0;
+        log_ = fresh_ || has("forgets_on_restart") ? "" : kept_before(setup.first_sequence);
+        waiting_.clear();
+        next_ = setup.first_sequence;
+        if (!has("looks_for_no_place")) {
+            fs::create_directories(fs::path(path_).parent_path());
+            put(path_ + ".try", "", O_TRUNC);
+            ::unlink((path_ + ".try").c_str());
+        }
+        if (has("empties_at_start") && fresh_)
+            put(path_ + ".log", "", O_TRUNC);
+        if (!fresh_ && !has("writes_no_file"))
+            put(path_ + ".log", log_, O_TRUNC);
+        is_starting_ = false;
+    }
+
+    arhost_status write(const arhost_output &output) {
+        const arhost_record &record = *output.record;
+        if (has("crash_in_write"))
+            crash();
+        if (has("hang_in_write"))
+            hang();
+        if (has("status_0"))
+            return 0;
+        if (has("writes_into_the_frame"))
+            const_cast<std::uint8_t *>(output.bgr)[0] = 0;
+        if (has("writes_into_the_record"))
+            const_cast<arhost_record &>(record).marker_count = 0;
+        if (has("crash_on_1x1") && output.width == 1 && output.height == 1)
+            crash();
+        if (has("crash_on_64_markers") && record.marker_count == ARHOST_MAX_MARKERS)
+            crash();
+        if (has("wants_every_number") && record.sequence != next_)
+            throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "a frame is missing");
+        if (has("cancelled_is_internal") && host_.cancelled())
+            return ARHOST_STATUS_ERROR_INTERNAL;
+        if (has("slow") && output.width >= 640)
+            std::this_thread::sleep_for(std::chrono::milliseconds(120));
+        for (int i = 0; i < (has("leaks_many_descriptors") ? 3 : has("leaks_descriptors") ? 1 : 0); ++i)
+            (void)::dup(0);
+        if (has("leaks_memory"))
+            leak_memory(1024);
+        if (has("leaves_threads"))
+            std::thread(hang).detach();
+        next_ = record.sequence + 1;
+        if ((has("drops_every_10th") && record.sequence % 10 == 9) || std::exchange(is_late_, false))
+            return ARHOST_STATUS_OK;
+        const auto begin = std::chrono::steady_clock::now();
+        std::string pixels;
+        for (std::uint32_t y = 0; y < output.height + has("reads_a_row_more"); ++y)
+            pixels.append(reinterpret_cast<const char *>(output.bgr) + std::size_t{stride(output)} * y,
+                          std::size_t{3} * output.width);
+        if (has("writes_the_frame_before"))
+            pixels.swap(before_);
+        const std::string line =
+            has("writes_the_frame_before") ? std::to_string(record.sequence) + "\n" : line_of(record);
+        waiting_.emplace_back(record.sequence, pixels, line);
+        if (!(has("writes_frames_in_pairs") && waiting_.size() < 2) && !has("keeps_all_to_its_end"))
+            write_waiting();
+        is_late_ = has("drops_frames_on_a_slow_disk") && path_.find("/slow/") != std::string::npos &&
+                   std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(80);
+        return ARHOST_STATUS_OK;
+    }
+
+    arhost_status idle() {
+        if (has("crash_in_idle"))
+            crash();
+        return has("idle_fails") ? ARHOST_STATUS_ERROR_UNSUPPORTED : ARHOST_STATUS_OK;
+    }
+
+    void stop() {
+        if (has("crash_in_stop"))
+            crash();
+        if (has("stop_fails"))
+            throw Failure(ARHOST_STATUS_ERROR_IO, "the files are not whole");
+        write_waiting();
+    }
+
+private:
+    struct Waiting {
+        Waiting(std::uint64_t n, std::string p, std::string l)
+            : sequence(n), pixels(std::move(p)), line(std::move(l)) {}
+        std::uint64_t sequence;
+        std::string pixels, line;
+    };
+
+    static std::uint32_t stride(const arhost_output &output) {
+        return has("rows_follow_each_other") ? 3 * output.width : output.stride;
+    }
+
+    std::string kept_before(std::uint64_t first) const {
+        std::ifstream old(path_ + ".log");
+        std::string kept;
+        for (std::string line; std::getline(old, line);)
+            if (has("writes_twice_on_restart") || std::stoull(line) < first)
+                kept += line + "\n";
+        return kept;
+    }
+
+    void write_waiting() {
+        if (has("writes_frames_in_pairs"))
+            std::reverse(waiting_.begin(), waiting_.end());
+        const std::string &path = has("mixes_instances") ? shared_path : path_;
+        std::string lines;
+        for (const Waiting &frame : waiting_) {
+            write_frame(path, frame);
+            lines += frame.line;
+        }
+        waiting_.clear();
+        if (lines.empty() || has("writes_no_file"))
+            return;
+        const bool is_first = std::exchange(fresh_, false) && !has("appends_to_an_old_log");
+        if (has("newest_first")) {
+            log_ = is_first ? lines : lines + log_;
+            put(path + ".part", log_, O_TRUNC);
+            fs::rename(path + ".part", path + ".log");
+        } else {
+            put(path + ".log", lines, is_first ? O_TRUNC : O_APPEND);
+        }
+    }
+
+    static void write_frame(const std::string &path, const Waiting &frame) {
+        if (has("writes_no_file"))
+            return;
+        const std::uint64_t number = has("writes_each_frame_twice") ? 2 * frame.sequence : frame.sequence;
+        const std::string name = path + std::to_string(number), part = path + ".part";
+        if (has("half_files")) {
+            const std::size_t half = frame.pixels.size() / 2;
+            put(name, frame.pixels.substr(0, half), O_TRUNC);
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            put(name, frame.pixels.substr(half), O_APPEND);
+        } else {
+            try {
+                put(part, frame.pixels, O_TRUNC);
+            } catch (const Failure &) {
+                if (has("half_files_on_a_full_disk"))
+                    fs::rename(part, name);
+                throw;
+            }
+            // Before it has its name: behind that, killed between the two, it would leave files as never between
+            // frames.
+            if (has("exchanges_frames") && frame.sequence % 4 == 3)
+                ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
+                            RENAME_EXCHANGE);
+            fs::rename(part, name);
+        }
+        if (has("writes_each_frame_twice")) {
+            put(part, frame.pixels, O_TRUNC);
+            fs::rename(part, path + std::to_string(number + 1));
+        }
+        if (has("writes_more_files")) // whose names sort before the others'
+            for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
+                put(part, frame.line, O_TRUNC);
+                fs::rename(part, fs::path(path).replace_filename(more));
+            }
+        if (has("dates_its_files"))
+            put(name, std::to_string(std::chrono::steady_clock::now().time_since_epoch().count()), O_APPEND);
+    }
+
+    Host host_;
+    std::string path_, log_, before_;
+    std::vector<Waiting> waiting_;
+    std::uint64_t next_ = 0;
+    bool fresh_ = true, is_starting_ = false, is_late_ = false;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", "frame", "What the files' names begin with."),
+};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_SINK,
+                                          "wrong_sink",
+                                          "Files",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "A file of each frame's pixels, and a log.",
+                                          0,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
+
+} // namespace
+
+extern "C" {
+extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
+    sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
+        static arhost_sink functions = detail::sink_functions<Files>;
+        if (has("no_write"))
+            functions.write = nullptr;
+        return negotiate_as<Files>(offer, answer, descriptor, &functions);
+    }};
+}

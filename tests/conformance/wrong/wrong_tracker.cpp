@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every wrong tracker at once: tracker_apriltag with the one defect that this library's file name tells, so
+// tracker_metres.so, a link to it, takes metres for millimetres. A name that is no defect's has none.
+#include "defect.hpp"
+
+#include <arhost/arhost.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace {
+
+using namespace arhost::test;
+
+// ---- The tracker that is spoilt ---------------------------------------------------------------------
+
+const arhost_plugin &real() {
+    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so");
+    return plugin;
+}
+const arhost_tracker &real_functions() {
+    return *static_cast<const arhost_tracker *>(real().functions);
+}
+
+// Of all instances.
+bool was_started = false;
+arhost_intrinsics first_camera{};
+
+struct Wrong {
+    arhost_instance *real = nullptr;
+    const arhost_host *host = nullptr;
+    bool start_failed = false;
+    arhost_frame_format format{};
+    std::vector<arhost_marker_config> listed;
+    std::int64_t threads = 0; // the option
+    std::unique_ptr<arhost_tracker_result> last = std::make_unique<arhost_tracker_result>();
+    std::uint64_t last_sequence = 0;
+    std::int64_t last_capture_ns = 0;
+    unsigned tracks = 0;
+    std::vector<std::uint8_t> copy; // of the grey plane
+};
+Wrong &wrong(arhost_instance *instance) {
+    return *reinterpret_cast<Wrong *>(instance);
+}
+
+// ---- What is asked, spoilt ---------------------------------------------------------------------------
+
+arhost_intrinsics spoil(arhost_intrinsics in) {
+    if (has("half_a_pixel")) {
+        in.cx += 0.5;
+        in.cy += 0.5;
+    }
+    if (has("focal_1_percent"))
+        in.fx *= 1.01, in.fy *= 1.01;
+    if (has("square_pixels"))
+        in.fy = in.fx;
+    if (has("centred_principal_point")) {
+        in.cx = (in.width - 1) / 2.0;
+        in.cy = (in.height - 1) / 2.0;
+    }
+    if (has("no_lens") || (has("fisheye_is_none") && in.distortion == ARHOST_DISTORTION_FISHEYE)) {
+        in.distortion = ARHOST_DISTORTION_NONE;
+        in.coefficient_count = 0;
+    }
+    if (has("tangential_swapped") && in.distortion == ARHOST_DISTORTION_BROWN)
+        std::swap(in.coefficients[2], in.coefficients[3]);
+    if (has("four_coefficients"))
+        in.coefficient_count = std::min(in.coefficient_count, 4u);
+    return in;
+}
+
+std::vector<arhost_marker_config> listed_in(const arhost_tracker_setup &setup) {
+    std::vector<arhost_marker_config> all;
+    const std::size_t step = has("steps_by_its_own_size") ? sizeof(arhost_marker_config) : setup.markers->struct_size;
+    for (std::uint32_t i = 0; i < setup.marker_count; ++i) {
+        const auto *bytes = reinterpret_cast<const std::byte *>(setup.markers) + i * step;
+        all.push_back(*reinterpret_cast<const arhost_marker_config *>(bytes));
+        all.back().struct_size = sizeof(arhost_marker_config);
+    }
+    if (has("side_is_half"))
+        for (arhost_marker_config &marker : all)
+            marker.side_mm *= 2;
+    if (has("one_side"))
+        for (arhost_marker_config &marker : all)
+            marker.side_mm = all[0].side_mm;
+    if (has("ignores_the_list"))
+        for (const int id : {31, 7, 586, 2})
+            if (std::ranges::find(all, id, &arhost_marker_config::id) == all.end())
+                all.push_back({sizeof(arhost_marker_config), id, 80});
+    if (has("order_of_ids"))
+        std::ranges::sort(all, {}, &arhost_marker_config::id);
+    return all;
+}
+
+// The frame's grey plane, where it may be written.
+std::uint8_t *copied(Wrong &self, arhost_frame &frame) {
+    const std::size_t size = std::size_t{frame.format->grey_stride} * frame.format->height;
+    self.copy.assign(frame.grey, frame.grey + size);
+    frame.grey = self.copy.data();
+    return self.copy.data();
+}
+
+void mirror(Wrong &self, arhost_frame &frame) {
+    std::uint8_t *row = copied(self, frame);
+    for (std::uint32_t y = 0; y < frame.format->height; ++y, row += frame.format->grey_stride)
+        std::reverse(row, row + frame.format->width);
+}
+
+// ---- What the frame is like --------------------------------------------------------------------------
+
+struct Pixels {
+    explicit Pixels(const arhost_frame &f) : frame(f) {}
+    template <class Function> void each_row(Function &&function) const {
+        for (std::uint32_t y = 0; y < frame.format->height; ++y)
+            function(std::span(frame.grey + std::size_t{frame.format->grey_stride} * y, frame.format->width));
+    }
+    int brightest() const {
+        int most = 0;
+        each_row([&](auto row) { most = std::max<int>(most, *std::ranges::max_element(row)); });
+        return most;
+    }
+    int steepest() const { // step from a pixel to the one after the next
+        int most = 0;
+        each_row([&](auto row) {
+            for (std::size_t x = 2; x < row.size(); ++x)
+                most = std::max(most, std::abs(row[x] - row[x - 2]));
+        });
+        return most;
+    }
+    bool is_noisy() const { // in the first row, where there is no print
+        const std::span row(frame.grey, frame.format->width);
+        std::size_t steps = 0;
+        for (std::size_t x = 1; x < row.size(); ++x)
+            steps += std::abs(row[x] - row[x - 1]) > 8;
+        return steps > row.size() / 5;
+    }
+    const arhost_frame &frame;
+};
+
+// ---- What is answered, spoilt ------------------------------------------------------------------------
+
+double longest_side_px(const arhost_marker &marker) {
+    double most = 0;
+    for (int k = 0; k < 4; ++k)
+        most = std::max(most, std::hypot(marker.corners_px[k][0] - marker.corners_px[(k + 1) % 4][0],
+                                         marker.corners_px[k][1] - marker.corners_px[(k + 1) % 4][1]));
+    return most;
+}
+
+void spoil(Wrong &self, arhost_marker &marker, const arhost_marker_config &config) {
+    double *m = marker.mt;
+    const double cosine_of_tilt = m[10];
+    const auto negate_rows = [&](std::initializer_list<int> rows) {
+        for (int row : rows)
+            for (int column = 0; column < 4; ++column)
+                m[4 * column + row] *= -1;
+    };
+    const auto move_along = [&](double x, double y) { // the marker's axes
+        for (int row = 0; row < 3; ++row)
+            m[12 + row] += m[row] * x + m[4 + row] * y;
+    };
+    if (has("flipped_z"))
+        negate_rows({2});
+    if (has("opencv_axes"))
+        negate_rows({1, 2});
+    if (has("z_into_the_paper"))
+        for (int i : {4, 5, 6, 8, 9, 10})
+            m[i] *= -1;
+    if (has("transposed_rotation"))
+        std::swap(m[1], m[4]), std::swap(m[2], m[8]), std::swap(m[6], m[9]);
+    if (has("row_major"))
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < i; ++j)
+                std::swap(m[4 * i + j], m[4 * j + i]);
+    if (has("metres"))
+        std::for_each_n(m + 12, 3, [](double &x) { x /= 1000; });
+    if (has("corner_is_the_origin"))
+        move_along(-config.side_mm / 2, -config.side_mm / 2);
+    if (has("single_precision"))
+        std::for_each_n(m, 12, [](double &x) { x = static_cast<float>(x); });
+    if (has("nan_pose"))
+        m[12] = std::numeric_limits<double>::quiet_NaN();
+    if (has("nan_alternative"))
+        marker.mt_alternative[5] = std::numeric_limits<double>::quiet_NaN();
+    if (has("no_struct_size"))
+        marker.struct_size = 0;
+    if (has("family_without_end"))
+        std::memset(marker.family, 'x', sizeof marker.family);
+    if (has("age_counts_frames"))
+        marker.age_frames = self.tracks + 1;
+    if (has("corners_from_bottom_left"))
+        std::rotate(&marker.corners_px[0][0], &marker.corners_px[3][0], &marker.corners_px[3][0] + 2);
+    if (has("corners_at_half"))
+        for (auto &corner : marker.corners_px)
+            corner[0] += 0.5, corner[1] += 0.5;
+    if (has("whole_pixels"))
+        for (auto &corner : marker.corners_px)
+            corner[0] = std::round(corner[0]), corner[1] = std::round(corner[1]);
+    const bool has_other = marker.mt_alternative[15] != 0;
+    if (has_other && has("flips_near_frontal") && cosine_of_tilt > std::cos(0.25))
+        std::copy_n(marker.mt_alternative, 16, m);
+    if (has_other && has("flips_to_the_side") && cosine_of_tilt < std::cos(0.6))
+        std::copy_n(marker.mt_alternative, 16, m);
+    if (has("nondeterministic"))
+        m[12] += 1e-9 * (self.tracks % 2);
+    if (has("depends_on_threads"))
+        m[12] += 1e-9 * static_cast<double>(self.threads);
+}
+
+void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &result) {
+    const std::span markers(result.markers, result.marker_count);
+    const auto drop_all = [&] {
+        std::memset(result.markers, 0, sizeof result.markers);
+        result.marker_count = 0;
+    };
+    for (arhost_marker &marker : markers)
+        spoil(self, marker, *std::ranges::find(self.listed, marker.id, &arhost_marker_config::id));
+    if (has("swapped_ids") && markers.size() > 1)
+        std::swap(markers[0].id, markers[1].id);
+    if (has("finds_large_ones_only") && !markers.empty() && longest_side_px(markers[0]) < 60)
+        drop_all();
+    if (has("gives_up_when_tilted") && !markers.empty() && markers[0].mt[10] < std::cos(0.9))
+        drop_all();
+    const Pixels pixels(frame);
+    if ((has("needs_sharp_edges") && pixels.steepest() < 90 && pixels.brightest() > 200) ||
+        (has("needs_clean_frames") && pixels.is_noisy() && pixels.brightest() > 200) ||
+        (has("needs_good_light") && (pixels.brightest() < 100 || pixels.brightest() > 250)))
+        drop_all();
+    if (has("invents_markers") && markers.empty()) {
+        const double distance = 300;
+        arhost_marker &marker = result.markers[result.marker_count++];
+        marker = {};
+        marker.struct_size = sizeof marker;
+        marker.id = self.listed[0].id;
+        std::strcpy(marker.family, "tag36h11");
+        marker.state = ARHOST_MARKER_DETECTED;
+        marker.mt[0] = marker.mt[5] = marker.mt[10] = marker.mt[15] = 1;
+        marker.mt[14] = -distance;
+    }
+    const bool has_last = self.last->marker_count > 0;
+    const bool predicts = has("predicts") || has("age_stays_1") || has("forgets_its_pose");
+    if ((has("smooths") || predicts) && !markers.empty() && has_last) {
+        for (int i = 12; i < 15; ++i)
+            markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
+        if (predicts)
+            markers[0].state = ARHOST_MARKER_PREDICTED;
+    }
+    if (predicts && markers.empty() && has_last) {
+        result = *self.last;
+        arhost_marker &gone = result.markers[0];
+        gone.age_frames = has("age_stays_1") ? 1 : gone.age_frames + 1;
+        gone.state = gone.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
+        if (has("forgets_its_pose") && gone.state == ARHOST_MARKER_LOST)
+            std::fill_n(gone.mt, 12, 0.0);
+    }
+    if (has("never_settles") && !markers.empty()) {
+        if (!has_last)
+            *self.last = result;
+        std::copy_n(self.last->markers[0].mt, 16, markers[0].mt);
+        markers[0].state = ARHOST_MARKER_PREDICTED;
+        return;
+    }
+    const arhost_tracker_result now = result;
+    if ((has("stale_pose") || (has("holds_what_is_gone") && result.marker_count == 0)) && has_last)
+        result = *self.last;
+    if (has("only_fresh_frames") && frame.sequence == self.last_sequence && self.tracks > 0)
+        drop_all();
+    *self.last = now;
+}
+
+// ---- The plugin --------------------------------------------------------------------------------------
+
+arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
+                     arhost_instance **instance) {
+    auto made = std::make_unique<Wrong>();
+    made->host = host;
+    made->threads = arhost_find_option(options, count, "threads")->integer;
+    std::vector<arhost_option> spoilt;
+    for (const auto &declared : std::span(real().descriptor->options, real().descriptor->option_count)) {
+        spoilt.push_back(*arhost_find_option(options, count, declared.key));
+        spoilt.back().struct_size = sizeof(arhost_option);
+        if (declared.key == std::string_view("corner_refinement") && has("trusts_rough_corners"))
+            spoilt.back().text = "none";
+    }
+    const arhost_status status = real().create(host, spoilt.data(), count, &made->real);
+    if (status == ARHOST_STATUS_OK)
+        *instance = reinterpret_cast<arhost_instance *>(made.release());
+    return status;
+}
+
+void destroy(arhost_instance *instance) {
+    if (wrong(instance).start_failed && has("crash_after_a_failed_start"))
+        crash();
+    real().destroy(wrong(instance).real);
+    delete &wrong(instance);
+}
+
+arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup) {
+    Wrong &self = wrong(instance);
+    if (has("crash_in_start"))
+        crash();
+    if (has("leaves_a_thread"))
+        std::thread(hang).detach();
+    const bool again = std::exchange(was_started, true);
+    if (has("starts_once") && again)
+        return ARHOST_STATUS_ERROR_INTERNAL;
+    if (!again)
+        first_camera = *setup->intrinsics;
+    self.format = *setup->format;
+    self.tracks = 0;
+    self.last->marker_count = 0;
+    arhost_intrinsics camera = spoil(has("keeps_the_first_camera") ? first_camera : *setup->intrinsics);
+    arhost_tracker_setup spoilt = *setup;
+    spoilt.intrinsics = &camera;
+    const auto real_start = [&] {
+        spoilt.markers = self.listed.data();
+        spoilt.marker_count = static_cast<std::uint32_t>(self.listed.size());
+        return real_functions().start(self.real, &spoilt);
+    };
+    self.listed = listed_in(*setup);
+    arhost_status status = real_start();
+    if (has("accepts_any_id") && status == ARHOST_STATUS_ERROR_CONFIGURATION && self.listed[0].id != 31) {
+        self.listed[0].id = 31;
+        status = real_start();
+    }
+    if (has("accepts_any_lens") && status == ARHOST_STATUS_ERROR_CONFIGURATION && self.listed[0].id == 31) {
+        camera = first_camera;
+        camera.distortion = ARHOST_DISTORTION_NONE;
+        camera.fx = camera.fy = 300;
+        status = real_start();
+    }
+    self.start_failed = status != ARHOST_STATUS_OK;
+    return status;
+}
+
+arhost_status track(arhost_instance *instance, const arhost_frame *given, arhost_tracker_result *result) {
+    Wrong &self = wrong(instance);
+    arhost_frame frame = *given;
+    if (has("crash_in_track") ||
+        (has("crash_on_small_frames") && std::min(frame.format->width, frame.format->height) < 8))
+        crash();
+    if (has("hang_in_track"))
+        hang();
+    if (has("crash_on_dropped_frames") && self.tracks > 0 && frame.sequence > self.last_sequence + 1)
+        crash();
+    if (has("writes_the_frame"))
+        const_cast<std::uint8_t *>(frame.grey)[0] = 0;
+    const volatile std::uint8_t *grey = frame.grey;
+    if (has("reads_past_the_frame"))
+        (void)grey[std::size_t{frame.format->grey_stride} * frame.format->height];
+    if (has("reads_before_the_frame"))
+        (void)grey[-1];
+    if (has("writes_past_the_result"))
+        *reinterpret_cast<std::uint8_t *>(result + 1) = 0;
+    if (has("slow"))
+        std::this_thread::sleep_for(std::chrono::milliseconds(frame.format->width >= 640 ? 60 : 0));
+    if (has("leaks_descriptors"))
+        (void)::dup(0);
+    if (has("leaks_memory"))
+        leak_memory(4096);
+    if (has("cancelled_is_internal") && self.host->cancelled(self.host))
+        return ARHOST_STATUS_ERROR_INTERNAL;
+    if (has("refuses_older_frames") && self.tracks > 0 && frame.capture_ns < self.last_capture_ns)
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
+    if (has("finds_nothing"))
+        return ARHOST_STATUS_OK;
+
+    arhost_frame_format format = *frame.format;
+    frame.format = &format;
+    if (has("ignores_the_stride"))
+        format.grey_stride = format.width;
+    if (has("first_plane_is_grey")) {
+        frame.grey = frame.plane[0];
+        format.grey_stride = format.stride[0];
+    }
+    arhost_status status = real_functions().track(self.real, &frame, result);
+    if (status == ARHOST_STATUS_OK && has("mirrored_too") && result->marker_count == 0) {
+        mirror(self, frame);
+        status = real_functions().track(self.real, &frame, result);
+    }
+    if (status == ARHOST_STATUS_OK && has("a_record_a_sighting") && result->marker_count == 1) {
+        const arhost_marker first = result->markers[0];
+        std::uint8_t *copy = copied(self, frame);
+        const auto [left, right] = std::ranges::minmax(
+            {first.corners_px[0][0], first.corners_px[1][0], first.corners_px[2][0], first.corners_px[3][0]});
+        for (std::uint32_t y = 0; y < format.height; ++y)
+            std::memset(copy + std::size_t{format.grey_stride} * y + std::lround(left), 140,
+                        static_cast<std::size_t>(std::lround(right - left)));
+        std::memset(result->markers, 0, sizeof result->markers);
+        status = real_functions().track(self.real, &frame, result);
+        result->markers[result->marker_count++] = first;
+    }
+    if (status != ARHOST_STATUS_OK)
+        return status;
+    spoil_all(self, frame, *result);
+    ++self.tracks;
+    self.last_sequence = frame.sequence;
+    self.last_capture_ns = frame.capture_ns;
+    return has("status_0") ? 0 : status;
+}
+
+void stop(arhost_instance *instance) {
+    if (has("crash_in_stop"))
+        crash();
+    real_functions().stop(wrong(instance).real);
+}
+
+const void *get_extension(const char *) {
+    return nullptr;
+}
+
+const arhost_plugin &spoilt_plugin() {
+    static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop};
+    static arhost_descriptor descriptor = *real().descriptor;
+    descriptor.id = own_name().c_str();
+    static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+    return plugin;
+}
+
+arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
+    if (offer->oldest_abi_version > ARHOST_ABI_VERSION)
+        return ARHOST_STATUS_ERROR_UNSUPPORTED;
+    answer->abi_version = ARHOST_ABI_VERSION;
+    answer->plugin = &spoilt_plugin();
+    return ARHOST_STATUS_OK;
+}
+
+} // namespace
+
+extern "C" {
+extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+}

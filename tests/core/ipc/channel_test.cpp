@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/channel.hpp"
+#include "ipc/json_abi.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fcntl.h>
+#include <sys/socket.h>
+
+using namespace arhost::ipc;
+
+TEST(Channel, CarriesMessagesAndDescriptors) {
+    auto [host, worker] = Channel::make_pair();
+    int pipe_ends[2];
+    ASSERT_EQ(::pipe(pipe_ends), 0);
+    const arhost::base::UniqueFd read_end(pipe_ends[0]), write_end(pipe_ends[1]);
+    ASSERT_TRUE(host.send({{"type", "attach"}, {"generation", 7}}, {write_end.get()}));
+    Message message;
+    ASSERT_EQ(worker.receive(message, 1000), ReceiveState::message);
+    EXPECT_EQ(message.body["generation"], 7);
+    ASSERT_EQ(message.fds.size(), 1u);
+    ASSERT_EQ(::write(message.fds[0].get(), "x", 1), 1);
+    char byte = 0;
+    EXPECT_EQ(::read(read_end.get(), &byte, 1), 1);
+}
+
+TEST(Channel, RefusesWhatIsNoMessage) {
+    auto [host, worker] = Channel::make_pair();
+    Message message;
+    for (const std::string text : {"{", "[1]", "{\"kind\": 1}", "{\"type\": 3}", "\xff\xfe"}) {
+        ASSERT_GT(::send(worker.fd(), text.data(), text.size(), 0), 0);
+        EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach) << text;
+    }
+    const std::string deep(100'000, '[');
+    ASSERT_GT(::send(worker.fd(), deep.data(), deep.size(), 0), 0);
+    EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach);
+}
+
+TEST(Channel, RefusesAMessageWithTooManyDescriptorsAndKeepsNone) {
+    auto [host, worker] = Channel::make_pair();
+    std::vector<int> fds(8, STDERR_FILENO);
+    char text[] = "{\"type\": \"log\"}";
+    iovec part{text, sizeof text - 1};
+    alignas(cmsghdr) char ancillary[CMSG_SPACE(8 * sizeof(int))] = {};
+    msghdr header{};
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    header.msg_control = ancillary;
+    header.msg_controllen = sizeof ancillary;
+    cmsghdr *control = CMSG_FIRSTHDR(&header);
+    control->cmsg_level = SOL_SOCKET;
+    control->cmsg_type = SCM_RIGHTS;
+    control->cmsg_len = CMSG_LEN(8 * sizeof(int));
+    std::copy(fds.begin(), fds.end(), reinterpret_cast<int *>(CMSG_DATA(control)));
+    ASSERT_GT(::sendmsg(worker.fd(), &header, 0), 0);
+    Message message;
+    EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach);
+}
+
+TEST(Channel, DoesNotWaitForAPeerThatTakesNothing) {
+    auto [host, worker] = Channel::make_pair();
+    const Json body = {{"type", "log"}, {"text", std::string(10'000, 'x')}};
+    int sent = 0;
+    while (host.send(body, {}, false))
+        ++sent;
+    EXPECT_GT(sent, 0);
+    EXPECT_EQ(errno, EAGAIN);
+}
+
+TEST(Channel, TellsThatThePeerIsGone) {
+    auto [host, worker] = Channel::make_pair();
+    worker.close();
+    Message message;
+    EXPECT_EQ(host.receive(message, 1000), ReceiveState::closed);
+    EXPECT_FALSE(host.send({{"type", "stop"}}));
+}
+
+TEST(JsonAbi, KeepsIntrinsicsToTheLastBit) {
+    arhost_intrinsics lens{};
+    lens.struct_size = sizeof lens;
+    lens.width = 641;
+    lens.height = 479;
+    lens.fx = 607.178466796875;
+    lens.fy = 1.0 / 3.0;
+    lens.cx = -0.1;
+    lens.cy = 1e300;
+    lens.distortion = ARHOST_DISTORTION_BROWN;
+    lens.coefficient_count = 5;
+    for (int i = 0; i < 5; ++i)
+        lens.coefficients[i] = 0.1 * i - 0.2;
+    const arhost_intrinsics back = intrinsics_from_json(Json::parse(to_json(lens).dump()));
+    EXPECT_EQ(std::memcmp(&lens, &back, sizeof lens), 0);
+}
+
+TEST(JsonAbi, RefusesFormatsAndIntrinsicsOutOfRange) {
+    Json format = {{"pixel_format", ARHOST_PIXEL_FORMAT_YUYV},
+                   {"width", 640},
+                   {"height", 480},
+                   {"yuv_matrix", ARHOST_YUV_MATRIX_BT601},
+                   {"yuv_range", ARHOST_YUV_RANGE_LIMITED},
+                   {"fps", 30.0}};
+    EXPECT_EQ(format_from_json(format).stride[0], 1280u);
+    for (const auto &[key, value] : std::map<std::string, Json>{{"pixel_format", 99},
+                                                                {"width", 641},
+                                                                {"height", 0},
+                                                                {"width", 1 << 20},
+                                                                {"yuv_matrix", 0},
+                                                                {"fps", -1}}) {
+        Json wrong = format;
+        wrong[key] = value;
+        EXPECT_THROW(format_from_json(wrong), std::exception) << key;
+    }
+    EXPECT_THROW(format_from_json(Json::object()), std::exception);
+    EXPECT_THROW(intrinsics_from_json({{"width", "x"}}), std::exception);
+}

@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A model of the link between the host and one worker (core/ipc/ring.hpp, core/supervise): the command
+ * ring, the result ring, the slots, and the worker's death at any point. Sequentially consistent: what
+ * the orderings in ring.hpp must provide is taken as given here, and tested under the thread sanitizer.
+ *
+ * Checked for every interleaving: frames come back in order, none lost, none twice, none torn; a slot is
+ * never written while the host reads it; positions stay within capacity; the host always gets done.
+ *
+ * The macros FAULT… plant a fault each; `check-model --faults` sees that the model catches it.
+ */
+#define CAPACITY 2  /* of both rings */
+#define SLOTS    2
+#define FRAMES   4
+#define DEATHS   2  /* at most */
+#define NOBODY   255
+
+/* Written by the host. */
+byte command_published, result_consumed;
+byte command_slot[CAPACITY], command_frame[CAPACITY];
+/* Written by the worker. */
+byte result_published, command_consumed;
+byte result_frame[CAPACITY];
+/* The slots' two halves: a frame number each, so that a torn frame shows. */
+byte low[SLOTS], high[SLOTS];
+/* The slot that the host reads at the moment. */
+byte reading = NOBODY;
+
+bool alive = true, done;
+byte deaths;
+
+/* Every step of the worker may be its last. */
+#define may_die  if :: deaths < DEATHS -> deaths++; goto dead :: true fi
+
+proctype worker() {
+    byte position = 0, results = 0, slot, frame;
+again:
+    may_die;
+end_waiting:
+    atomic { command_published != position -> slot = command_slot[position % CAPACITY];
+             frame = command_frame[position % CAPACITY]; }
+    position++;
+    command_consumed = position;
+    may_die;
+#ifdef FAULT_PUBLISH_FIRST
+    result_frame[results % CAPACITY] = frame;
+    results++;
+    result_published = results;
+#endif
+    assert(reading != slot);          /* the host has let go of it */
+    low[slot] = frame;
+    may_die;
+    assert(reading != slot);
+    high[slot] = frame;
+    may_die;
+#ifndef FAULT_PUBLISH_FIRST
+#ifndef FAULT_NO_FULL_CHECK
+    assert(results - result_consumed < CAPACITY); /* the host has never more in flight than fit */
+#endif
+    result_frame[results % CAPACITY] = frame;
+    may_die;
+    results++;
+    result_published = results;
+#endif
+    goto again;
+dead:
+    alive = false
+}
+
+/* Takes one result if there is one. */
+inline take_result() {
+    if
+    :: result_published != result_position ->
+        assert(result_published - result_position <= CAPACITY);
+        assert(result_frame[result_position % CAPACITY] == expected); /* in order, once */
+        slot = expected % SLOTS;
+        reading = slot;
+        assert(low[slot] == expected);
+        assert(high[slot] == expected);                               /* whole */
+        reading = NOBODY;
+        result_position++;
+        result_consumed = result_position;
+        expected++
+    :: else
+    fi
+}
+
+active proctype host() {
+    byte submitted = 0;        /* frames given out */
+    byte expected = 0;         /* the next frame to come back */
+    byte position = 0, result_position = 0, slot;
+    run worker();
+    do
+    :: expected == FRAMES -> break
+#ifdef FAULT_REUSE_SLOT
+    :: submitted < FRAMES && submitted - expected < CAPACITY + 1 && position - command_consumed < CAPACITY ->
+#elif defined(FAULT_NO_FULL_CHECK)
+    :: submitted < FRAMES && submitted - expected < SLOTS + 1 ->
+#else
+    :: submitted < FRAMES && submitted - expected < SLOTS && position - command_consumed < CAPACITY ->
+#endif
+        command_slot[position % CAPACITY] = submitted % SLOTS;
+        command_frame[position % CAPACITY] = submitted;
+        position++;
+        submitted++;
+        command_published = position
+    :: result_published != result_position -> take_result()
+    :: !alive ->
+        /* What it had finished counts. */
+        do
+        :: result_published != result_position -> take_result()
+        :: else -> break
+        od;
+        /* New memory, a new worker; the unanswered frames again. */
+        atomic {
+            command_published = 0; command_consumed = 0; result_published = 0; result_consumed = 0;
+            low[0] = NOBODY; low[1] = NOBODY; high[0] = NOBODY; high[1] = NOBODY;
+            position = 0; result_position = 0;
+#ifndef FAULT_LOSE_IN_FLIGHT
+            submitted = expected;
+#endif
+            alive = true;
+            run worker()
+        }
+    od;
+    done = true
+}
+
+/* Whatever happens, the host gets done (as long as each process that can take a step does, in time). */
+ltl finishes { <> done }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/memory.hpp"
+#include "ipc/wake.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+
+using namespace arhost::ipc;
+using namespace std::chrono_literals;
+
+TEST(Wake, ReachesAnotherProcessThroughAReadOnlyMapping) {
+    const SharedMemory memory = SharedMemory::create("test", 4096);
+    const Mapping writer = memory.map(Access::read_write);
+    memory.seal_future_writes();
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const Mapping reader = memory.map(Access::read_only);
+        ::_exit(wait_for_wake(reader.as<WakeWord>(), 0, 20s) ? 0 : 1);
+    }
+    ::usleep(20'000); // asleep by now, most times; the test holds either way
+    wake(writer.as<WakeWord>());
+    int status = -1;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+}
+
+TEST(Wake, IsNotLostWhenItComesBeforeTheWait) {
+    WakeWord word{};
+    const std::uint32_t seen = wake_count(word);
+    wake(word);
+    EXPECT_TRUE(wait_for_wake(word, seen, 20s));
+    EXPECT_FALSE(wait_for_wake(word, wake_count(word), 1ms));
+}
+
+TEST(Doorbell, CountsItsRings) {
+    const DoorbellPair bell = make_doorbell();
+    EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
+    for (int i = 0; i < 3; ++i)
+        ring_doorbell(bell.worker.get());
+    EXPECT_EQ(drain_doorbell(bell.host.get()), 3);
+    EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
+}
+
+TEST(Doorbell, NeverBlocksTheHostWhateverTheWorkerDoesToItsEnd) {
+    const DoorbellPair bell = make_doorbell();
+    ::fcntl(bell.worker.get(), F_SETFL, 0); // clears O_NONBLOCK, were it there and shared
+    EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
+}
+
+TEST(Doorbell, SurvivesAFlood) {
+    const DoorbellPair bell = make_doorbell();
+    for (int i = 0; i < 1'000'000; ++i)
+        ring_doorbell(bell.worker.get()); // never blocks the worker either
+    EXPECT_LE(drain_doorbell(bell.host.get()), 4096);
+}
+
+TEST(Doorbell, TellsThatTheOtherEndIsShut) {
+    DoorbellPair bell = make_doorbell();
+    bell.worker.reset();
+    EXPECT_EQ(drain_doorbell(bell.host.get()), -1);
+}

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugin_under_test.hpp"
+#include "run_config/access.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+using namespace arhost::run_config;
+using namespace arhost::yaml;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Access : testing::Test {
+    arhost::sandbox::Policy of(const std::string &component, bool is_output) {
+        std::ofstream(folder / "run.yaml") << component;
+        return access_of(Node::load(folder / "run.yaml"), is_output);
+    }
+    std::string error_of(const std::string &component) {
+        try {
+            of(component, false);
+        } catch (const Error &error) {
+            return error.what();
+        }
+        return "no error";
+    }
+    void file(const std::string &name) {
+        fs::create_directories((folder / name).parent_path());
+        std::ofstream(folder / name) << "x";
+    }
+    arhost::test::ScratchFolder scratch;
+    const fs::path folder = fs::canonical(scratch.path());
+};
+
+} // namespace
+
+TEST_F(Access, IsNothingByItself) {
+    const auto policy = of("{plugin: tracker_aruco, options: {dictionary: DICT_6X6_250, threads: 4}}", false);
+    EXPECT_THAT(policy.readable, IsEmpty());
+    EXPECT_THAT(policy.writable, IsEmpty());
+    EXPECT_THAT(policy.allow, IsEmpty());
+}
+
+TEST_F(Access, OfASourceIsItsFile) {
+    file("film.mp4");
+    file("film.mp4.key");
+    EXPECT_THAT(of("{plugin: source_file, path: film.mp4}", false).readable, ElementsAre(folder / "film.mp4"));
+    EXPECT_THAT(of("{plugin: source_file, options: {path: film.mp4}}", false).readable,
+                ElementsAre(folder / "film.mp4"));
+}
+
+TEST_F(Access, OfAPatternIsItsFolder) {
+    file("frames/0001.png");
+    EXPECT_THAT(of("{plugin: source_file, path: frames/%04d.png}", false).readable, ElementsAre(folder / "frames"));
+}
+
+TEST_F(Access, IsNeverToDevicesNorToAllFiles) {
+    for (const char *path : {"/dev/null", "missing.mp4", "/", "/missing.mp4", "/%04d.png", "/dev/../"}) {
+        EXPECT_THAT(of("{plugin: source_file, path: " + std::string(path) + "}", false).readable, IsEmpty()) << path;
+        EXPECT_THAT(of("{plugin: p, options: {folder: " + std::string(path) + "}}", false).readable, IsEmpty())
+            << path;
+    }
+    const char *home = std::getenv("HOME");
+    EXPECT_THAT(of("{plugin: p, options: {folder: " + std::string(home ? home : "/") + "}}", false).readable,
+                IsEmpty());
+}
+
+TEST_F(Access, OfAnOutputIsItsFolder) {
+    const std::string path = (folder / "out/film.mp4").string();
+    EXPECT_THAT(of("{plugin: sink_video, path: " + path + "}", true).writable, ElementsAre(folder / "out"));
+    EXPECT_THAT(of("{plugin: sink_video, options: {path: " + path + "}}", true).writable,
+                ElementsAre(folder / "out"));
+}
+
+TEST_F(Access, OfALinkedOutputIsTheTargetsFolderToo) {
+    file("there/film.mp4");
+    fs::create_symlink(folder / "there/film.mp4", folder / "link.mp4");
+    EXPECT_THAT(of("{plugin: sink_video, path: " + (folder / "link.mp4").string() + "}", true).writable,
+                ElementsAre(folder, folder / "there"));
+}
+
+TEST_F(Access, OfOptionsIsTheFilesThatTheyName) {
+    file("tags.txt");
+    const auto policy = of("{plugin: p, options: {file: tags.txt, device: /dev/null, other: none.txt}}", false);
+    EXPECT_THAT(policy.readable, ElementsAre(folder / "tags.txt"));
+}
+
+TEST_F(Access, IsWidenedByKeys) {
+    file("data/a.txt");
+    const auto policy = of("{plugin: p, allow: [gpu, video], reads: [data, data/a.txt], writes: [/var/tmp]}", false);
+    EXPECT_THAT(policy.allow, ElementsAre("gpu", "video"));
+    EXPECT_THAT(policy.readable, ElementsAre(folder / "data", folder / "data/a.txt"));
+    EXPECT_THAT(policy.writable, ElementsAre("/var/tmp"));
+}
+
+TEST_F(Access, ToWhatIsNotThereIsAnError) {
+    file("data/a.txt");
+    EXPECT_THAT(error_of("{plugin: p, reads: [data, dta]}"),
+                AllOf(HasSubstr("run.yaml:1:27: reads[1]: there is no file or folder '" + (folder / "dta").string()),
+                      HasSubstr("mend the path")));
+    EXPECT_THAT(error_of("{plugin: p, writes: [/no/such]}"),
+                AllOf(HasSubstr("run.yaml:1:22: writes[0]: there is no folder '/no/such'"), HasSubstr("mkdir -p")));
+    EXPECT_THAT(error_of("{plugin: p, writes: [" + (folder / "data/a.txt").string() + "]}"),
+                HasSubstr("there is no folder '" + (folder / "data/a.txt").string()));
+    EXPECT_THAT(error_of("{plugin: p, reads: ['']}"), HasSubstr("run.yaml:1:21: reads[0]: must not be empty"));
+    EXPECT_FALSE(fs::exists(folder / "dta"));
+}
+
+TEST_F(Access, UpFromALinkIsUpFromItsTarget) {
+    file("there/inner/x");
+    file("there/tags.txt");
+    file("tags.txt");
+    fs::create_directory_symlink(folder / "there/inner", folder / "link");
+    EXPECT_THAT(of("{plugin: p, options: {file: link/../tags.txt}}", false).readable,
+                ElementsAre(folder / "there/tags.txt"));
+    EXPECT_THAT(of("{plugin: p, reads: [link/..]}", false).readable, ElementsAre(folder / "there"));
+    const std::string up = (folder / "link/..").string();
+    EXPECT_THAT(of("{plugin: p, writes: [" + up + "]}", false).writable, ElementsAre(folder / "there"));
+    EXPECT_THAT(of("{plugin: p, path: " + up + "/film.mp4}", true).writable, ElementsAre(folder / "there"));
+}
+
+TEST_F(Access, OfTheEnvironmentIsByName) {
+    EXPECT_THAT(of("{plugin: p, environment: [LICENCE_FILE]}", false).environment, ElementsAre("LICENCE_FILE"));
+    for (const char *name : {"LICENCE_FILE=/x", R"("LICENCE\nFILE")", R"("LICENCE\0FILE")", "'A B'", "''"})
+        EXPECT_THAT(error_of("{plugin: p, environment: [" + std::string(name) + "]}"),
+                    HasSubstr("run.yaml:1:27: environment[0]: must "))
+            << name;
+}
+
+TEST_F(Access, ToAHomeOrTheWorkingDirectoryIsWarnedOf) {
+    const auto warning = [&](const std::string &path) {
+        std::ofstream(folder / "run.yaml") << "path: " << path;
+        return warning_of_output(Node::load(folder / "run.yaml").require("path"), "my_sink");
+    };
+    const std::string home = fs::canonical(std::getenv("HOME")).string();
+    EXPECT_THAT(warning(home + "/film.mp4"),
+                HasSubstr("run.yaml:1:7: path: 'my_sink' can write all of '" + home + "'"));
+    EXPECT_THAT(warning("film.mp4"), HasSubstr("give it a folder of its own, as in 'path: output/film.mp4'"));
+    EXPECT_THAT(warning("/film.mp4"), HasSubstr("all of '/'"));
+    EXPECT_EQ(warning("out/film.mp4"), "");
+    EXPECT_EQ(warning((folder / "film.mp4").string()), "");
+}
+
+TEST_F(Access, ToUnknownThingsIsAnError) {
+    try {
+        of("{plugin: p, allow: [everything]}", false);
+        FAIL();
+    } catch (const Error &error) {
+        EXPECT_THAT(error.what(), HasSubstr("allow[0]"));
+        EXPECT_THAT(error.what(), HasSubstr("network"));
+    }
+}

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugin_under_test.hpp"
+#include "run_config/files_in_use.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+using namespace arhost::run_config;
+using namespace arhost::yaml;
+using testing::AllOf;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct FilesInUseTest : testing::Test {
+    fs::path file(const std::string &name) const {
+        fs::create_directories((folder / name).parent_path());
+        std::ofstream(folder / name) << "x";
+        return folder / name;
+    }
+    // What is said to an output of that path, where the run reads `input`; "" is nothing.
+    std::string refusal(const std::string &input, const std::string &output) const {
+        FilesInUse files;
+        files.read_numbered(folder / input);
+        return error_of([&] { files.write(node(output)); });
+    }
+    Node node(const std::string &path) const {
+        return Node::parse("{path: '" + (folder / path).string() + "'}", "run.yaml").require("path");
+    }
+    template <class Call> static std::string error_of(const Call &call) {
+        try {
+            call();
+        } catch (const Error &error) {
+            return error.what();
+        }
+        return "";
+    }
+    arhost::test::ScratchFolder scratch;
+    const fs::path folder = fs::canonical(scratch.path());
+};
+
+} // namespace
+
+TEST_F(FilesInUseTest, KnowsAFileByItsName) {
+    file("a.yaml");
+    EXPECT_EQ(refusal("a.yaml", "./a.yaml"), "run.yaml:1:8: path: '" + (folder / "./a.yaml").string() +
+                                                 "' is a file that this run reads; choose another path");
+    EXPECT_EQ(refusal("a.yaml", "b.yaml"), "");
+    EXPECT_NE(refusal("none.yaml", "none.yaml"), "");
+}
+
+TEST_F(FilesInUseTest, KnowsAFileByItsLinks) {
+    fs::create_symlink(file("a.yaml"), folder / "soft.yaml");
+    fs::create_hard_link(folder / "a.yaml", folder / "hard.yaml");
+    EXPECT_NE(refusal("a.yaml", "soft.yaml"), "");
+    EXPECT_NE(refusal("soft.yaml", "a.yaml"), "");
+    EXPECT_THAT(refusal("a.yaml", "hard.yaml"), AllOf(HasSubstr("hard.yaml' is a file that this run reads ("),
+                                                      HasSubstr((folder / "a.yaml").string())));
+}
+
+TEST_F(FilesInUseTest, KnowsAFileUpFromALink) {
+    file("there/inner/x");
+    file("there/a.yaml");
+    fs::create_directory_symlink("there/inner", folder / "link");
+    EXPECT_NE(refusal("there/a.yaml", "link/../a.yaml"), "");
+    file("a.yaml");
+    EXPECT_EQ(refusal("a.yaml", "link/../a.yaml"), "");
+}
+
+TEST_F(FilesInUseTest, KnowsTheFilesOfAPattern) {
+    file("f-0001.png");
+    EXPECT_THAT(refusal("f-%04d.png", "f-00%02d.png"), HasSubstr("(" + (folder / "f-0001.png").string() + ")"));
+    EXPECT_NE(refusal("f-%04d.png", "f-0001.png"), "");
+    EXPECT_NE(refusal("f-0001.png", "f-%04d.png"), "");
+    fs::create_hard_link(folder / "f-0001.png", folder / "g-7.png");
+    EXPECT_NE(refusal("f-%04d.png", "g-%d.png"), "");
+    // Files that such a pattern does not write, or that are not there yet.
+    for (const char *other : {"f-%d.png", "f-%03d.png", "f-%05d.png", "f-000%%1.png", "f-%04d.jpg", "f-%x.png",
+                              "f-0002.png", "f_%04d.png", "g-8.png", "f.%04d.png"})
+        EXPECT_EQ(refusal("f-%04d.png", other), "") << other;
+    file("f-%.png");
+    EXPECT_NE(refusal("f-%.png", "f-%.png"), "");
+    file("f-0.png");
+    EXPECT_NE(refusal("f-0.png", "f-%0d.png"), "");
+    EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "no digit is left";
+    file("100%f-12345.png");
+    EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "more digits than at least";
+}
+
+TEST_F(FilesInUseTest, TakesNoNameForAPatternButWherePatternsAreMeant) {
+    file("f-0001.png");
+    FilesInUse files;
+    files.read(folder / "f-%04d.png");
+    EXPECT_EQ(error_of([&] { files.write(node("f-0001.png")); }), "");
+    EXPECT_NE(error_of([&] { files.write(node("f-%04d.png")); }), "");
+}
+
+TEST_F(FilesInUseTest, TakesOneNumberAlone) {
+    file("f-00010002.png");
+    EXPECT_EQ(refusal("f-%04d%04d.png", "f-00010002.png"), "");
+    std::string numbers;
+    for (int i = 0; i < 100; ++i)
+        numbers += "%d";
+    file(std::string(200, '1') + ".png");
+    EXPECT_EQ(refusal("other.png", numbers + ".jpg"), "") << "and soon";
+}
+
+TEST_F(FilesInUseTest, ListsNoFolderThatIsNotThere) {
+    EXPECT_EQ(refusal("none/f-%04d.png", "f-0001.png"), "");
+    EXPECT_NE(refusal("none/f-%04d.png", "none/f-%04d.png"), "");
+}
+
+TEST_F(FilesInUseTest, KnowsWhatAnotherOutputWrites) {
+    FilesInUse files;
+    files.write(node("a.mp4"));
+    EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output writes '"));
+    file("f-0001.png");
+    fs::create_hard_link(folder / "f-0001.png", folder / "f-0002.png");
+    EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "") << "one file by two names is one output's";
+}
+
+TEST_F(FilesInUseTest, KnowsOutputsThatCanMeetBeforeTheirFilesAreThere) {
+    const auto meet = [&](const std::string &one, const std::string &other) {
+        FilesInUse files;
+        files.write(node(one));
+        const std::string error = error_of([&] { files.write(node(other)); });
+        EXPECT_THAT(error, testing::AnyOf("", HasSubstr("can write a file of the same name"), HasSubstr("already")));
+        return !error.empty();
+    };
+    EXPECT_TRUE(meet("f%d.png", "f1%d.png"));
+    EXPECT_TRUE(meet("f1%d.png", "f%d.png"));
+    EXPECT_TRUE(meet("f%03d.png", "./f%04d.png")) << "both write f1000.png";
+    EXPECT_TRUE(meet("f%d.png", "f%d2.png"));
+    EXPECT_TRUE(meet("f%d.png", "f3.png"));
+    EXPECT_TRUE(meet("f3.png", "f%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "g%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "f-%d.png"));
+    EXPECT_FALSE(meet("f%d.png", "f%d.jpg"));
+    EXPECT_FALSE(meet("f%d.png", "f.png"));
+    EXPECT_FALSE(meet("f%d.png", "there/f%d.png"));
+    fs::create_directory(folder / "there");
+    fs::create_directory_symlink("there", folder / "link");
+    EXPECT_TRUE(meet("link/f%d.png", "there/f7.png"));
+    fs::create_symlink("f-0001.png", folder / "to_none.json");
+    EXPECT_TRUE(meet("f-%04d.png", "to_none.json"));
+}
+
+TEST_F(FilesInUseTest, TellsOfAnOutputWhenItsFileIsReadLater) {
+    file("wood.png");
+    FilesInUse files;
+    files.write(node("wood.png"));
+    files.write(node("new.png"));
+    const auto error_about = [&](const std::string &name) {
+        return error_of([&] { files.check_read(arhost::base::identity_of(folder / name)); });
+    };
+    EXPECT_EQ(error_about("stone.png"), "");
+    const std::string refused =
+        "run.yaml:1:8: path: '" + (folder / "wood.png").string() + "' is a file that this run";
+    EXPECT_THAT(error_about("wood.png"), HasSubstr(refused));
+    fs::create_hard_link(folder / "wood.png", folder / "hard.png");
+    EXPECT_THAT(error_about("hard.png"), AllOf(HasSubstr(refused), HasSubstr("/hard.png)")));
+    file("new.png");
+    EXPECT_NE(error_about("new.png"), "") << "which was not there yet";
+}
+
+TEST_F(FilesInUseTest, LooksAtNoFileOfThoseThatAreReadLater) {
+    file("f-0001.png");
+    file("wood.png");
+    FilesInUse files;
+    files.write(node("wood.png"));
+    files.write(node("f-%04d.png"));
+    for (const char *other : {"link.png", "w%dod.png", "f-%d.png", "./wood.png"})
+        EXPECT_EQ(error_of([&] { files.check_read({folder / other, "0:0"}); }), "") << other;
+}

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/options.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost;
+using testing::HasSubstr;
+
+namespace {
+
+ipc::PluginDescription plugin() {
+    ipc::PluginDescription description;
+    description.id = "tracker_x";
+    description.options = {{"threads", ARHOST_OPTION_INTEGER, "2", 1, 8, {}, "Threads."},
+                           {"sigma", ARHOST_OPTION_REAL, "0.5", 0, 0, {}, "Blur in px."},
+                           {"refine", ARHOST_OPTION_BOOL, "true", 0, 0, {}, "Refine."},
+                           {"family", ARHOST_OPTION_TEXT, "tag36h11", 0, 0, {"tag36h11", "tag25h9"}, "Family."},
+                           {"path", ARHOST_OPTION_INPUT_PATH, std::nullopt, 0, 0, {}, "The file."}};
+    return description;
+}
+
+std::vector<ipc::OptionValue> resolve(const std::string &yaml) {
+    const yaml::Node owner = yaml::Node::parse(yaml, "/lab/a.yaml");
+    return run_config::resolve_options(plugin(), owner.find("options"), owner.find("path"), owner);
+}
+
+std::string error_of(const std::string &yaml) {
+    try {
+        resolve(yaml);
+    } catch (const yaml::Error &error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+} // namespace
+
+TEST(Options, TakeTheirDefaultsAndTheGivenValuesInTheDeclaredOrder) {
+    const auto values = resolve("{path: x.png, options: {threads: 4, family: tag25h9}}");
+    ASSERT_EQ(values.size(), 5u);
+    EXPECT_EQ(values[0].integer, 4);
+    EXPECT_EQ(values[1].real, 0.5);
+    EXPECT_EQ(values[2].integer, 1);
+    EXPECT_EQ(values[3].text, "tag25h9");
+    EXPECT_EQ(values[4].text, "/lab/x.png") << "relative to the configuration's folder";
+}
+
+TEST(Options, AreRefusedWithTheirPlace) {
+    EXPECT_EQ(error_of("{path: x, options: {threads: 9}}"),
+              "/lab/a.yaml:1:30: options.threads: must be 1 to 8, is 9");
+    EXPECT_THAT(error_of("{path: x, options: {family: tag36h12}}"), HasSubstr("did you mean 'tag36h11'?"));
+    EXPECT_THAT(error_of("{path: x, options: {refine: 1}}"), HasSubstr("options.refine: must be true or false"));
+    EXPECT_THAT(error_of("{path: x, options: {tread: 1}}"),
+                HasSubstr("options.tread: unknown key; did you mean 'threads'?"));
+    EXPECT_THAT(error_of("{options: {}}"), HasSubstr("tracker_x needs 'path': The file."));
+    EXPECT_THAT(error_of("{path: x, options: {path: y}}"), HasSubstr("keep one of them"));
+}

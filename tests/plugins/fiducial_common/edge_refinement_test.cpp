@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/edge_refinement.hpp>
+
+#include "prints.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace {
+
+using namespace arhost::test;
+using arhost::planar::Corners;
+using arhost::planar::refine_edges;
+
+const arhost_intrinsics camera = intrinsics_of({320, 240}, 300, 300, 159.5, 119.5);
+const arhost::planar::Lens lens(camera);
+
+// Corners of a picture of one tag before and after refinement, against where projection has them.
+struct Errors {
+    double before_px = 0, after_px = 0;
+    cv::Point2d bias_px;
+};
+
+Errors errors(bool inverted) {
+    Errors sum;
+    int count = 0;
+    std::mt19937 generator(3);
+    std::uniform_real_distribution<double> tilt(-40, 40), turn(-180, 180), offset(-1.2, 1.2);
+    for (int i = 0; i < 8; ++i) {
+        const Mt mt =
+            pose_of(tilt(generator), tilt(generator), 400, tilt(generator), tilt(generator), turn(generator));
+        cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}}, 4);
+        if (inverted)
+            picture = 255 - picture;
+        add_noise(picture, 2, i + 1);
+        const auto truth = corners_of(mt, camera, 100);
+        Corners rough = truth;
+        for (auto &corner : rough)
+            corner += cv::Point2d(offset(generator), offset(generator));
+        const Corners fine = refine_edges(picture, rough, lens).value();
+        for (int k = 0; k < 4; ++k, ++count) {
+            sum.before_px += cv::norm(rough[k] - truth[k]);
+            sum.after_px += cv::norm(fine[k] - truth[k]);
+            sum.bias_px += fine[k] - truth[k];
+        }
+    }
+    return {sum.before_px / count, sum.after_px / count, sum.bias_px / count};
+}
+
+TEST(EdgeRefinement, PutsRoughCornersWhereProjectionHasThem) {
+    for (const bool inverted : {false, true}) {
+        const Errors e = errors(inverted);
+        EXPECT_GT(e.before_px, 0.7);
+        EXPECT_LT(e.after_px, 0.05);
+        // Pixel centres at integers: half a pixel off would show here.
+        EXPECT_LT(cv::norm(e.bias_px), 0.02);
+    }
+}
+
+TEST(EdgeRefinement, FindsACornerThatIsHidden) {
+    const Mt mt = pose_of(5, -3, 300, 20, 15, 25);
+    const auto truth = corners_of(mt, camera, 100);
+    for (const int grey : {20, 128, 230}) {
+        cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(2), 100, mt}}, 4);
+        cv::circle(picture, truth[2], 12, cv::Scalar(grey), cv::FILLED);
+        Corners rough = truth;
+        rough[2] += (truth[0] - truth[2]) / cv::norm(truth[0] - truth[2]) * 6;
+        const auto fine = refine_edges(picture, rough, lens);
+        ASSERT_TRUE(fine);
+        for (int k = 0; k < 4; ++k)
+            EXPECT_LT(cv::norm((*fine)[k] - truth[k]), 0.2) << grey << " " << k;
+    }
+}
+
+TEST(EdgeRefinement, ReportsNoneWhereThereAreNoEdges) {
+    const Corners corners{{{100, 80}, {160, 80}, {160, 140}, {100, 140}}};
+    for (const cv::Size size : {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // half or all of it outside
+        EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens));
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const cv::Mat plain(240, 320, CV_8U, cv::Scalar(90));
+    EXPECT_FALSE(refine_edges(plain, {{{100, 80}, {100, 80}, {100, 80}, {100, 80}}}, lens));
+    EXPECT_FALSE(refine_edges(plain, {{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}}, lens));
+}
+
+TEST(EdgeRefinement, NeverMovesACornerFar) {
+    cv::Mat noise(240, 320, CV_8U, cv::Scalar(128));
+    add_noise(noise, 60, 5);
+    std::mt19937 generator(11);
+    std::uniform_real_distribution<double> at(-10, 250);
+    for (int i = 0; i < 200; ++i) {
+        Corners corners;
+        for (auto &corner : corners)
+            corner = {at(generator), at(generator)};
+        if (const auto refined = refine_edges(noise, corners, lens)) {
+            for (int k = 0; k < 4; ++k)
+                EXPECT_LT(cv::norm((*refined)[k] - corners[k]), cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
+        }
+    }
+}
+
+} // namespace

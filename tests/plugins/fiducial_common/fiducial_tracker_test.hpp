@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What every fiducial tracker must do, on tag36h11. A tracker's test includes this and instantiates the
+// suite FiducialTracker with the ways in which it is to be tested.
+#pragma once
+
+#include "prints.hpp"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/core/utility.hpp>
+
+#include <algorithm>
+
+namespace arhost::test {
+
+struct TrackerCase {
+    const char *name, *plugin;
+    Options options;
+    Options on_more_threads; // the same detector on several threads
+};
+
+inline const arhost_intrinsics test_camera = intrinsics_of({480, 360}, 450, 455, 243.2, 176.9);
+
+inline double angle_degrees(const double *a, const Mt &b) {
+    double trace = 0;
+    for (int i = 0; i < 11; ++i)
+        trace += i % 4 < 3 ? a[i] * b[i] : 0;
+    return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+inline cv::Mat picture_of(const std::vector<Placed> &markers) {
+    cv::Mat picture = render(test_camera, markers, 4);
+    cv::GaussianBlur(picture, picture, {}, 0.6);
+    add_noise(picture, 1.5, 1);
+    return picture;
+}
+
+inline Print tag(int id) {
+    return april_tag("tag36h11", id).with_margin(1);
+}
+
+class FiducialTracker : public testing::TestWithParam<TrackerCase> {
+protected:
+    FiducialTracker() : tracker_(GetParam().plugin, GetParam().options) {
+        EXPECT_EQ(tracker_.created(), ARHOST_STATUS_OK) << tracker_.log();
+    }
+    std::vector<arhost_marker> track(const cv::Mat &picture, const std::vector<Listed> &listed) {
+        auto camera = test_camera;
+        camera.width = static_cast<uint32_t>(picture.cols);
+        camera.height = static_cast<uint32_t>(picture.rows);
+        EXPECT_EQ(tracker_.start(camera, listed), ARHOST_STATUS_OK) << tracker_.log();
+        return tracker_.track(GreyFrame(picture));
+    }
+    Tracker tracker_;
+};
+
+inline void PrintTo(const TrackerCase &tracker, std::ostream *out) {
+    *out << tracker.name;
+}
+inline std::string case_name(const testing::TestParamInfo<TrackerCase> &info) {
+    return info.param.name;
+}
+
+TEST_P(FiducialTracker, RecoversTheRenderedPose) {
+    cv::Point2d bias;
+    const std::vector<Mt> poses{pose_of(0, 0, 500), pose_of(60, 40, 450, 30, 20, 15),
+                                pose_of(-70, 30, 600, -35, 25, 90), pose_of(40, -50, 550, 20, -45, 180),
+                                pose_of(-30, -40, 700, -20, -30, -100)};
+    for (const Mt &truth : poses) {
+        const auto markers = track(picture_of({{tag(17), 100, truth}}), {{17, 100}});
+        ASSERT_EQ(markers.size(), 1u);
+        const arhost_marker &found = markers[0];
+        EXPECT_EQ(found.id, 17);
+        EXPECT_STREQ(found.family, "tag36h11");
+        EXPECT_LT(angle_degrees(found.mt, truth), 0.7);
+        for (int i = 12; i < 15; ++i)
+            EXPECT_NEAR(found.mt[i], truth[i], -0.003 * truth[14]);
+        EXPECT_LT(found.reprojection_px, 0.1);
+        const auto corners = corners_of(truth, test_camera, 100);
+        for (int k = 0; k < 4; ++k) {
+            EXPECT_LT(corner_distance_px(found, k, corners[k]), 0.2);
+            bias += cv::Point2d(found.corners_px[k][0], found.corners_px[k][1]) - corners[k];
+        }
+    }
+    // Pixel centres at integers: half a pixel off would show here.
+    EXPECT_LT(cv::norm(bias) / (4.0 * static_cast<double>(poses.size())), 0.03);
+}
+
+TEST_P(FiducialTracker, FacingTagHasXRightYUpAndZTowardsTheViewer) {
+    const auto upright = track(picture_of({{tag(3), 100, pose_of(20, 30, 400)}}), {{3, 100}});
+    ASSERT_EQ(upright.size(), 1u);
+    EXPECT_LT(angle_degrees(upright[0].mt, pose_of(0, 0, 1)), 1);
+    EXPECT_NEAR(upright[0].mt[12], 20, 1);
+    EXPECT_NEAR(upright[0].mt[13], 30, 1);
+    EXPECT_NEAR(upright[0].mt[14], -400, 2);
+    EXPECT_LT(upright[0].corners_px[0][0], upright[0].corners_px[1][0]); // top-left is left of top-right
+    EXPECT_LT(upright[0].corners_px[0][1], upright[0].corners_px[3][1]); // and above bottom-left
+
+    for (const double turn : {90.0, 180.0, 270.0}) {
+        const auto turned = track(picture_of({{tag(3), 100, pose_of(0, 0, 400, 0, 0, turn)}}), {{3, 100}});
+        ASSERT_EQ(turned.size(), 1u);
+        EXPECT_LT(angle_degrees(turned[0].mt, pose_of(0, 0, 1, 0, 0, turn)), 1);
+    }
+}
+
+TEST_P(FiducialTracker, SeesThroughADistortedLens) {
+    // The lens moves the corners by up to 10 px and bends the edges by up to a pixel.
+    arhost_intrinsics lens = test_camera;
+    lens.distortion = ARHOST_DISTORTION_BROWN;
+    lens.coefficient_count = 4;
+    lens.coefficients[0] = -0.2;
+    const Mt truth = pose_of(140, 80, 450, 20, -15, 10);
+    const cv::Mat straight = render(test_camera, {{tag(8), 110, truth}}, 4);
+    cv::Mat_<cv::Vec2f> source(straight.size());
+    std::vector<cv::Point2d> distorted, ideal;
+    for (int y = 0; y < source.rows; ++y)
+        for (int x = 0; x < source.cols; ++x)
+            distorted.emplace_back(x, y);
+    const cv::Matx33d k(lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1);
+    cv::undistortPoints(distorted, ideal, k, std::vector<double>{-0.2, 0, 0, 0}, cv::noArray(), k,
+                        cv::TermCriteria(cv::TermCriteria::COUNT, 30, 0));
+    std::transform(ideal.begin(), ideal.end(), source.begin(), [](cv::Point2d p) { return cv::Vec2f(p.x, p.y); });
+    cv::Mat bent;
+    cv::remap(straight, bent, source, cv::noArray(), cv::INTER_LINEAR);
+
+    ASSERT_EQ(tracker_.start(lens, {{8, 110}}), ARHOST_STATUS_OK);
+    const auto markers = tracker_.track(GreyFrame(bent));
+    ASSERT_EQ(markers.size(), 1u);
+    EXPECT_GT(corner_distance_px(markers[0], 1, corners_of(truth, test_camera, 110)[1]), 5);
+    for (int k = 0; k < 4; ++k)
+        EXPECT_LT(corner_distance_px(markers[0], k, corners_of(truth, lens, 110)[k]), 0.1);
+    EXPECT_LT(angle_degrees(markers[0].mt, truth), 0.5);
+    for (int i = 12; i < 15; ++i)
+        EXPECT_NEAR(markers[0].mt[i], truth[i], 0.002 * 450);
+}
+
+TEST_P(FiducialTracker, ReportsTheListedMarkersOnlyInTheSetupsOrder) {
+    const cv::Mat picture = picture_of({{tag(5), 60, pose_of(-100, 60, 500)},
+                                        {tag(2), 80, pose_of(100, 60, 500)},
+                                        {tag(586), 70, pose_of(0, -60, 500)}});
+    const auto ids = [&](const std::vector<Listed> &listed) {
+        std::vector<int> found;
+        for (const auto &marker : track(picture, listed))
+            found.push_back(marker.id);
+        return found;
+    };
+    EXPECT_THAT(ids({{5, 60}, {2, 80}}), testing::ElementsAre(5, 2));
+    EXPECT_THAT(ids({{586, 70}, {7}, {2, 80}}), testing::ElementsAre(586, 2));
+    EXPECT_THAT(ids({{7}, {9}}), testing::IsEmpty());
+    for (const auto &marker : track(picture, {{2, 80}, {5, 60}, {586, 70}}))
+        EXPECT_NEAR(marker.mt[14], -500, 2); // each with its own side
+}
+
+TEST_P(FiducialTracker, GivesOneRecordForAMarkerSeenTwice) {
+    const cv::Mat picture = picture_of({{tag(5), 80, pose_of(-90, 20, 500)}, {tag(5), 80, pose_of(90, -20, 500)}});
+    const auto first = track(picture, {{5, 80}});
+    ASSERT_EQ(first.size(), 1u);
+    EXPECT_NEAR(std::abs(first[0].mt[12]), 90, 2);
+    const auto second = track(picture, {{5, 80}});
+    ASSERT_EQ(second.size(), 1u);
+    EXPECT_EQ(std::memcmp(first.data(), second.data(), sizeof(arhost_marker)), 0);
+}
+
+TEST_P(FiducialTracker, RejectsAMirroredPrint) {
+    EXPECT_EQ(track(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}), {{3}}).size(), 1u);
+    std::vector<Listed> all;
+    for (int id = 0; id < 64; ++id)
+        all.push_back({id});
+    EXPECT_TRUE(track(picture_of({{tag(3).mirrored(), 100, pose_of(0, 0, 400)}}), all).empty());
+}
+
+TEST_P(FiducialTracker, FindsNothingInEmptyPictures) {
+    std::vector<Listed> all;
+    for (int id = 0; id < 64; ++id)
+        all.push_back({id});
+    for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 3), cv::Size(7, 7), cv::Size(8, 8), cv::Size(13, 12),
+                                cv::Size(1, 500), cv::Size(500, 1), cv::Size(33, 9), cv::Size(320, 240)})
+        for (const int grey : {0, 255, 128}) {
+            cv::Mat picture(size, CV_8U, cv::Scalar(grey));
+            EXPECT_TRUE(track(picture, all).empty()) << size << " grey " << grey;
+            add_noise(picture, 60, 4);
+            EXPECT_TRUE(track(picture, all).empty()) << size << " noise about " << grey;
+        }
+}
+
+TEST_P(FiducialTracker, RefusesAnIdThatIsNotInTheFamily) {
+    EXPECT_EQ(tracker_.start(test_camera, {{0}, {587}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker_.log(), testing::HasSubstr("marker id 587 is not in tag36h11, whose ids are 0 to 586"));
+    EXPECT_EQ(tracker_.start(test_camera, {{0}, {586}}), ARHOST_STATUS_OK);
+}
+
+TEST_P(FiducialTracker, GivesNoFalsePoseWhereACornerIsHidden) {
+    const Mt truth = pose_of(10, 5, 450, 25, -20, 30);
+    const cv::Mat whole = picture_of({{tag(17), 100, truth}});
+    const auto corners = corners_of(truth, test_camera, 100);
+    for (int hidden = 0; hidden < 4; ++hidden)
+        for (const int radius_px : {4, 8, 14, 22, 30})
+            for (const int grey : {20, 120, 230}) {
+                cv::Mat picture = whole.clone();
+                cv::circle(picture, corners[hidden], radius_px, cv::Scalar(grey), cv::FILLED);
+                for (const arhost_marker &marker : track(picture, {{17, 100}})) {
+                    EXPECT_LT(angle_degrees(marker.mt, truth), 5)
+                        << "corner " << hidden << " radius " << radius_px << " grey " << grey;
+                    EXPECT_NEAR(marker.mt[14] / truth[14], 1, 0.02)
+                        << "corner " << hidden << " radius " << radius_px << " grey " << grey;
+                }
+            }
+}
+
+TEST_P(FiducialTracker, GivesTheSameResultOnAnyNumberOfThreads) {
+    std::vector<Placed> placed;
+    std::vector<Listed> listed;
+    for (int id = 0; id < 12; ++id) {
+        placed.push_back(
+            {tag(id), 60, pose_of((id % 4 - 1.5) * 110, (id / 4 - 1) * 110, 500, 3 * id, 20 - 4 * id, 31 * id)});
+        listed.push_back({id, 60});
+    }
+    const cv::Mat picture = picture_of(placed);
+    const int threads = cv::getNumThreads();
+    cv::setNumThreads(1);
+    const auto alone = track(picture, listed);
+    cv::setNumThreads(2);
+    Options options = GetParam().options;
+    options.insert(GetParam().on_more_threads.begin(), GetParam().on_more_threads.end());
+    Tracker wide(GetParam().plugin, options);
+    ASSERT_EQ(wide.start(test_camera, listed), ARHOST_STATUS_OK);
+    for (int repetition = 0; repetition < 5; ++repetition) {
+        const auto together = wide.track(GreyFrame(picture));
+        ASSERT_EQ(together.size(), alone.size());
+        EXPECT_EQ(std::memcmp(together.data(), alone.data(), alone.size() * sizeof(arhost_marker)), 0);
+    }
+    EXPECT_EQ(alone.size(), 12u);
+    cv::setNumThreads(threads);
+}
+
+TEST_P(FiducialTracker, LeavesTheFrameAsItWas) {
+    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
+    const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());
+    ASSERT_EQ(tracker_.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(tracker_.track(frame).size(), 1u);
+    EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
+    EXPECT_TRUE(frame.slot().intact());
+}
+
+} // namespace arhost::test

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How exact a tracker is on a real sequence with known poses (../shared/data/markers/rbt_sequence).
+#pragma once
+
+#include "tracker_support.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <numeric>
+
+namespace arhost::test {
+
+inline double percentile(std::vector<double> values, double share) {
+    if (values.empty())
+        throw std::runtime_error("no values");
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), nth, values.end());
+    return *nth;
+}
+
+inline double mean(const std::vector<double> &values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+class RbtSequence {
+public:
+    using Frames = std::vector<std::map<int, arhost_marker>>; // a tracker's answer, by frame and id
+
+    RbtSequence() {
+        const auto folder = shared_data("markers/rbt_sequence");
+        truth_ = nlohmann::json::parse(std::ifstream(folder / "apriltag_data.json"));
+        for (std::size_t k = 0; k < truth_["grid"].size(); ++k) {
+            char name[48];
+            std::snprintf(name, sizeof name, "color_image_%04zu.png", k);
+            frames_.emplace_back(read_grey(folder / name));
+            for (const auto &[id, detection] : truth_["detections"][k].items())
+                ids_.push_back(std::stoi(id));
+        }
+        std::sort(ids_.begin(), ids_.end());
+        ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
+    }
+
+    // Milliseconds of each frame go to `ms`.
+    Frames run(Tracker &tracker, std::vector<double> *ms = nullptr) const {
+        std::vector<Listed> listed;
+        for (int id : ids_)
+            listed.push_back({id, side_mm});
+        // cam.json; the sequence is rectified.
+        const auto camera =
+            intrinsics_of({640, 480}, 607.178466796875, 607.2342529296875, 321.39129638671875, 241.91822814941406);
+        if (tracker.start(camera, listed) != ARHOST_STATUS_OK)
+            throw std::runtime_error("start failed: " + tracker.log());
+        Frames frames;
+        for (const GreyFrame &frame : frames_) {
+            const auto begin = std::chrono::steady_clock::now();
+            const auto markers = tracker.track(frame);
+            const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - begin;
+            if (ms)
+                ms->push_back(taken.count());
+            frames.emplace_back();
+            for (const arhost_marker &marker : markers)
+                frames.back()[marker.id] = marker;
+        }
+        return frames;
+    }
+
+    struct Accuracy {
+        int listed = 0, found = 0;     // detections of the reference, and those that the tracker has too
+        std::vector<double> corner_px; // distance of each corner from the reference's
+        std::vector<double> distance;  // relative error of each tag's distance
+        double found_share() const { return static_cast<double>(found) / listed; }
+    };
+    Accuracy accuracy(const Frames &frames) const {
+        Accuracy result;
+        for (std::size_t k = 0; k < frames.size(); ++k)
+            for (const auto &[name, reference] : truth_["detections"][k].items()) {
+                ++result.listed;
+                const int id = std::stoi(name);
+                const auto marker = frames[k].find(id);
+                if (marker == frames[k].end())
+                    continue;
+                ++result.found;
+                // Rows and columns with pixel centres at +0.5, from the bottom left against the clock.
+                for (int corner = 0; corner < 4; ++corner) {
+                    const auto &at = reference["tag_corners"][3 - corner];
+                    result.corner_px.push_back(corner_distance_px(
+                        marker->second, corner, {at[1].get<double>() - 0.5, at[0].get<double>() - 0.5}));
+                }
+                const double *mt = marker->second.mt;
+                const double expected_mm = distance_mm(truth_["grid"][k], id);
+                result.distance.push_back(std::abs(std::hypot(mt[12], mt[13], mt[14]) / expected_mm - 1));
+            }
+        return result;
+    }
+
+    // Distances in px between corners that both trackers have found.
+    static std::vector<double> disagreement_px(const Frames &a, const Frames &b) {
+        std::vector<double> distances;
+        for (std::size_t k = 0; k < a.size(); ++k)
+            for (const auto &[id, marker] : a[k])
+                if (const auto other = b[k].find(id); other != b[k].end())
+                    for (int corner = 0; corner < 4; ++corner)
+                        distances.push_back(corner_distance_px(
+                            marker, corner,
+                            {other->second.corners_px[corner][0], other->second.corners_px[corner][1]}));
+        return distances;
+    }
+
+private:
+    static constexpr double side_mm = 95.5;
+
+    // The layout of ../shared/data/README.md.
+    static double distance_mm(const nlohmann::json &camera_from_board, int id) {
+        const double x = 47.75 + 120.0 * (id / 4), y = 47.75 + 120.0 * (id % 4);
+        std::array<double, 3> centre;
+        for (int row = 0; row < 3; ++row) {
+            const auto &r = camera_from_board[row];
+            centre[row] = r[0].get<double>() * x + r[1].get<double>() * y + 1000 * r[3].get<double>();
+        }
+        return std::hypot(centre[0], centre[1], centre[2]);
+    }
+
+    nlohmann::json truth_;
+    std::vector<GreyFrame> frames_;
+    std::vector<int> ids_;
+};
+
+} // namespace arhost::test

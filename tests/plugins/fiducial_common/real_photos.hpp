@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Photos of ../shared/data/markers with known tags of the family tag36h11.
+#pragma once
+
+#include "tracker_support.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/calib3d.hpp>
+
+#include <fstream>
+
+namespace arhost::test {
+
+// The markers of a photo, by id.
+inline std::map<int, arhost_marker> markers_in(Tracker &tracker, const std::filesystem::path &file,
+                                               const std::vector<Listed> &listed) {
+    const cv::Mat picture = read_grey(file);
+    if (tracker.start(plain_camera(picture.size()), listed) != ARHOST_STATUS_OK)
+        throw std::runtime_error(tracker.log());
+    std::map<int, arhost_marker> by_id;
+    for (const arhost_marker &marker : tracker.track(GreyFrame(picture)))
+        by_id[marker.id] = marker;
+    return by_id;
+}
+
+inline std::vector<Listed> ids_to(int count) {
+    std::vector<Listed> listed;
+    for (int id = 0; id < count; ++id)
+        listed.push_back({id});
+    return listed;
+}
+
+// Where the diagonals cross: the centre of the print.
+inline cv::Point2d centre_px(const arhost_marker &marker) {
+    const auto corner = [&](int i) { return cv::Point2d(marker.corners_px[i][0], marker.corners_px[i][1]); };
+    const cv::Point2d a = corner(2) - corner(0), b = corner(3) - corner(1);
+    return corner(0) + (corner(1) - corner(0)).cross(b) / a.cross(b) * a;
+}
+
+// Twelve tags of 53 mm (apriltag_photo): their corners within ViSP's own tolerance of 0.5 px, and their poses.
+inline void expect_april_tag_photo(Tracker &tracker) {
+    const auto folder = shared_data("markers/apriltag_photo");
+    const auto photo = read_grey(folder / "AprilTag.png");
+    std::vector<Listed> listed = ids_to(30);
+    for (Listed &marker : listed)
+        marker.side_mm = 53;
+    ASSERT_EQ(tracker.start(intrinsics_of(photo.size(), 615.1674805, 615.1675415, 312.1889954, 243.4373779), listed),
+              ARHOST_STATUS_OK);
+    const auto found = tracker.track(GreyFrame(photo));
+    EXPECT_EQ(found.size(), 12u);
+    std::ifstream corners(folder / "ground_truth_detection.txt"), poses(folder / "ground_truth_pose.txt");
+    for (const arhost_marker &marker : found) {
+        SCOPED_TRACE(marker.id);
+        std::string title;
+        std::getline(corners >> std::ws, title);
+        ASSERT_EQ(title, "36h11_id:_" + std::to_string(marker.id));
+        for (int k = 3; k >= 0; --k) { // from the bottom left against the clock; centres at +0.5
+            double row = 0, column = 0;
+            corners >> row >> column;
+            EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}), 0.5);
+        }
+        std::getline(poses >> std::ws, title);
+        double t[3], u[3]; // metres, and angle times axis, in OpenCV's camera axes
+        poses >> t[0] >> t[1] >> t[2] >> u[0] >> u[1] >> u[2];
+        const double sign[3] = {1, -1, -1};
+        cv::Matx33d truth, ours;
+        cv::Rodrigues(cv::Vec3d(u), truth);
+        for (int row = 0; row < 3; ++row) {
+            EXPECT_NEAR(sign[row] * marker.mt[12 + row], 1000 * t[row], 5);
+            for (int column = 0; column < 3; ++column)
+                ours(row, column) = sign[row] * marker.mt[4 * column + row];
+        }
+        cv::Vec3d difference;
+        cv::Rodrigues(truth.t() * ours, difference);
+        EXPECT_LT(cv::norm(difference), 0.03); // rad
+    }
+}
+
+// A clipboard of 30 tags, 320×240, in which a tag is about 25 px, and five views of a hallway.
+inline void expect_swatbotics_photos(Tracker &tracker) {
+    const auto folder = shared_data("markers/swatbotics");
+    for (const char *name : {"clipboard02.png", "clipboard04.png", "clipboard05.png", "clipboard06.png"})
+        EXPECT_EQ(markers_in(tracker, folder / "clipboard" / name, ids_to(60)).size(), 30u) << name;
+    for (const auto &[name, id] : {std::pair{"0612", 3}, std::pair{"0613", 3}, std::pair{"0614", 2},
+                                   std::pair{"0615", 2}, std::pair{"0617", 10}}) {
+        const auto found =
+            markers_in(tracker, folder / "hallway" / ("IMG_" + std::string(name) + ".jpg"), ids_to(60));
+        EXPECT_EQ(found.size(), 1u) << name;
+        EXPECT_TRUE(found.contains(id)) << name;
+    }
+}
+
+// The centres of AprilTags.jl, which has pixel centres at +0.5.
+inline void expect_julia_photo(Tracker &tracker) {
+    std::vector<cv::Point2d> expected{{176.1, 404.5}, {216.1, 134.0}, {130.1, 412.0}};
+    const auto found = markers_in(tracker, shared_data("markers/julia/tagtest.jpg"), ids_to(30));
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto &[id, marker] : found) {
+        const cv::Point2d centre = centre_px(marker) + cv::Point2d(0.5, 0.5);
+        EXPECT_TRUE(
+            std::any_of(expected.begin(), expected.end(), [&](cv::Point2d e) { return cv::norm(e - centre) < 0.5; }))
+            << "tag " << id << " at " << centre;
+    }
+}
+
+} // namespace arhost::test

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A sink as the worker drives it, pictures to feed it with, and ways to make its life hard.
+#pragma once
+
+#include "plugin_under_test.hpp"
+
+#include <arhost/sink.h>
+
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace arhost::test {
+
+// A BGR8 picture in memory that faults on a write, and on a read past the last pixel.
+class Picture {
+public:
+    // Soft gradients that drift with `number`, and `number` in binary as black and white squares of 8 px
+    // along the top, where the picture is at least 128 px wide. `stride` 0: the rows lie close together.
+    Picture(int width, int height, std::uint64_t number, int stride = 0)
+        : width_(width), height_(height), stride_(stride ? stride : 3 * width) {
+        const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+        const std::size_t used =
+            static_cast<std::size_t>(stride_) * (height - 1) + 3 * static_cast<std::size_t>(width);
+        const std::size_t readable = (used + page - 1) / page * page;
+        mapped_ = readable + page;
+        void *map = mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (map == MAP_FAILED)
+            throw std::runtime_error("mmap");
+        map_ = static_cast<std::uint8_t *>(map);
+        bgr_ = map_ + readable - used;
+        paint(number);
+        mprotect(map_, readable, PROT_READ);
+        mprotect(map_ + readable, page, PROT_NONE);
+    }
+    ~Picture() { munmap(map_, mapped_); }
+    Picture(const Picture &) = delete;
+    Picture &operator=(const Picture &) = delete;
+
+    int width() const { return width_; }
+    int height() const { return height_; }
+    int stride() const { return stride_; }
+    const std::uint8_t *bgr() const { return bgr_; }
+    const std::uint8_t *pixel(int x, int y) const { return bgr_ + static_cast<std::size_t>(y) * stride_ + 3 * x; }
+
+    static constexpr int square_px = 8, squares = 16;
+
+private:
+    void paint(std::uint64_t number) {
+        for (int y = 0; y < height_; ++y)
+            for (int x = 0; x < width_; ++x) {
+                std::uint8_t *p = bgr_ + static_cast<std::size_t>(y) * stride_ + 3 * x;
+                const double t = static_cast<double>(number % 1000);
+                p[0] = wave(0.021 * x + 0.009 * y + 0.05 * t);
+                p[1] = wave(0.013 * x - 0.017 * y + 1.0 + 0.03 * t);
+                p[2] = wave(0.007 * x + 0.023 * y + 2.0 - 0.04 * t);
+                if (y < square_px && x < square_px * squares && width_ >= square_px * squares)
+                    p[0] = p[1] = p[2] = (number >> (x / square_px)) & 1 ? 255 : 0;
+            }
+    }
+    static std::uint8_t wave(double phase) {
+        return static_cast<std::uint8_t>(std::lround(128 + 100 * std::sin(phase)));
+    }
+
+    int width_, height_, stride_;
+    std::size_t mapped_;
+    std::uint8_t *map_, *bgr_;
+};
+
+inline arhost_record make_record(std::uint64_t sequence) {
+    arhost_record record{};
+    record.struct_size = sizeof record;
+    record.clock = ARHOST_CLOCK_MEDIA;
+    record.sequence = sequence;
+    record.capture_ns = static_cast<std::int64_t>(sequence) * 33'333'333;
+    record.overlay = ARHOST_OVERLAY_NONE;
+    return record;
+}
+
+// A camera for pictures of that size, its numbers awkward.
+inline arhost_intrinsics make_intrinsics(int width, int height) {
+    arhost_intrinsics intrinsics{};
+    intrinsics.struct_size = sizeof intrinsics;
+    intrinsics.width = static_cast<std::uint32_t>(width);
+    intrinsics.height = static_cast<std::uint32_t>(height);
+    intrinsics.distortion = ARHOST_DISTORTION_BROWN;
+    intrinsics.fx = 1000.0 / 3;
+    intrinsics.fy = 1000.0 / 7;
+    intrinsics.cx = width / 2.1;
+    intrinsics.cy = height / 1.9;
+    intrinsics.coefficient_count = 4;
+    const double coefficients[] = {0.1 / 3, -1e-17, 0, 2e-3};
+    std::ranges::copy(coefficients, intrinsics.coefficients);
+    return intrinsics;
+}
+
+// One process's life of a sink. Destroying it without `stop` is as near to a kill as one process gets.
+class SinkUnderTest {
+public:
+    SinkUnderTest(const std::string &id, const std::map<std::string, std::string> &options) : plugin_(id) {
+        created_ = plugin_.create(options);
+    }
+
+    bool knows_camera = true; // start() tells the intrinsics
+
+    arhost_status created() const { return created_; }
+    arhost_status start(int width, int height, std::uint64_t first_sequence = 0, double fps = 30) {
+        if (created_ != ARHOST_STATUS_OK)
+            return created_;
+        width_ = width;
+        height_ = height;
+        arhost_sink_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.width = static_cast<std::uint32_t>(width);
+        setup.height = static_cast<std::uint32_t>(height);
+        setup.fps = fps;
+        setup.first_sequence = first_sequence;
+        const arhost_intrinsics intrinsics = make_intrinsics(width, height);
+        setup.intrinsics = knows_camera ? &intrinsics : nullptr;
+        return functions().start(plugin_.instance(), &setup);
+    }
+    arhost_status write(const Picture &picture, const arhost_record &record) {
+        arhost_output output{};
+        output.struct_size = sizeof output;
+        output.stride = static_cast<std::uint32_t>(picture.stride());
+        output.width = static_cast<std::uint32_t>(picture.width());
+        output.height = static_cast<std::uint32_t>(picture.height());
+        output.bgr = picture.bgr();
+        output.record = &record;
+        return functions().write(plugin_.instance(), &output);
+    }
+    arhost_status write(std::uint64_t sequence) {
+        return write(Picture(width_, height_, sequence), make_record(sequence));
+    }
+    arhost_status write(std::uint64_t first, std::uint64_t end) { // [first, end)
+        for (; first < end; ++first)
+            if (const arhost_status status = write(first); status != ARHOST_STATUS_OK)
+                return status;
+        return ARHOST_STATUS_OK;
+    }
+    arhost_status idle() { return functions().idle(plugin_.instance()); }
+    arhost_status stop() { return functions().stop(plugin_.instance()); }
+
+    const arhost_sink &functions() const { return plugin_.functions<arhost_sink>(); }
+    const arhost_descriptor &descriptor() const { return plugin_.descriptor(); }
+    void cancel() { plugin_.cancel(); }
+    std::string log() const { return plugin_.log(); }
+
+private:
+    PluginUnderTest plugin_;
+    arhost_status created_;
+    int width_ = 0, height_ = 0;
+};
+
+// Runs a sink in a process of its own from `first_sequence` on and kills that process while it works,
+// once at least `frames` frames have been acknowledged. Returns the number of the first frame that was
+// not: where the host would go on.
+inline std::uint64_t write_until_killed(const std::string &id, const std::map<std::string, std::string> &options,
+                                        int width, int height, std::uint64_t first_sequence, std::uint64_t frames,
+                                        arhost_record (*record)(std::uint64_t) = make_record) {
+    int pipe_ends[2];
+    if (pipe(pipe_ends) != 0)
+        throw std::runtime_error("pipe");
+    const pid_t child = fork();
+    if (child < 0)
+        throw std::runtime_error("fork");
+    if (child == 0) {
+        SinkUnderTest sink(id, options);
+        if (sink.start(width, height, first_sequence) != ARHOST_STATUS_OK)
+            _exit(1);
+        for (std::uint64_t i = first_sequence;; ++i)
+            if (sink.write(Picture(width, height, i), record(i)) != ARHOST_STATUS_OK ||
+                ::write(pipe_ends[1], "a", 1) != 1)
+                _exit(1);
+    }
+    ::close(pipe_ends[1]);
+    std::uint64_t acknowledged = 0;
+    for (char byte; ::read(pipe_ends[0], &byte, 1) == 1;)
+        if (++acknowledged == frames)
+            kill(child, SIGKILL);
+    ::close(pipe_ends[0]);
+    int status = 0;
+    waitpid(child, &status, 0);
+    if (!WIFSIGNALED(status) || acknowledged < frames)
+        throw std::runtime_error("the sink failed before it was killed");
+    return first_sequence + acknowledged;
+}
+
+// A full disk, as far as a process can tell: no file grows past `bytes`.
+class FileSizeLimit {
+public:
+    explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+        getrlimit(RLIMIT_FSIZE, &before_);
+        const rlimit limit{bytes, before_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FileSizeLimit() {
+        setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+    FileSizeLimit(const FileSizeLimit &) = delete;
+    FileSizeLimit &operator=(const FileSizeLimit &) = delete;
+
+private:
+    void (*handler_)(int);
+    rlimit before_{};
+};
+
+// A folder that nobody may write to; root, whom nothing stops, becomes nobody for a while.
+class UnwritableFolder {
+public:
+    explicit UnwritableFolder(const std::filesystem::path &path) : path_(path) {
+        std::filesystem::create_directories(path);
+        chmod(path.c_str(), 0555);
+        chmod(path.parent_path().c_str(), 0755);
+        if (geteuid() == 0)
+            was_root_ = seteuid(65534) == 0;
+    }
+    ~UnwritableFolder() {
+        if (was_root_ && seteuid(0) != 0)
+            std::abort();
+        chmod(path_.c_str(), 0755);
+    }
+    UnwritableFolder(const UnwritableFolder &) = delete;
+    UnwritableFolder &operator=(const UnwritableFolder &) = delete;
+
+private:
+    std::filesystem::path path_;
+    bool was_root_ = false;
+};
+
+inline std::string read_text(const std::filesystem::path &file) {
+    std::ifstream in(file, std::ios::binary);
+    if (!in)
+        throw std::runtime_error("can't read " + file.string());
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// The names in a folder, hidden ones too, sorted.
+inline std::vector<std::string> names_in(const std::filesystem::path &folder) {
+    std::vector<std::string> names;
+    for (const auto &entry : std::filesystem::directory_iterator(folder))
+        names.push_back(entry.path().filename().string());
+    std::ranges::sort(names);
+    return names;
+}
+
+} // namespace arhost::test
