@@ -4,8 +4,8 @@
 #include "encoder.hpp"
 #include "last_frame.hpp"
 #include "sink_common/files.hpp"
-#include "sink_common/pattern.hpp"
 
+#include <arhost-cpp/numbered_name.hpp>
 #include <arhost-cpp/plugin.hpp>
 
 #include <algorithm>
@@ -33,11 +33,19 @@ std::unique_ptr<images::Encoder> make_encoder(const fs::path &path, const Option
                   "path: '" + path.string() + "' ends in neither .png nor .jpg: the ending chooses the format");
 }
 
+// nullopt if the file name has no percent sign: a single image.
+std::optional<NumberedName> numbered_name_of(const fs::path &path) try {
+    const std::string name = path.filename().string();
+    return name.find('%') == std::string::npos ? std::nullopt : std::optional<NumberedName>(name);
+} catch (const std::invalid_argument &error) {
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::string("path: ") + error.what());
+}
+
 class ImageSink {
 public:
     ImageSink(const Host &host, const Options &options)
         : host_(host), path_(options.text("path")), scratch_(files::hidden_beside(path_, ".partial")),
-          kept_path_(files::hidden_beside(path_, ".last")), pattern_(files::FramePattern::parse(path_)),
+          kept_path_(files::hidden_beside(path_, ".last")), pattern_(numbered_name_of(path_)),
           encoder_(make_encoder(path_, options)), frame_(options.integer("frame")),
           every_(static_cast<std::uint64_t>(options.integer("every"))) {
         if (pattern_ && frame_ >= 0)
@@ -77,7 +85,7 @@ public:
         may_be_older_ = false;
         if (pattern_) {
             if (sequence % every_ == 0)
-                replace(pattern_->file(sequence), image);
+                replace(path_.parent_path() / pattern_->name(sequence), image);
         } else if (frame_ < 0) {
             if (!kept_)
                 begin_keeping();
@@ -113,7 +121,7 @@ private:
         const fs::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
         const auto older =
             std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
-                          [&](const auto &e) { return pattern_->matches(e.path().filename().string()); });
+                          [&](const auto &e) { return pattern_->number(e.path().filename().string()).has_value(); });
         if (older > 0)
             host_.warn("'" + folder.string() + "' holds " + std::to_string(older) +
                        " images of an earlier run with such names: those that this run doesn't replace stay");
@@ -122,7 +130,7 @@ private:
     Host host_;
     fs::path path_;
     fs::path scratch_, kept_path_; // beside `path_`, for a while
-    std::optional<files::FramePattern> pattern_;
+    std::optional<NumberedName> pattern_;
     std::unique_ptr<images::Encoder> encoder_;
     std::int64_t frame_;  // of a plain path: which one, or -1, the last
     std::uint64_t every_; // of a pattern

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_sequence.hpp"
 
-#include "pattern.hpp"
+#include "folder.hpp"
+
+#include <arhost-cpp/numbered_name.hpp>
 
 #include <opencv2/imgcodecs.hpp>
 
 #include <cctype>
 #include <cstring>
+#include <map>
 
 namespace arhost {
 
@@ -41,6 +44,13 @@ cv::Mat read_image(const fs::path &file, int flags) {
                                                              " px: no side may be longer than " +
                                                              std::to_string(ARHOST_MAX_IMAGE_SIDE));
     return image;
+}
+
+NumberedName numbered_name_of(const fs::path &path) try {
+    return NumberedName(path.filename().string());
+} catch (const std::invalid_argument &error) {
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                  "path: " + quoted(path) + " does not exist, nor is it a numbered name: " + error.what());
 }
 
 } // namespace
@@ -91,16 +101,20 @@ void ImageSequence::copy_to(const arhost_frame_buffer &buffer) {
 }
 
 std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, const Host &host) {
-    const Pattern pattern = *Pattern::parse(path);
-    const auto found = pattern.scan();
-    if (start < 0 && !found.empty())
-        start = found.begin()->first;
-    auto next = found.find(start);
+    const fs::path folder = path.parent_path();
+    const NumberedName pattern = numbered_name_of(path);
+    std::map<std::uint64_t, fs::path> found;
+    std::error_code ignored; // describe_folder reports a folder that cannot be listed
+    for (const auto &entry : fs::directory_iterator(folder, ignored))
+        if (const auto number = pattern.number(entry.path().filename().string()))
+            found.emplace(*number, entry.path());
+    std::uint64_t number = start >= 0 ? static_cast<std::uint64_t>(start) : found.empty() ? 0 : found.begin()->first;
+    auto next = found.find(number);
     if (next == found.end()) {
         std::string message = "path: no file matches the pattern " + quoted(path) + ": looked for " +
-                              quoted(pattern.file(std::max<std::int64_t>(start, 0))) + " first; ";
+                              quoted(folder / pattern.name(number)) + " first; ";
         if (found.empty())
-            message += describe_folder(pattern.folder());
+            message += describe_folder(folder);
         else
             message.append("there are ")
                 .append(std::to_string(found.size()))
@@ -112,11 +126,10 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, message);
     }
     std::vector<fs::path> files;
-    std::int64_t number = start;
     for (; next != found.end() && next->first == number; ++next, ++number)
         files.push_back(next->second);
     if (next != found.end())
-        host.warn(quoted(pattern.file(number)) +
+        host.warn(quoted(folder / pattern.name(number)) +
                   " is missing: the sequence ends before it, though there are files up to number " +
                   std::to_string(found.rbegin()->first));
     return files;

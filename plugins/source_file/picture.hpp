@@ -23,7 +23,7 @@ private:
     int quarter_turns_;
     AVPixelFormat source_, target_;
     arhost_frame_format format_{};
-    SwsPointer scaler_;
+    libav::SwsPointer scaler_;
     std::vector<std::uint8_t> upright_; // a converted picture that has yet to be turned
 };
 

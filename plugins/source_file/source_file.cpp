@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_file: frames out of videos, numbered images and single images.
+#include "folder.hpp"
 #include "image_sequence.hpp"
-#include "pattern.hpp"
 #include "video.hpp"
 
 #include <algorithm>
@@ -80,7 +80,7 @@ private:
                     " is a folder: give a video, an image, or numbered images as 'folder/image_%04d.png'; " +
                     arhost::describe_folder(path_));
         // A file may have a percent sign in its name.
-        if (!fs::exists(status) && arhost::Pattern::parse(path_)) {
+        if (!fs::exists(status) && path_.string().find('%') != std::string::npos) {
             reader_ = std::make_unique<arhost::ImageSequence>(arhost::numbered_files(path_, start_, host_));
             return;
         }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "video.hpp"
 
-#include "pattern.hpp"
+#include "folder.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -14,21 +14,15 @@ namespace arhost {
 
 namespace {
 
-// Memory is the one failure that is not about the file.
+// Out of memory is the only failure that the file does not cause.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
     return code;
 }
 
-template <class T> T *allocated(T *pointer) {
-    if (!pointer)
-        throw std::bad_alloc();
-    return pointer;
-}
-
-// An AVI says how long its data are; its header's count is of time slots, of which some may be empty (Microsoft, AVI
-// RIFF File Reference). Whether `file` is one and shorter than that; none where it is no AVI.
+// Whether `file` is shorter than its AVI header says; nullopt if it is not an AVI. The header's frame count cannot be
+// used: it counts time slots, of which some may be empty (Microsoft, AVI RIFF File Reference).
 std::optional<bool> is_short_avi(const std::filesystem::path &file) {
     std::ifstream stream(file, std::ios::binary);
     unsigned char head[12] = {};
@@ -43,8 +37,9 @@ std::optional<bool> is_short_avi(const std::filesystem::path &file) {
 } // namespace
 
 Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
-    : name_("the video " + quoted(file)), host_(host), log_(log), packet_(allocated(av_packet_alloc())),
-      frame_(allocated(av_frame_alloc())) {
+    : name_("the video " + quoted(file)), host_(host), log_(log),
+      packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
+      frame_(libav::allocated<libav::FramePointer>(av_frame_alloc())) {
     const auto refuse = [&](const std::string &why) {
         if (host_.cancelled())
             return Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
@@ -53,19 +48,21 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     log_.take_reason();
     short_avi_ = is_short_avi(file);
 
-    AVFormatContext *context = allocated(avformat_alloc_context());
+    AVFormatContext *context = avformat_alloc_context();
+    if (!context)
+        throw std::bad_alloc();
     context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
                                    this};
-    AVDictionary *options = nullptr; // a playlist must not lead anywhere but to files
+    AVDictionary *options = nullptr; // a playlist must refer to files only
     av_dict_set(&options, "protocol_whitelist", "file", 0);
-    // "file:" keeps libav from taking the path for a URL. It frees the context where it fails.
+    // "file:" keeps libav from taking the path for a URL. It frees the context if it fails.
     const int opened = checked(avformat_open_input(&context, ("file:" + file.string()).c_str(), nullptr, &options));
     av_dict_free(&options);
     if (opened < 0)
-        throw refuse(libav_error(opened));
+        throw refuse(libav::error_text(opened));
     file_.reset(context);
     if (const int found = checked(avformat_find_stream_info(context, nullptr)); found < 0)
-        throw refuse(libav_error(found));
+        throw refuse(libav::error_text(found));
 
     const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
     if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
@@ -79,14 +76,14 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (!decoder)
         throw refuse(std::string("this machine's libavcodec has no decoder for '") +
                      avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
-    codec_.reset(allocated(avcodec_alloc_context3(decoder)));
+    codec_ = libav::allocated<libav::CodecPointer>(avcodec_alloc_context3(decoder));
     checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
     codec_->pkt_timebase = stream_->time_base;
-    // Threads share a picture, never a run of pictures: so damaged data gives the same pictures each time.
+    // Threads share a picture, never a run of pictures: so damaged data decodes to the same pictures each time.
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
-        throw refuse(std::string("the decoder '") + decoder->name + "' does not start: " + libav_error(ready));
+        throw refuse(std::string("the decoder '") + decoder->name + "' does not start: " + libav::error_text(ready));
 
     const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
     fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;

@@ -45,11 +45,11 @@ private:
     std::string name_;
     Host host_;
     LibavLog &log_;
-    FormatPointer file_;
+    libav::InputPointer file_;
     AVStream *stream_ = nullptr; // owned by file_
-    CodecPointer codec_;
-    PacketPointer packet_;
-    FramePointer frame_;
+    libav::CodecPointer codec_;
+    libav::PacketPointer packet_;
+    libav::FramePointer frame_;
     double fps_ = 0;
     std::int64_t period_ns_ = 0;
     std::uint64_t count_ = 0, packets_ = 0;
