@@ -21,10 +21,10 @@ std::string size_text(const cv::Mat &image) {
     return std::to_string(image.cols) + "×" + std::to_string(image.rows);
 }
 
-// 16 bits are scaled down, alpha is dropped, Exif's orientation is applied.
+// Converts 16-bit images to 8 bits, drops alpha, applies the Exif orientation.
 cv::Mat read_image(const fs::path &file, int flags) {
     cv::Mat image;
-    std::string reason = "it is damaged, or no image of a known format";
+    std::string reason = "damaged or unknown image format";
     try {
         image = cv::imread(file.string(), flags);
     } catch (const cv::Exception &error) {
@@ -36,12 +36,12 @@ cv::Mat read_image(const fs::path &file, int flags) {
         if (error)
             reason = error.message();
         else if (size == 0)
-            reason = "it is empty";
-        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " can't be read: " + reason);
+            reason = "the file is empty";
+        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " cannot be read: " + reason);
     }
     if (image.cols > ARHOST_MAX_IMAGE_SIDE || image.rows > ARHOST_MAX_IMAGE_SIDE)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +
-                                                             " px: no side may be longer than " +
+                                                             " px; the limit per side is " +
                                                              std::to_string(ARHOST_MAX_IMAGE_SIDE));
     return image;
 }
@@ -122,7 +122,7 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
                 .append(std::to_string(found.begin()->first))
                 .append(" to ")
                 .append(std::to_string(found.rbegin()->first))
-                .append(": set the option 'start'");
+                .append("; set the option 'start'");
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, message);
     }
     std::vector<fs::path> files;

@@ -43,7 +43,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     const auto refuse = [&](const std::string &why) {
         if (host_.cancelled())
             return Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
-        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be read: " + why + log_.take_reason());
     };
     log_.take_reason();
     short_avi_ = is_short_avi(file);
@@ -66,7 +66,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
 
     const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
     if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
-        throw refuse("it has no video stream");
+        throw refuse("there is no video stream");
     stream_ = context->streams[index];
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != stream_)
@@ -83,7 +83,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
-        throw refuse(std::string("the decoder '") + decoder->name + "' does not start: " + libav::error_text(ready));
+        throw refuse(std::string("the decoder '") + decoder->name + "' cannot start: " + libav::error_text(ready));
 
     const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
     fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;
@@ -93,7 +93,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (first == ARHOST_STATUS_ERROR_CANCELLED)
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
     if (first >= ARHOST_STATUS_END)
-        throw refuse("not one picture of it can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
+        throw refuse("no picture can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
 arhost_status Decoder::next() {
@@ -121,7 +121,7 @@ arhost_status Decoder::next() {
     return cut_short_.empty() ? ARHOST_STATUS_END : ARHOST_STATUS_END_TRUNCATED;
 }
 
-// Gives the decoder the next packet, or tells it that there is none.
+// Sends the next packet to the decoder, or signals the end.
 arhost_status Decoder::feed() {
     if (host_.cancelled())
         return ARHOST_STATUS_ERROR_CANCELLED;
@@ -133,13 +133,13 @@ arhost_status Decoder::feed() {
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
         read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
-        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" is in no error code
+        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" has no error code
         checked(avcodec_send_packet(codec_.get(), nullptr));
         return ARHOST_STATUS_OK;
     }
     if (packet_->stream_index != stream_->index)
         return ARHOST_STATUS_OK;
-    // Half a packet is left out: a picture that is half grey would pass for a real one.
+    // Drop a truncated packet: a half-grey picture would look like a valid one.
     if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
         return ARHOST_STATUS_OK;
@@ -168,7 +168,7 @@ void Decoder::finish() {
     const bool has_all = short_avi_ ? !*short_avi_ : packets_ >= declared;
     if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
-    cut_short_ = name_ + " is cut short: it ends after frame " + std::to_string(count_ - 1);
+    cut_short_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);
     if (declared > count_ && !short_avi_)
         cut_short_ += " of " + std::to_string(declared);
     cut_short_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
@@ -196,8 +196,8 @@ int Decoder::quarter_turns() const {
     const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
     if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      name_ + " asks to be shown " + (mirrored ? "mirrored" : "at an angle") +
-                          ", which is not supported: write it out upright with ffmpeg -i … -c:v libx264 …");
+                      name_ + " is marked as " + (mirrored ? "mirrored" : "rotated by an angle") +
+                          ", which is unsupported; convert it with ffmpeg -i … -c:v libx264 …");
     return (static_cast<int>(quarters) + 4) % 4;
 }
 
@@ -209,12 +209,12 @@ Video::Video(std::filesystem::path file, const Host &host) : file_(std::move(fil
     if (width_ > ARHOST_MAX_IMAGE_SIDE || height_ > ARHOST_MAX_IMAGE_SIDE)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the video " + quoted(file_) + " is " + std::to_string(width_) + "×" + std::to_string(height_) +
-                          " px: no side may be longer than " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
+                          " px; the limit per side is " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
     converter_.emplace(first, decoder_->quarter_turns());
     const AVRational aspect = first.sample_aspect_ratio;
     if (aspect.num > 0 && aspect.num != aspect.den)
         host_.info("the video's pixels are not square (" + std::to_string(aspect.num) + ":" +
-                   std::to_string(aspect.den) + "); its frames are given as stored, " + std::to_string(width_) + "×" +
+                   std::to_string(aspect.den) + "); frames are delivered as stored, " + std::to_string(width_) + "×" +
                    std::to_string(height_));
 }
 
@@ -233,8 +233,8 @@ std::uint64_t Video::frame_count() const {
 }
 
 arhost_status Video::go_to(std::uint64_t index) {
-    // Back means from the start again: every picture is then decoded from the same data in the same order
-    // as the first time, which seeking to a keyframe can't promise. At its end the decoder has no picture.
+    // Seeking back reopens the file: every picture is then decoded from the same data in the same order, which
+    // seeking to a keyframe does not guarantee. At the end the decoder has no picture.
     if (index < (decoder_->ended() ? decoder_->count() : decoder_->index()))
         open();
     const std::uint64_t from = decoder_->index();
@@ -261,11 +261,11 @@ void Video::check_size() const {
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) +
                                                              ": frame " + std::to_string(decoder_->index()) + " is " +
                                                              std::to_string(picture.width) + "×" +
-                                                             std::to_string(picture.height) + ", those before it " +
+                                                             std::to_string(picture.height) + ", earlier ones " +
                                                              std::to_string(width_) + "×" + std::to_string(height_));
 }
 
-// Once: a loop meets the same place again and again.
+// Reports once: a loop reaches the same position repeatedly.
 void Video::tell(const std::string &fault, bool &told) const {
     if (fault.empty() || told)
         return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-cpp/numbered_name.hpp: file names with a frame number, "frame_%05d.png". Sources that read numbered files and
-// sinks that write them share this parser, so that a source reads every name that a sink writes.
+// arhost-cpp/numbered_name.hpp: file names with a frame number, "frame_%05d.png". Sources that read numbered files
+// and sinks that write them share this parser, so that a source reads every name that a sink writes.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace arhost {
 class NumberedName {
 public:
     // `name`, without folders, has one conversion: %d, or %0Nd for at least N digits with leading zeros (N: 1 to 20).
-    // "%%" is a percent sign. Throws std::invalid_argument with a sentence that quotes `name` and says how to write it.
-    // The name is never passed to printf.
+    // "%%" is a percent sign. Throws std::invalid_argument with a sentence that quotes `name` and says how to write
+    // it. The name is never passed to printf.
     explicit NumberedName(std::string_view name) {
         bool has_number = false;
         for (std::size_t i = 0; i < name.size();) {
@@ -37,7 +37,8 @@ public:
             const std::string_view conversion = name.substr(i, end - i + 1);
             const std::string_view width = conversion.substr(1, conversion.size() - 1 - (conversion.size() > 1));
             if (!conversion.ends_with('d') || (!width.empty() && !parse_width(width)))
-                throw error(name, std::string("'").append(conversion).append("' is not %d or %0Nd with N from 1 to 20"));
+                throw error(name,
+                            std::string("'").append(conversion).append("' is not %d or %0Nd with N from 1 to 20"));
             if (has_number)
                 throw error(name, std::string("there is a second number, '").append(conversion) + "'");
             has_number = true;
