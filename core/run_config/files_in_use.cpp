@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/files_in_use.hpp"
 
+#include <arhost-cpp/numbered_name.hpp>
+
 #include <algorithm>
-#include <charconv>
 #include <string_view>
 
 namespace arhost::run_config {
@@ -15,66 +16,33 @@ bool are_digits(std::string_view text) {
     return text.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-// A name with one number in it: frame-%04d.png.
-struct Pattern {
-    std::string before, after;
-    std::size_t digits = 0; // at least; 0: no number has been met
-
-    bool names(std::string_view file) const {
-        if (file.size() < before.size() + digits + after.size() || !file.starts_with(before) ||
-            !file.ends_with(after))
-            return false;
-        const std::string_view number = file.substr(before.size(), file.size() - before.size() - after.size());
-        return are_digits(number) && (number.size() == digits || number[0] != '0');
-    }
-};
-
-// None where it is none that a plugin takes: with no number, with two, or with a '%' that is neither that nor %%.
-std::optional<Pattern> pattern_of(const std::string &name) {
-    constexpr std::size_t longest_width = 4;
-    Pattern pattern;
-    for (std::size_t i = 0; i < name.size(); ++i) {
-        std::string &part = pattern.digits ? pattern.after : pattern.before;
-        if (name[i] != '%') {
-            part += name[i];
-            continue;
-        }
-        const std::size_t width = i + 1;
-        i = name.find_first_not_of("0123456789", width);
-        if (i == width && name[i] == '%') {
-            part += '%';
-            continue;
-        }
-        if (i == std::string::npos || name[i] != 'd' || pattern.digits || i - width > longest_width ||
-            (i > width && name[width] != '0'))
-            return std::nullopt;
-        std::from_chars(name.data() + width, name.data() + i, pattern.digits);
-        pattern.digits = std::max<std::size_t>(pattern.digits, 1);
-    }
-    return pattern.digits ? std::optional(pattern) : std::nullopt;
+// nullopt if no sink accepts `name` as a numbered name.
+std::optional<NumberedName> numbered_name(const std::string &name) try {
+    return NumberedName(name);
+} catch (const std::invalid_argument &) {
+    return std::nullopt;
 }
 
-// Whether two names can stand for one file. Patterns that differ by zeros alone (f0%d, f%d) can, as taken here.
+// Whether two names can refer to one file. Two numbered names can if they differ by digits alone (f0%d, f%d).
 bool can_meet(const std::string &a, const std::string &b) {
-    const auto p = pattern_of(a), q = pattern_of(b);
+    const auto p = numbered_name(a), q = numbered_name(b);
     if (!p || !q)
-        return p ? p->names(b) : q ? q->names(a) : a == b;
-    const auto [begin, longer_begin] =
-        std::minmax(p->before, q->before, [](auto &x, auto &y) { return x.size() < y.size(); });
-    const auto [end, longer_end] =
-        std::minmax(p->after, q->after, [](auto &x, auto &y) { return x.size() < y.size(); });
-    return longer_begin.starts_with(begin) && are_digits(std::string_view(longer_begin).substr(begin.size())) &&
-           longer_end.ends_with(end) &&
-           are_digits(std::string_view(longer_end).substr(0, longer_end.size() - end.size()));
+        return p ? p->number(b).has_value() : q ? q->number(a).has_value() : a == b;
+    const auto by_size = [](auto &x, auto &y) { return x.size() < y.size(); };
+    const auto [prefix, longer_prefix] = std::minmax(p->prefix(), q->prefix(), by_size);
+    const auto [suffix, longer_suffix] = std::minmax(p->suffix(), q->suffix(), by_size);
+    return longer_prefix.starts_with(prefix) && are_digits(std::string_view(longer_prefix).substr(prefix.size())) &&
+           longer_suffix.ends_with(suffix) &&
+           are_digits(std::string_view(longer_suffix).substr(0, longer_suffix.size() - suffix.size()));
 }
 
 std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
-    if (const auto pattern = pattern_of(file_or_pattern.filename())) {
+    if (const auto pattern = numbered_name(file_or_pattern.filename())) {
         std::error_code ignored; // a folder that can't be listed: who is to use it says so
         for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
              entry.increment(ignored))
-            if (pattern->names(entry->path().filename().string()))
+            if (pattern->number(entry->path().filename().string()))
                 files.push_back(base::identity_of(entry->path()));
     }
     return files;
@@ -83,8 +51,8 @@ std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
 // Name or pattern, behind links.
 fs::path written_by(const yaml::Node &output) {
     const fs::path path = output.output_path();
-    return pattern_of(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
-                                       : base::real_path(path);
+    return numbered_name(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
+                                          : base::real_path(path);
 }
 
 [[noreturn]] void refuse(const yaml::Node &output, const std::string &file_read) {

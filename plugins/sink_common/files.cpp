@@ -11,7 +11,7 @@
 namespace arhost::files {
 namespace {
 
-const char *mend(int error_number) {
+const char *advice_for(int error_number) {
     switch (error_number) {
     case ENOSPC:
     case EDQUOT:
@@ -21,10 +21,10 @@ const char *mend(int error_number) {
     case EACCES:
     case EPERM:
     case EROFS:
-        return "choose a path that you may write to";
+        return "choose a writable path";
     case ENOTDIR:
     case EEXIST:
-        return "a part of the path that should be a folder is a file";
+        return "a folder in the path is a file";
     case EISDIR:
         return "the path is a folder: add a file's name";
     default:
@@ -32,13 +32,13 @@ const char *mend(int error_number) {
     }
 }
 
-// Pipes and devices can neither be cut back after a restart nor replaced.
+// Pipes and devices can neither be truncated after a restart nor replaced.
 void require_regular_file(int fd, const std::filesystem::path &path) {
     struct stat status {};
     if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
         ::close(fd);
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "'" + path.string() + "' is no regular file: choose another path");
+                      "'" + path.string() + "' is not a regular file; choose another path");
     }
 }
 
@@ -46,7 +46,7 @@ void require_regular_file(int fd, const std::filesystem::path &path) {
 
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number) {
     return Failure(ARHOST_STATUS_ERROR_IO, what + " '" + file.string() + "': " + std::strerror(error_number) + " (" +
-                                               mend(error_number) + ")");
+                                               advice_for(error_number) + ")");
 }
 
 void make_parent_folders(const std::filesystem::path &file) {
@@ -54,7 +54,7 @@ void make_parent_folders(const std::filesystem::path &file) {
     if (file.has_parent_path())
         std::filesystem::create_directories(file.parent_path(), error);
     if (error)
-        throw io_failure("can't make the folder", file.parent_path(), error.value());
+        throw io_failure("cannot create the folder", file.parent_path(), error.value());
 }
 
 void check_can_write(const std::filesystem::path &file) {
@@ -64,32 +64,33 @@ void check_can_write(const std::filesystem::path &file) {
         return;
     }
     if (errno != ENOENT)
-        throw io_failure("can't open", file, errno);
+        throw io_failure("cannot open", file, errno);
     std::error_code error;
-    if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))) { // to nothing yet: try there
+    if (std::filesystem::is_symlink(
+            std::filesystem::symlink_status(file, error))) { // a dangling link: check its target
         std::filesystem::path target = std::filesystem::read_symlink(file, error);
         return check_can_write(target.is_absolute() ? target : file.parent_path() / target);
     }
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (fd < 0)
-        throw io_failure("can't open", file, errno);
+        throw io_failure("cannot open", file, errno);
     ::close(fd);
-    remove_file(file); // made a moment ago, by this process
+    remove_file(file); // created above
 }
 
 void remove_file(const std::filesystem::path &file) {
     if (::unlink(file.c_str()) != 0 && errno != ENOENT)
-        throw io_failure("can't delete", file, errno);
+        throw io_failure("cannot delete", file, errno);
 }
 
-std::filesystem::path hidden_beside(const std::filesystem::path &file, std::string_view suffix) {
+std::filesystem::path hidden_sibling(const std::filesystem::path &file, std::string_view suffix) {
     return file.parent_path() / std::string(".").append(file.filename().string()).append(suffix);
 }
 
 File::File(std::filesystem::path path, int open_flags)
     : path_(std::move(path)), fd_(::open(path_.c_str(), open_flags | O_CLOEXEC | O_NONBLOCK, 0666)) {
     if (fd_ < 0)
-        throw io_failure("can't open", path_, errno);
+        throw io_failure("cannot open", path_, errno);
     require_regular_file(fd_, path_);
 }
 
@@ -103,7 +104,7 @@ File::File(File &&other) noexcept : path_(std::move(other.path_)), fd_(std::exch
 std::uint64_t File::size() const {
     struct stat status {};
     if (::fstat(fd_, &status) != 0)
-        throw io_failure("can't read", path_, errno);
+        throw io_failure("cannot read", path_, errno);
     return static_cast<std::uint64_t>(status.st_size);
 }
 
@@ -113,7 +114,7 @@ void File::append(std::span<const std::uint8_t> bytes) {
         if (written >= 0)
             bytes = bytes.subspan(static_cast<std::size_t>(written));
         else if (errno != EINTR)
-            throw io_failure("can't write", path_, errno);
+            throw io_failure("cannot write", path_, errno);
     }
 }
 
@@ -124,7 +125,7 @@ void File::write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes) {
             bytes = bytes.subspan(static_cast<std::size_t>(written));
             offset += static_cast<std::uint64_t>(written);
         } else if (errno != EINTR) {
-            throw io_failure("can't write", path_, errno);
+            throw io_failure("cannot write", path_, errno);
         }
     }
 }
@@ -136,16 +137,16 @@ void File::read_at(std::uint64_t offset, std::span<std::uint8_t> bytes) const {
             bytes = bytes.subspan(static_cast<std::size_t>(got));
             offset += static_cast<std::uint64_t>(got);
         } else if (got == 0) {
-            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path_.string() + "' is shorter than it should be");
+            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path_.string() + "' is shorter than expected");
         } else if (errno != EINTR) {
-            throw io_failure("can't read", path_, errno);
+            throw io_failure("cannot read", path_, errno);
         }
     }
 }
 
 void File::truncate(std::uint64_t size) {
     if (::ftruncate(fd_, static_cast<off_t>(size)) != 0)
-        throw io_failure("can't shorten", path_, errno);
+        throw io_failure("cannot truncate", path_, errno);
 }
 
 void replace_file(const std::filesystem::path &target, const std::filesystem::path &scratch,
@@ -153,9 +154,9 @@ void replace_file(const std::filesystem::path &target, const std::filesystem::pa
     try {
         File(scratch, O_WRONLY | O_CREAT | O_TRUNC).append(bytes);
         if (::rename(scratch.c_str(), target.c_str()) != 0)
-            throw io_failure("can't write", target, errno);
+            throw io_failure("cannot write", target, errno);
     } catch (const Failure &) {
-        ::unlink(scratch.c_str()); // leave no half of a file; the failure above is the one to tell
+        ::unlink(scratch.c_str()); // leave no partial file
         throw;
     }
 }

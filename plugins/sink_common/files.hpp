@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Files as the sinks write them. Every failure is an arhost::Failure of ARHOST_STATUS_ERROR_IO whose message
-// names the file, the system's reason and what to try.
+// File operations of the sinks. They throw arhost::Failure (ARHOST_STATUS_ERROR_IO) with a message that names the
+// file, the system's reason and what to change.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -15,22 +15,21 @@
 
 namespace arhost::files {
 
-// "can't write 'out/film.mp4': No space left on device (free some space, or choose another path)".
+// "cannot write 'out/film.mp4': No space left on device (free some space, or choose another path)".
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number);
 
-// Makes the folders that `file` is to lie in.
+// Creates the parent folders of `file`.
 void make_parent_folders(const std::filesystem::path &file);
 
-// Fails now, rather than at the first frame, where `file` can't be written. Leaves it as it is.
+// Throws if `file` cannot be opened for writing, so that a run fails at its start. Does not change the file.
 void check_can_write(const std::filesystem::path &file);
 
-// Deletes a file if it is there.
+// Deletes a file if it exists.
 void remove_file(const std::filesystem::path &file);
 
-// `out/film.mp4` → `out/.film.mp4<suffix>`: a hidden name beside the file, for what is not yet it.
-std::filesystem::path hidden_beside(const std::filesystem::path &file, std::string_view suffix);
+// `out/film.mp4` → `out/.film.mp4<suffix>`: a hidden temporary file in the same folder.
+std::filesystem::path hidden_sibling(const std::filesystem::path &file, std::string_view suffix);
 
-// An open file.
 class File {
 public:
     File(std::filesystem::path path, int open_flags);
@@ -40,9 +39,9 @@ public:
 
     const std::filesystem::path &path() const { return path_; }
     std::uint64_t size() const;
-    void append(std::span<const std::uint8_t> bytes); // in one write(2) where the system takes it so
+    void append(std::span<const std::uint8_t> bytes); // in one write(2) unless the system writes less
     void write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes);
-    void read_at(std::uint64_t offset, std::span<std::uint8_t> bytes) const; // all of them, or it throws
+    void read_at(std::uint64_t offset, std::span<std::uint8_t> bytes) const; // all bytes, or throws
     void truncate(std::uint64_t size);
 
 private:
@@ -50,8 +49,7 @@ private:
     int fd_;
 };
 
-// Puts `bytes` in place of `target` through the file `scratch` in the same folder: under its own name
-// the file is the old one or the whole new one, never a part.
+// Replaces `target` by `bytes` atomically: writes `scratch`, in the same folder, and renames it.
 void replace_file(const std::filesystem::path &target, const std::filesystem::path &scratch,
                   std::span<const std::uint8_t> bytes);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Lines of JSON, one a frame.
+// JSON lines, one per frame.
 #pragma once
 
 #include <charconv>
@@ -16,11 +16,11 @@ namespace arhost::json_text {
 
 // The shortest digits that read back as the same number.
 template <class Number> void append_number(std::string &text, Number number) {
-    char digits[32]; // a double takes at most 24
+    char digits[32]; // a double needs at most 24
     text.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
 }
 
-// JSON has no number that is not finite.
+// JSON cannot express infinities and NaN: null.
 inline void append(std::string &text, double number) {
     if (std::isfinite(number))
         append_number(text, number);
@@ -37,10 +37,10 @@ inline void append(std::string &text, std::span<const double> numbers) {
     text += ']';
 }
 
-// How a frame's line begins: its number follows, then a comma.
+// The beginning of a line; the frame number and a comma follow.
 inline constexpr std::string_view frame_start = "{\"frame\": ";
 
-// The number in a line that begins so, whole or not past it; nothing in any other.
+// The frame number of a complete or truncated line; nullopt if the number itself is incomplete or missing.
 inline std::optional<std::uint64_t> frame_of_line(std::string_view line) {
     if (!line.starts_with(frame_start))
         return std::nullopt;

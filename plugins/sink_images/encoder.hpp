@@ -8,15 +8,15 @@
 
 namespace arhost::images {
 
-// BGR8, first row at the top.
+// BGR8, top row first.
 struct Image {
     std::uint32_t width, height;
-    std::size_t stride; // bytes a row
+    std::size_t stride; // bytes per row
     const std::uint8_t *bgr;
     const std::uint8_t *row(std::uint32_t y) const { return bgr + y * stride; }
 };
 
-// Makes the bytes of an image file. The same image gives the same bytes.
+// Encodes an image file. The same image always gives the same bytes.
 class Encoder {
 public:
     virtual ~Encoder() = default;

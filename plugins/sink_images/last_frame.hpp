@@ -12,13 +12,12 @@
 
 namespace arhost::images {
 
-// The newest frame, kept in a file until it is known to be the last. Nobody can tell beforehand which
-// frame will be, and encoding each would be dear, so the pixels go there as they are: into the older of
-// two slots, which is marked as empty before and as filled after. Whenever the process dies, what is
-// marked as filled is whole.
+// Keeps the newest frame in a file until the run ends: which frame is the last is not known in advance, and encoding
+// every frame is expensive. The raw pixels go to the older of two slots, which is marked empty before and filled
+// after, so that a slot marked filled is complete even if the process is killed.
 class LastFrame {
 public:
-    // `first_sequence`: frames from there on that are kept already are forgotten; 0: all of them are.
+    // Discards kept frames with numbers from `first_sequence` on.
     LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height,
               std::uint64_t first_sequence);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes frames and drops them: for measuring everything else, and for trying out a slow sink.
+// Discards frames: to measure everything else, or the effect of a slow sink.
 #include <arhost-cpp/plugin.hpp>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "delay_ms", "0", "How long each frame takes, in milliseconds.", 0, 600000),
+    arhost::option(ARHOST_OPTION_INTEGER, "delay_ms", "0", "Time per frame in milliseconds.", 0, 600000),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -46,7 +46,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Takes frames and drops them, at once or after a delay.",
+    "Discards frames, immediately or after a delay.",
     0,
     std::size(options),
     options,

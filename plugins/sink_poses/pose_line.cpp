@@ -13,7 +13,7 @@ namespace {
 using json_text::append;
 using json_text::append_number;
 
-// Families are names in ASCII; anything else comes from a broken tracker and must not break the line.
+// Family names are ASCII; other bytes come from a defective tracker and must not corrupt the line.
 void append_text(std::string &text, std::string_view value) {
     text += '"';
     for (const char c : value) {

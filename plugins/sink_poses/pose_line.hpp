@@ -7,8 +7,7 @@
 
 namespace arhost::poses {
 
-// Appends all that is known of a frame as one line of JSON, its line end included. README.md lists the
-// keys. Numbers are the shortest that read back as the same double; what is not finite is null.
+// Appends the record of a frame as one JSON line with its line end. README.md lists the keys.
 void append_line(std::string &text, const arhost_record &record);
 
 } // namespace arhost::poses

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A log of the poses: a line of JSON a frame.
+// The pose log: one JSON line per frame.
 #include "pose_line.hpp"
 #include "sink_common/json_text.hpp"
 #include "sink_common/line_file.hpp"
@@ -35,7 +35,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The log to write, a line of JSON a frame."),
+    arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The log to write, one JSON line per frame."),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -46,7 +46,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Writes what is known of each frame (markers, poses, camera) as a line of JSON.",
+    "Writes markers, poses and camera of each frame as a JSON line.",
     0,
     std::size(options),
     options,

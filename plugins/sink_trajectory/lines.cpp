@@ -24,7 +24,7 @@ const char *name_of(arhost_distortion distortion) {
     }
 }
 
-// A camera that can be traced; a number that is not finite comes from a broken host.
+// False if a number is not finite, which a defective host could send.
 bool has_camera(const arhost_record &record) {
     const auto finite = [](const double(&values)[3]) {
         return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });

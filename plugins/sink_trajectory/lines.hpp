@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The lines of both formats (docs/trajectories.md), line ends included.
+// The lines of both formats (docs/trajectories.md), with line ends.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -9,12 +9,12 @@
 
 namespace arhost::trajectory {
 
-// arhost's: a header, then an object a frame. Numbers are the shortest that read back as the same double.
+// Format `arhost`: a header, then one object per frame. Numbers read back as the same double.
 void append_header(std::string &text, const arhost_intrinsics &intrinsics, arhost_clock clock, double fps);
 void append_frame(std::string &text, const arhost_record &record);
 
-// The dissertation's: nine numbers of six digits, each with a space behind it. A frame without a camera is
-// an empty line, which its programs skip.
+// Format `dissertation`: nine numbers with six significant digits, each followed by a space. A frame without a camera
+// is an empty line, which the dissertation's programs skip.
 void append_dissertation_frame(std::string &text, const arhost_record &record);
 
 } // namespace arhost::trajectory

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Records every frame's camera, to be traced again by `arhost replay`.
+// Records the camera of every frame for `arhost replay`.
 #include "lines.hpp"
 #include "sink_common/json_text.hpp"
 #include "sink_common/line_file.hpp"
@@ -21,7 +21,7 @@ public:
     void start(const arhost_sink_setup &setup) {
         if (!setup.intrinsics)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "there is no camera to record: add a tracker, or 'camera:' (docs/camera.md)");
+                          "there is no camera to record; add a tracker or 'camera:' (docs/camera.md)");
         intrinsics_ = *setup.intrinsics;
         fps_ = setup.fps;
         file_.start(setup.first_sequence, [&](std::string_view line) {
@@ -39,7 +39,7 @@ public:
         const arhost_record &record = *output.record;
         text_.clear();
         if (dissertation_) {
-            // Its lines bear no numbers, so that frames which the live mode dropped need one, too.
+            // Lines have no frame number, so each frame that live mode dropped needs a line too.
             if (record.sequence > next_line_)
                 text_.assign(record.sequence - next_line_, '\n');
             arhost::trajectory::append_dissertation_frame(text_, record);
@@ -58,15 +58,15 @@ private:
     bool dissertation_;
     arhost_intrinsics intrinsics_{};
     double fps_ = 0;
-    std::uint64_t next_line_ = 0; // dissertation: the frame that the next line stands for
+    std::uint64_t next_line_ = 0; // dissertation: the frame of the next line
     std::string text_;
 };
 
 constexpr const char *formats[] = {"arhost", "dissertation", nullptr};
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The trajectory to write, a line a frame."),
+    arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The trajectory to write, one line per frame."),
     arhost::option(ARHOST_OPTION_TEXT, "format", "arhost",
-                   "arhost: JSON lines with time stamps and intrinsics; dissertation: nine numbers a line.", 0, 0,
+                   "arhost: JSON lines with time stamps and intrinsics; dissertation: nine numbers per line.", 0, 0,
                    formats),
 };
 
@@ -78,7 +78,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Records the camera of each frame, to be traced again by 'arhost replay'.",
+    "Records the camera of each frame for 'arhost replay'.",
     0,
     std::size(options),
     options,

@@ -36,16 +36,16 @@ SwsPointer make_converter(int width, int height) {
     av_opt_set_int(sws.get(), "dsth", height, 0);
     av_opt_set_int(sws.get(), "src_format", AV_PIX_FMT_BGR24, 0);
     av_opt_set_int(sws.get(), "dst_format", AV_PIX_FMT_YUV420P, 0);
-    // Without accurate rounding luma comes out half a step too dark, and without full chroma input every
-    // second pixel's colour is left out.
+    // Without accurate rounding luma is half a step too dark; without full chroma input every second pixel's colour
+    // is ignored.
     av_opt_set_int(sws.get(), "sws_flags", SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_BITEXACT, 0);
-    av_opt_set_int(sws.get(), "dst_h_chr_pos", 0, 0); // as AVCHROMA_LOC_LEFT says
+    av_opt_set_int(sws.get(), "dst_h_chr_pos", 0, 0); // AVCHROMA_LOC_LEFT
     av_opt_set_int(sws.get(), "dst_v_chr_pos", 128, 0);
     const int *bt709 = sws_getCoefficients(SWS_CS_ITU709);
     constexpr int full = 1, limited = 0, brightness = 0, contrast = 1 << 16, saturation = 1 << 16;
     sws_setColorspaceDetails(sws.get(), bt709, full, bt709, limited, brightness, contrast, saturation);
     if (const int code = sws_init_context(sws.get(), nullptr, nullptr); code < 0)
-        throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "can't convert the frames to YUV", code);
+        throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "cannot convert the frames to YUV", code);
     return sws;
 }
 
@@ -69,21 +69,21 @@ Encoder::Encoder(const EncoderSettings &settings)
     context_->chroma_sample_location = AVCHROMA_LOC_LEFT;
     context_->max_b_frames = 0;
     context_->thread_count = settings.threads;
-    context_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER; // as MP4 wants it
+    context_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER; // required by MP4
     if (settings.codec == "h264") {
         av_opt_set(context_->priv_data, "preset", settings.preset.c_str(), 0);
         av_opt_set(context_->priv_data, "tune", "zerolatency", 0);
         av_opt_set_double(context_->priv_data, "crf", settings.crf, 0);
     } else {
-        // The quantiser, 1 to 31, whose step (twice the quantiser) is that of H.264 (0.625·2^(crf/6)).
+        // The MPEG-4 quantiser, 1 to 31, with the step size of H.264 at this crf: 2·quantiser = 0.625·2^(crf/6).
         const long quantiser = std::lround(0.3125 * std::exp2(settings.crf / 6.0));
         context_->flags |= AV_CODEC_FLAG_QSCALE | AV_CODEC_FLAG_BITEXACT;
         context_->global_quality = FF_QP2LAMBDA * static_cast<int>(std::clamp(quantiser, 1l, 31l));
-        context_->gop_size = 250; // as x264's
+        context_->gop_size = 250; // x264's default
     }
     if (const int code = avcodec_open2(context_.get(), codec, nullptr); code < 0)
         throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                            "can't encode frames of " + std::to_string(width_) + "×" + std::to_string(height_) +
+                            "cannot encode frames of " + std::to_string(width_) + "×" + std::to_string(height_) +
                                 " with " + codec->name,
                             code);
     bgr_ = make_frame(AV_PIX_FMT_BGR24, even_width, even_height);
@@ -93,7 +93,7 @@ Encoder::Encoder(const EncoderSettings &settings)
 
 AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number) {
     copy_padded(bgr, stride);
-    if (av_frame_make_writable(yuv_.get()) < 0) // the encoder may still hold the last one
+    if (av_frame_make_writable(yuv_.get()) < 0) // the encoder may still reference the previous frame
         throw std::bad_alloc();
     sws_scale(converter_.get(), bgr_->data, bgr_->linesize, 0, bgr_->height, yuv_->data, yuv_->linesize);
     yuv_->pts = number;
@@ -102,13 +102,13 @@ AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int6
     if (code >= 0)
         code = avcodec_receive_packet(context_.get(), packet_.get());
     if (code < 0)
-        throw libav_failure(ARHOST_STATUS_ERROR_INTERNAL, "can't encode frame " + std::to_string(number), code);
+        throw libav_failure(ARHOST_STATUS_ERROR_INTERNAL, "cannot encode frame " + std::to_string(number), code);
     packet_->duration = 1;
     return *packet_;
 }
 
-// Into a frame of even size, the last column and row twice where theirs are odd. Also because swscale
-// reads a little past the pixels, which is forbidden in the host's memory.
+// Copies into a frame of even size; an odd last column or row is repeated. The copy is needed in any case: swscale
+// reads past the pixels, which the host's memory does not allow.
 void Encoder::copy_padded(const std::uint8_t *bgr, std::size_t stride) {
     const std::size_t row_size = 3 * static_cast<std::size_t>(width_);
     for (int y = 0; y < bgr_->height; ++y) {

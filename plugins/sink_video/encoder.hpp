@@ -10,7 +10,7 @@
 namespace arhost::video {
 
 struct EncoderSettings {
-    int width, height; // px, of the frames; the film's are made even
+    int width, height; // px, of the input; the film is padded to even sizes
     AVRational fps;
     std::string codec; // "h264" or "mpeg4"
     int crf;
@@ -18,8 +18,8 @@ struct EncoderSettings {
     int threads;
 };
 
-// BGR8 frames to packets: YUV 4:2:0 of BT.709, limited range. It looks at no later frame, so that each
-// frame has become a packet when the call returns, and can be on its way to the disk.
+// Encodes BGR8 frames as YUV 4:2:0, BT.709, limited range. There is no look-ahead: each call returns the packet of
+// its frame, which can be written at once.
 class Encoder {
 public:
     explicit Encoder(const EncoderSettings &settings); // throws Failure of ARHOST_STATUS_ERROR_UNSUPPORTED

@@ -16,10 +16,10 @@ constexpr std::string_view name_middle = ".from", name_end = ".mkv";
 
 void check_written(int code, const fs::path &path) {
     if (code < 0)
-        throw files::io_failure("can't write", path, AVUNERROR(code));
+        throw files::io_failure("cannot write", path, AVUNERROR(code));
 }
 
-// As libav is told it: no part of the path may be taken for a protocol.
+// The prefix keeps libav from parsing the path as a URL.
 std::string url(const fs::path &path) {
     return "file:" + path.string();
 }
@@ -28,7 +28,7 @@ OutputPointer open_output(const fs::path &path, const char *format) {
     AVFormatContext *context = nullptr;
     if (avformat_alloc_output_context2(&context, nullptr, format, url(path).c_str()) < 0)
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                      std::string("this machine's libavformat can't write ") + format);
+                      std::string("this machine's libavformat cannot write ") + format);
     OutputPointer output(context);
     output->flags |= AVFMT_FLAG_BITEXACT; // no dates and versions
     check_written(avio_open(&output->pb, url(path).c_str(), AVIO_FLAG_WRITE), path);
@@ -50,14 +50,14 @@ bool same_codec(const AVCodecParameters &a, const AVCodecParameters &b) {
                               std::span(b.extradata, static_cast<std::size_t>(b.extradata_size)));
 }
 
-// The film that is being joined. Its file and header are made with the first frame.
+// The joined film. Its file and header are created with the first frame.
 class Film {
 public:
     Film(const fs::path &path, const char *format, AVRational fps) : path_(path), format_(format), fps_(fps) {}
 
     std::int64_t frames() const { return frames_; }
 
-    // Takes the segment's frames below `end`.
+    // Appends the frames of the segment with numbers below `end`.
     void append(AVFormatContext &segment, const fs::path &segment_path, std::int64_t end,
                 const std::function<void(double)> &progress) {
         check_fits(*segment.streams[0]->codecpar, segment_path);
@@ -66,7 +66,7 @@ public:
         for (; av_read_frame(&segment, packet.get()) >= 0; av_packet_unref(packet.get())) {
             const std::int64_t number = av_rescale_q(packet->pts, in.time_base, av_inv_q(fps_));
             if (packet->flags & AV_PKT_FLAG_CORRUPT || number >= end)
-                return; // cut off by a kill, or sent again to the next segment
+                return; // truncated by a kill, or repeated in the next segment
             if (frames_ == 0)
                 begin(*in.codecpar, number);
             packet->pts = packet->dts = av_rescale_q(number - first_, av_inv_q(fps_), out_->time_base);
@@ -78,8 +78,8 @@ public:
             if (++frames_ % 256 == 0)
                 progress(static_cast<double>(avio_tell(segment.pb)) / static_cast<double>(avio_size(segment.pb)));
         }
-        if (segment.pb->error < 0) // the disk's; where the segment was cut off is no error of its
-            throw files::io_failure("can't read", segment_path, AVUNERROR(segment.pb->error));
+        if (segment.pb->error < 0) // an I/O error; a truncated segment does not set it
+            throw files::io_failure("cannot read", segment_path, AVUNERROR(segment.pb->error));
     }
 
     void finish() {
@@ -92,7 +92,8 @@ private:
     void check_fits(const AVCodecParameters &segment, const fs::path &segment_path) const {
         if (out_ && !same_codec(*out_->codecpar, segment))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "'" + segment_path.string() + "' was encoded with other options than what came before it");
+                          "'" + segment_path.string() +
+                              "' was encoded with different options than the previous segment");
     }
 
     void begin(const AVCodecParameters &codec, std::int64_t first) {
@@ -101,9 +102,9 @@ private:
         out_ = &add_stream(*output_, fps_);
         if (avcodec_parameters_copy(out_->codecpar, &codec) < 0)
             throw std::bad_alloc();
-        out_->codecpar->codec_tag = 0; // the container's own
+        out_->codecpar->codec_tag = 0; // chosen by the container
         out_->sample_aspect_ratio = codec.sample_aspect_ratio;
-        // MP4's index in front, so that a film can be watched while it loads; Matroska knows no such option.
+        // MP4: index first, so that playback can start during a download. Matroska ignores it.
         av_opt_set(output_->priv_data, "movflags", "faststart", 0);
         check_written(avformat_write_header(output_.get(), nullptr), path_);
     }
@@ -119,12 +120,12 @@ private:
 } // namespace
 
 Segment segment_of(const fs::path &film, std::int64_t first) {
-    return {files::hidden_beside(film, std::string(name_middle) + std::to_string(first) + std::string(name_end)),
+    return {files::hidden_sibling(film, std::string(name_middle) + std::to_string(first) + std::string(name_end)),
             first};
 }
 
 std::vector<Segment> find_segments(const fs::path &film) {
-    const std::string start = files::hidden_beside(film, name_middle).filename().string();
+    const std::string start = files::hidden_sibling(film, name_middle).filename().string();
     std::vector<Segment> found;
     for (const fs::directory_entry &entry :
          fs::directory_iterator(film.has_parent_path() ? film.parent_path() : fs::path("."))) {
@@ -171,14 +172,14 @@ std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, co
         if (const int code =
                 avformat_open_input(&context, url(path).c_str(), av_find_input_format("matroska"), nullptr);
             code < 0) {
-            if (code != AVERROR_EOF) // a header and no frame: a restart that was followed by none
-                warn(libav_failure(ARHOST_STATUS_ERROR_IO, "no frame can be read from '" + path.string() + "'", code)
+            if (code != AVERROR_EOF) // AVERROR_EOF: a header without a frame, after a restart without further frames
+                warn(libav_failure(ARHOST_STATUS_ERROR_IO, "cannot read a frame from '" + path.string() + "'", code)
                          .what());
             continue;
         }
         const InputPointer segment(context);
         if (segment->nb_streams != 1)
-            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path.string() + "' is no segment of a film: delete it");
+            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path.string() + "' is not a segment of a film; delete it");
         joined.append(*segment, path,
                       i + 1 < segments.size() ? segments[i + 1].first : std::numeric_limits<std::int64_t>::max(),
                       progress);

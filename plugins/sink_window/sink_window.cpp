@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Frames in a window. The fixed pipeline of OpenGL 2.1 does all that one textured rectangle needs, on
-// every driver.
+// Shows frames in a window. OpenGL 2.1 with its fixed pipeline suffices for one textured rectangle and runs on every
+// driver.
 #include <arhost-cpp/plugin.hpp>
 
 #define GLFW_INCLUDE_GLEXT
@@ -33,7 +33,7 @@ class Glfw {
 public:
     Glfw() {
         if (!glfwInit())
-            throw glfw_failure("can't open a window");
+            throw glfw_failure("cannot open a window");
     }
     ~Glfw() { glfwTerminate(); }
     Glfw(const Glfw &) = delete;
@@ -48,7 +48,7 @@ struct Rectangle {
     int x, y, width, height;
 };
 
-// The largest rectangle of the image's aspect within `width`×`height`, in its middle.
+// The largest centred rectangle with the aspect ratio of the image within `width`×`height`.
 Rectangle fit(int image_width, int image_height, int width, int height) {
     const double scale =
         std::min(static_cast<double>(width) / image_width, static_cast<double>(height) / image_height);
@@ -113,7 +113,7 @@ private:
         }
         window_.reset(glfwCreateWindow(std::max(1, width), std::max(1, height), title_.c_str(), nullptr, nullptr));
         if (!window_)
-            throw glfw_failure("can't open a window");
+            throw glfw_failure("cannot open a window");
         glfwSetWindowUserPointer(window_.get(), this);
         glfwSetFramebufferSizeCallback(window_.get(), [](GLFWwindow *w, int, int) { self(w).stale_ = true; });
         glfwSetWindowRefreshCallback(window_.get(), [](GLFWwindow *w) { self(w).stale_ = true; });
@@ -121,7 +121,7 @@ private:
             if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS)
                 glfwSetWindowShouldClose(w, GLFW_TRUE);
         });
-        // Letters as the keyboard's layout has them.
+        // Letters according to the keyboard layout.
         glfwSetCharCallback(window_.get(), [](GLFWwindow *w, unsigned letter) {
             if (letter == 'q')
                 glfwSetWindowShouldClose(w, GLFW_TRUE);
@@ -134,10 +134,10 @@ private:
         GLint largest = 0;
         glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
         if (width_ > largest || height_ > largest)
-            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "this machine's OpenGL shows images of at most " +
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "this machine's OpenGL supports images of at most " +
                                                                std::to_string(largest) +
-                                                               " px a side: use smaller frames");
-        GLuint texture = 0; // goes with the context
+                                                               " px per side; use smaller frames");
+        GLuint texture = 0; // freed with the context
         glGenTextures(1, &texture);
         glBindTexture(GL_TEXTURE_2D, texture);
         glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
@@ -156,7 +156,7 @@ private:
     void upload(const arhost_output &output) {
         const std::size_t row_size = 3 * std::size_t{output.width};
         const std::uint8_t *pixels = output.bgr;
-        if (output.stride != row_size) { // OpenGL counts strides in whole pixels
+        if (output.stride != row_size) { // OpenGL row lengths are whole pixels
             packed_.resize(row_size * output.height);
             for (std::size_t y = 0; y < output.height; ++y)
                 std::memcpy(packed_.data() + y * row_size, output.bgr + y * output.stride, row_size);
@@ -175,11 +175,11 @@ private:
         glViewport(0, 0, width, height);
         glClear(GL_COLOR_BUFFER_BIT);
         const Rectangle r = fit(width_, height_, width, height);
-        glViewport(r.x, height - r.y - r.height, r.width, r.height); // OpenGL counts from the bottom
+        glViewport(r.x, height - r.y - r.height, r.width, r.height); // OpenGL has its origin at the bottom
         glBegin(GL_TRIANGLE_STRIP);
         for (const auto &[u, v] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
             glTexCoord2i(u, v);
-            glVertex2i(2 * u - 1, 1 - 2 * v); // the image's first row is at the top
+            glVertex2i(2 * u - 1, 1 - 2 * v); // the first row is at the top
         }
         glEnd();
         glfwSwapBuffers(window_.get());
@@ -205,7 +205,7 @@ private:
         }
     }
 
-    // The one that the window's middle is on, else the primary one.
+    // The monitor with the centre of the window, or the primary one.
     GLFWmonitor *monitor_in_view() const {
         const int x = windowed_.x + windowed_.width / 2, y = windowed_.y + windowed_.height / 2;
         int count = 0;
@@ -232,9 +232,9 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_TEXT, "title", "arhost", "The window's title."),
-    option(ARHOST_OPTION_REAL, "scale", "1", "The window's first size, as a multiple of the frame's.", 0.05, 16),
-    option(ARHOST_OPTION_BOOL, "vsync", "true", "Whether frames wait for the screen, which avoids tearing."),
+    option(ARHOST_OPTION_TEXT, "title", "arhost", "Window title."),
+    option(ARHOST_OPTION_REAL, "scale", "1", "Initial window size as a multiple of the frame size.", 0.05, 16),
+    option(ARHOST_OPTION_BOOL, "vsync", "true", "Synchronize with the display, which avoids tearing."),
 };
 
 constexpr const char *needs[] = {"display", nullptr};

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_sequence.hpp"
 
-#include "pattern.hpp"
+#include "folder.hpp"
+
+#include <arhost-cpp/numbered_name.hpp>
 
 #include <opencv2/imgcodecs.hpp>
 
 #include <cctype>
 #include <cstring>
+#include <map>
 
 namespace arhost {
 
@@ -18,10 +21,10 @@ std::string size_text(const cv::Mat &image) {
     return std::to_string(image.cols) + "×" + std::to_string(image.rows);
 }
 
-// 16 bits are scaled down, alpha is dropped, Exif's orientation is applied.
+// Converts 16-bit images to 8 bits, drops alpha, applies the Exif orientation.
 cv::Mat read_image(const fs::path &file, int flags) {
     cv::Mat image;
-    std::string reason = "it is damaged, or no image of a known format";
+    std::string reason = "damaged or unknown image format";
     try {
         image = cv::imread(file.string(), flags);
     } catch (const cv::Exception &error) {
@@ -33,14 +36,21 @@ cv::Mat read_image(const fs::path &file, int flags) {
         if (error)
             reason = error.message();
         else if (size == 0)
-            reason = "it is empty";
-        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " can't be read: " + reason);
+            reason = "the file is empty";
+        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " cannot be read: " + reason);
     }
     if (image.cols > ARHOST_MAX_IMAGE_SIDE || image.rows > ARHOST_MAX_IMAGE_SIDE)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +
-                                                             " px: no side may be longer than " +
+                                                             " px; the limit per side is " +
                                                              std::to_string(ARHOST_MAX_IMAGE_SIDE));
     return image;
+}
+
+NumberedName numbered_name_of(const fs::path &path) try {
+    return NumberedName(path.filename().string());
+} catch (const std::invalid_argument &error) {
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                  "path: " + quoted(path) + " does not exist, nor is it a numbered name: " + error.what());
 }
 
 } // namespace
@@ -91,16 +101,20 @@ void ImageSequence::copy_to(const arhost_frame_buffer &buffer) {
 }
 
 std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, const Host &host) {
-    const Pattern pattern = *Pattern::parse(path);
-    const auto found = pattern.scan();
-    if (start < 0 && !found.empty())
-        start = found.begin()->first;
-    auto next = found.find(start);
+    const fs::path folder = path.parent_path();
+    const NumberedName pattern = numbered_name_of(path);
+    std::map<std::uint64_t, fs::path> found;
+    std::error_code ignored; // describe_folder reports a folder that cannot be listed
+    for (const auto &entry : fs::directory_iterator(folder, ignored))
+        if (const auto number = pattern.number(entry.path().filename().string()))
+            found.emplace(*number, entry.path());
+    std::uint64_t number = start >= 0 ? static_cast<std::uint64_t>(start) : found.empty() ? 0 : found.begin()->first;
+    auto next = found.find(number);
     if (next == found.end()) {
         std::string message = "path: no file matches the pattern " + quoted(path) + ": looked for " +
-                              quoted(pattern.file(std::max<std::int64_t>(start, 0))) + " first; ";
+                              quoted(folder / pattern.name(number)) + " first; ";
         if (found.empty())
-            message += describe_folder(pattern.folder());
+            message += describe_folder(folder);
         else
             message.append("there are ")
                 .append(std::to_string(found.size()))
@@ -108,15 +122,14 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
                 .append(std::to_string(found.begin()->first))
                 .append(" to ")
                 .append(std::to_string(found.rbegin()->first))
-                .append(": set the option 'start'");
+                .append("; set the option 'start'");
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, message);
     }
     std::vector<fs::path> files;
-    std::int64_t number = start;
     for (; next != found.end() && next->first == number; ++next, ++number)
         files.push_back(next->second);
     if (next != found.end())
-        host.warn(quoted(pattern.file(number)) +
+        host.warn(quoted(folder / pattern.name(number)) +
                   " is missing: the sequence ends before it, though there are files up to number " +
                   std::to_string(found.rbegin()->first));
     return files;

@@ -10,10 +10,10 @@
 
 namespace arhost {
 
-// Whether the file's name ends like an image's: others are left to libav.
+// Whether the extension is that of an image format. Other files are decoded by libav.
 bool is_image_name(const std::filesystem::path &path);
 
-// One image a file. The first decides on size and on grey or colour.
+// One image per file. The first determines size and pixel format (grey or colour).
 class ImageSequence final : public Reader {
 public:
     explicit ImageSequence(std::vector<std::filesystem::path> files); // at least one
@@ -26,11 +26,11 @@ public:
 private:
     std::vector<std::filesystem::path> files_;
     std::uint64_t current_ = 0;
-    cv::Mat image_; // the current one, 8-bit, 1 or 3 channels
+    cv::Mat image_; // the current image, 8-bit, 1 or 3 channels
 };
 
-// The files of a pattern ("frames/image_%04d.png") from number `start` (−1: the lowest) up to the first
-// that is missing.
+// The files of a numbered name ("frames/image_%04d.png") from number `start` (−1: the lowest) up to the first missing
+// number. Throws Failure if there is none.
 std::vector<std::filesystem::path> numbered_files(const std::filesystem::path &path, std::int64_t start,
                                                   const Host &host);
 

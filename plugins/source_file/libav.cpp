@@ -8,30 +8,24 @@ namespace arhost {
 
 namespace {
 
-// The callback has no argument of ours, so the log in use must be found here. The newest one has it.
+// The callback has no user argument, so the log in use is global: the newest one.
 struct {
     std::mutex mutex;
     LibavLog *log = nullptr;
-} in_use;
+} active;
 
 } // namespace
 
-std::string libav_error(int code) {
-    std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
-    av_strerror(code, text.data(), text.size());
-    return text.data();
-}
-
 LibavLog::LibavLog(const Host &host) : host_(host) {
-    std::lock_guard lock(in_use.mutex);
-    in_use.log = this;
+    std::lock_guard lock(active.mutex);
+    active.log = this;
     av_log_set_callback(&on_message);
 }
 
 LibavLog::~LibavLog() {
-    std::lock_guard lock(in_use.mutex);
-    if (in_use.log == this)
-        in_use.log = nullptr;
+    std::lock_guard lock(active.mutex);
+    if (active.log == this)
+        active.log = nullptr;
 }
 
 std::string LibavLog::take_reason() {
@@ -43,10 +37,10 @@ std::string LibavLog::take_reason() {
 void LibavLog::on_message(void *context, int level, const char *format, va_list arguments) {
     if (level > AV_LOG_INFO)
         return;
-    std::lock_guard lock(in_use.mutex);
-    if (!in_use.log)
+    std::lock_guard lock(active.mutex);
+    if (!active.log)
         return;
-    LibavLog &log = *in_use.log;
+    LibavLog &log = *active.log;
     std::array<char, 512> line{};
     av_log_format_line2(context, level, format, arguments, line.data(), line.size(), &log.print_prefix_);
     std::string text = line.data();
@@ -56,7 +50,7 @@ void LibavLog::on_message(void *context, int level, const char *format, va_list 
         return;
     log.host_.log(ARHOST_SEVERITY_DEBUG, "libav: " + text);
     if (level <= AV_LOG_ERROR) {
-        // "[mov,mp4 @ 0x55…] moov atom not found": the user needs no address.
+        // "[mov,mp4 @ 0x55…] moov atom not found": drop the prefix with the address.
         const std::size_t end_of_prefix = text.starts_with('[') ? text.find("] ") : std::string::npos;
         std::lock_guard own(log.mutex_);
         log.last_error_ = end_of_prefix == std::string::npos ? text : text.substr(end_of_prefix + 2);

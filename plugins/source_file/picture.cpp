@@ -16,7 +16,7 @@ bool is_full_range(const AVFrame &picture) {
            picture.format == AV_PIX_FMT_YUVJ440P || picture.format == AV_PIX_FMT_YUVJ411P;
 }
 
-// The matrix, with the guess that players make where the stream does not tell.
+// The colour matrix; if the stream does not specify it, the same guess as in common players.
 AVColorSpace colour_space(const AVFrame &picture) {
     if (picture.colorspace != AVCOL_SPC_UNSPECIFIED && picture.colorspace != AVCOL_SPC_RESERVED)
         return picture.colorspace;
@@ -30,7 +30,7 @@ std::optional<arhost_yuv_matrix> yuv_matrix(const AVFrame &picture) {
     case AVCOL_SPC_BT470BG:
     case AVCOL_SPC_SMPTE170M:
         return ARHOST_YUV_MATRIX_BT601;
-    default: // BT.2020 and rarer ones: left to swscale
+    default: // BT.2020 and others: converted by swscale
         return std::nullopt;
     }
 }
@@ -43,13 +43,13 @@ std::size_t bytes_a_pixel(arhost_pixel_format format, std::uint32_t plane) {
     return format == ARHOST_PIXEL_FORMAT_BGR8 ? 3 : format == ARHOST_PIXEL_FORMAT_NV12 && plane == 1 ? 2 : 1;
 }
 
-// A plane that may be read in any of four directions: pixel (x, y) of it lies at x·step_x + y·step_y.
+// A plane rotated by a multiple of 90°: pixel (x, y) is at offset x·step_x + y·step_y.
 struct Plane {
     const std::uint8_t *origin;
     std::ptrdiff_t step_x, step_y;
 };
 
-// `width` and `height` are those before the turn.
+// `width` and `height`: before rotation.
 Plane turned(const std::uint8_t *data, std::ptrdiff_t stride, std::ptrdiff_t width, std::ptrdiff_t height,
              std::ptrdiff_t bytes, int quarter_turns_clockwise) {
     switch (quarter_turns_clockwise) {
@@ -111,9 +111,8 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
             SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_BITEXACT, nullptr, nullptr, nullptr));
         if (!scaler_)
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                          std::string("no conversion is known from the pixel format '") +
-                              av_get_pix_fmt_name(format) + "'");
-        // The numbers of AVColorSpace are those of SWS_CS_…
+                          std::string("cannot convert from the pixel format '") + av_get_pix_fmt_name(format) + "'");
+        // AVColorSpace and SWS_CS_… have the same values.
         const int *matrix = sws_getCoefficients(colour_space(picture));
         const bool to_full = target_ == AV_PIX_FMT_BGR24 || format_.yuv_range == ARHOST_YUV_RANGE_FULL;
         sws_setColorspaceDetails(scaler_.get(), matrix, is_full_range(picture), matrix, to_full, 0, 1 << 16, 1 << 16);
@@ -143,7 +142,7 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
                    buffer.plane[p], buffer.format->stride[p], format_.width / shrink, format_.height / shrink, bytes);
     }
 
-    // GREY8 is full range by definition; swscale takes every grey for that.
+    // GREY8 is full range by definition; swscale assumes full range for every grey format.
     if (format_.pixel_format == ARHOST_PIXEL_FORMAT_GREY8 && picture.color_range == AVCOL_RANGE_MPEG)
         for (std::uint32_t y = 0; y < format_.height; ++y) {
             std::uint8_t *row = buffer.plane[0] + static_cast<std::size_t>(y) * buffer.format->stride[0];

@@ -9,22 +9,22 @@
 
 namespace arhost {
 
-// Brings decoded pictures into one pixel format. Those that the host can composite on go through
-// unchanged (4:2:0 with BT.601 or BT.709, and grey); others become BGR, or grey if they have no colour.
+// Converts decoded pictures to one pixel format. Formats that the host supports (4:2:0 with BT.601 or BT.709, and
+// grey) pass unchanged; others become BGR, or grey if they have no colour.
 class PictureConverter {
 public:
-    // As the first picture is; all are turned clockwise by so many quarters.
+    // `first` determines the format. All pictures are rotated clockwise by `quarter_turns` × 90°.
     PictureConverter(const AVFrame &first, int quarter_turns);
 
-    const arhost_frame_format &format() const { return format_; } // not laid out
+    const arhost_frame_format &format() const { return format_; } // without plane layout
     void convert(const AVFrame &picture, const arhost_frame_buffer &buffer);
 
 private:
     int quarter_turns_;
     AVPixelFormat source_, target_;
     arhost_frame_format format_{};
-    SwsPointer scaler_;
-    std::vector<std::uint8_t> upright_; // a converted picture that has yet to be turned
+    libav::SwsPointer scaler_;
+    std::vector<std::uint8_t> upright_; // a converted picture before rotation
 };
 
 } // namespace arhost

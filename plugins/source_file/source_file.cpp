@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// source_file: frames out of videos, numbered images and single images.
+// source_file: frames from videos, numbered images and single images.
+#include "folder.hpp"
 #include "image_sequence.hpp"
-#include "pattern.hpp"
 #include "video.hpp"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ public:
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         open();
         arhost_frame_format format = reader_->format();
-        // A rate that was asked for overrides the video's own times.
+        // A configured rate overrides the time stamps of the video.
         counts_time_ = setup.fps > 0 || !reader_->media_ns();
         fps_ = setup.fps > 0 ? setup.fps : format.fps > 0 ? format.fps : 30;
         paced_ = setup.paced != 0;
@@ -43,14 +43,14 @@ public:
             camera && (camera->width != format.width || camera->height != format.height))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           quoted(path_) + " has frames of " + std::to_string(format.width) + "×" +
-                              std::to_string(format.height) + " px, but the camera's calibration is for " +
+                              std::to_string(format.height) + " px, but the camera calibration is for " +
                               std::to_string(camera->width) + "×" + std::to_string(camera->height));
         properties.format = format;
         const std::uint64_t count = reader_->frame_count();
         properties.frame_count = loop_ ? limit_ : limit_ && count ? std::min(limit_, count) : count;
 
         if (go_to(setup.first_sequence) == ARHOST_STATUS_ERROR_CANCELLED)
-            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "going to frame " + std::to_string(setup.first_sequence) +
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "seeking to frame " + std::to_string(setup.first_sequence) +
                                                              " of " + quoted(path_) + " was cancelled");
     }
 
@@ -77,32 +77,32 @@ private:
             throw Failure(
                 ARHOST_STATUS_ERROR_CONFIGURATION,
                 "path: " + quoted(path_) +
-                    " is a folder: give a video, an image, or numbered images as 'folder/image_%04d.png'; " +
+                    " is a folder; set a video, an image, or numbered images such as 'folder/image_%04d.png'; " +
                     arhost::describe_folder(path_));
-        // A file may have a percent sign in its name.
-        if (!fs::exists(status) && arhost::Pattern::parse(path_)) {
+        // The name of an existing file may have a percent sign.
+        if (!fs::exists(status) && path_.string().find('%') != std::string::npos) {
             reader_ = std::make_unique<arhost::ImageSequence>(arhost::numbered_files(path_, start_, host_));
             return;
         }
         if (!fs::exists(status)) {
-            std::string why = error ? error.message() : "there is no such file";
+            std::string why = error ? error.message() : "no such file";
             if (fs::is_directory(path_.parent_path(), error))
                 why += "; " + arhost::describe_folder(path_.parent_path());
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "path: " + quoted(path_) + " can't be opened: " + why);
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "path: " + quoted(path_) + " cannot be opened: " + why);
         }
         if (!fs::is_regular_file(status))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "path: " + quoted(path_) + " is no file; a camera is read by source_v4l2");
+                          "path: " + quoted(path_) + " is not a regular file; use source_v4l2 for cameras");
         if (arhost::is_image_name(path_)) {
             reader_ = std::make_unique<arhost::ImageSequence>(std::vector{path_});
             limit_ = loop_ ? limit_ : std::max<std::uint64_t>(limit_, 1);
-            loop_ = true; // a still picture is repeated
+            loop_ = true; // a single image is repeated
         } else {
             reader_ = std::make_unique<arhost::Video>(path_, host_);
         }
     }
 
-    // Makes frame `frame`, counted over all rounds of a loop, the reader's current one.
+    // Seeks to `frame`, counted over all iterations of a loop.
     arhost_status go_to(std::uint64_t frame) {
         if (limit_ && frame >= limit_)
             return ARHOST_STATUS_END;
@@ -110,7 +110,7 @@ private:
             const arhost_status status = reader_->go_to(round_frames_ ? frame % round_frames_ : frame);
             if (status < ARHOST_STATUS_END || !loop_ || round_frames_)
                 return status;
-            round_frames_ = reader_->frame_count(); // only the end tells a video's true length
+            round_frames_ = reader_->frame_count(); // the true length of a video is known only at its end
             round_ns_ = reader_->end_ns();
         }
     }
@@ -122,7 +122,7 @@ private:
         return static_cast<std::int64_t>(round) * round_ns_ + *reader_->media_ns();
     }
 
-    // Waits until `frame` is due. Where that is past already, goes on to the frame that is due now.
+    // Waits until `frame` is due. If it is late, advances `frame` to the one that is due now.
     arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
         const auto period_ns = std::max(static_cast<std::int64_t>(1e9 / fps_), std::int64_t{1});
         if (!epoch_set_) {
@@ -130,12 +130,12 @@ private:
             epoch_set_ = true;
         }
         if (const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame); late_ns >= period_ns) {
-            // At most a second's frames: after a long halt the time in between was not meant to be seen.
+            // Skips at most one second: after a longer pause playback resumes where it stopped.
             info.skipped = static_cast<std::uint32_t>(std::min(late_ns, std::int64_t{1'000'000'000}) / period_ns);
             frame += info.skipped;
             if (const arhost_status status = go_to(frame); status != ARHOST_STATUS_OK)
                 return status;
-            // A decoder that can't keep up plays slower, instead of skipping ever more.
+            // A decoder that is too slow plays slower instead of skipping more and more.
             if (now_ns() - epoch_ns_ - time_ns(frame) >= period_ns)
                 epoch_ns_ = now_ns() - time_ns(frame);
         }
@@ -147,12 +147,12 @@ private:
     fs::path path_;
     std::int64_t start_; // −1: the lowest number
     bool loop_;
-    std::uint64_t limit_; // frames in all; 0: no limit
+    std::uint64_t limit_; // total number of frames; 0: no limit
 
     std::unique_ptr<arhost::Reader> reader_;
-    bool counts_time_ = true; // frame n is at n/fps; else the reader tells
+    bool counts_time_ = true; // frame n is at n/fps; otherwise the reader has time stamps
     double fps_ = 0;
-    std::uint64_t round_frames_ = 0; // of a loop, once known
+    std::uint64_t round_frames_ = 0; // frames per loop iteration, once known
     std::int64_t round_ns_ = 0;
 
     bool paced_ = false, epoch_set_ = false;
@@ -162,12 +162,12 @@ private:
 using arhost::option;
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INPUT_PATH, "path", nullptr,
-           "A video, an image, or numbered images as a pattern: 'frames/image_%04d.png'."),
-    option(ARHOST_OPTION_INTEGER, "start", "-1",
-           "The first number of a pattern's images; -1: the lowest that there is.", -1, 2'147'483'647),
-    option(ARHOST_OPTION_BOOL, "loop", "false", "Whether to begin again at the end."),
+           "A video, an image, or numbered images: 'frames/image_%04d.png'."),
+    option(ARHOST_OPTION_INTEGER, "start", "-1", "First number of numbered images; -1: the lowest that exists.", -1,
+           2'147'483'647),
+    option(ARHOST_OPTION_BOOL, "loop", "false", "Restart at the end."),
     option(ARHOST_OPTION_INTEGER, "frames", "0",
-           "End after so many frames; 0: all (and 1 of a single image, which is repeated).", 0, 2'147'483'647),
+           "Number of frames; 0: all (1 for a single image, which is repeated).", 0, 2'147'483'647),
 };
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
@@ -177,7 +177,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "Frames from a video file, from numbered images or from one image.",
+                                          "Reads frames from a video file, numbered images or one image.",
                                           ARHOST_CAPABILITY_SEEK,
                                           std::size(options),
                                           options,

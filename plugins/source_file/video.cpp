@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "video.hpp"
 
-#include "pattern.hpp"
+#include "folder.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -14,21 +14,15 @@ namespace arhost {
 
 namespace {
 
-// Memory is the one failure that is not about the file.
+// Out of memory is the only failure that the file does not cause.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
     return code;
 }
 
-template <class T> T *allocated(T *pointer) {
-    if (!pointer)
-        throw std::bad_alloc();
-    return pointer;
-}
-
-// An AVI says how long its data are; its header's count is of time slots, of which some may be empty (Microsoft, AVI
-// RIFF File Reference). Whether `file` is one and shorter than that; none where it is no AVI.
+// Whether `file` is shorter than its AVI header says; nullopt if it is not an AVI. The header's frame count cannot be
+// used: it counts time slots, of which some may be empty (Microsoft, AVI RIFF File Reference).
 std::optional<bool> is_short_avi(const std::filesystem::path &file) {
     std::ifstream stream(file, std::ios::binary);
     unsigned char head[12] = {};
@@ -43,33 +37,36 @@ std::optional<bool> is_short_avi(const std::filesystem::path &file) {
 } // namespace
 
 Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
-    : name_("the video " + quoted(file)), host_(host), log_(log), packet_(allocated(av_packet_alloc())),
-      frame_(allocated(av_frame_alloc())) {
+    : name_("the video " + quoted(file)), host_(host), log_(log),
+      packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
+      frame_(libav::allocated<libav::FramePointer>(av_frame_alloc())) {
     const auto refuse = [&](const std::string &why) {
         if (host_.cancelled())
             return Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
-        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " can't be read: " + why + log_.take_reason());
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be read: " + why + log_.take_reason());
     };
     log_.take_reason();
     short_avi_ = is_short_avi(file);
 
-    AVFormatContext *context = allocated(avformat_alloc_context());
+    AVFormatContext *context = avformat_alloc_context();
+    if (!context)
+        throw std::bad_alloc();
     context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
                                    this};
-    AVDictionary *options = nullptr; // a playlist must not lead anywhere but to files
+    AVDictionary *options = nullptr; // a playlist must refer to files only
     av_dict_set(&options, "protocol_whitelist", "file", 0);
-    // "file:" keeps libav from taking the path for a URL. It frees the context where it fails.
+    // "file:" keeps libav from taking the path for a URL. It frees the context if it fails.
     const int opened = checked(avformat_open_input(&context, ("file:" + file.string()).c_str(), nullptr, &options));
     av_dict_free(&options);
     if (opened < 0)
-        throw refuse(libav_error(opened));
+        throw refuse(libav::error_text(opened));
     file_.reset(context);
     if (const int found = checked(avformat_find_stream_info(context, nullptr)); found < 0)
-        throw refuse(libav_error(found));
+        throw refuse(libav::error_text(found));
 
     const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
     if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
-        throw refuse("it has no video stream");
+        throw refuse("there is no video stream");
     stream_ = context->streams[index];
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != stream_)
@@ -79,14 +76,14 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (!decoder)
         throw refuse(std::string("this machine's libavcodec has no decoder for '") +
                      avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
-    codec_.reset(allocated(avcodec_alloc_context3(decoder)));
+    codec_ = libav::allocated<libav::CodecPointer>(avcodec_alloc_context3(decoder));
     checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
     codec_->pkt_timebase = stream_->time_base;
-    // Threads share a picture, never a run of pictures: so damaged data gives the same pictures each time.
+    // Threads share a picture, never a run of pictures: so damaged data decodes to the same pictures each time.
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
-        throw refuse(std::string("the decoder '") + decoder->name + "' does not start: " + libav_error(ready));
+        throw refuse(std::string("the decoder '") + decoder->name + "' cannot start: " + libav::error_text(ready));
 
     const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
     fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;
@@ -96,7 +93,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (first == ARHOST_STATUS_ERROR_CANCELLED)
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
     if (first >= ARHOST_STATUS_END)
-        throw refuse("not one picture of it can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
+        throw refuse("no picture can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
 arhost_status Decoder::next() {
@@ -124,7 +121,7 @@ arhost_status Decoder::next() {
     return cut_short_.empty() ? ARHOST_STATUS_END : ARHOST_STATUS_END_TRUNCATED;
 }
 
-// Gives the decoder the next packet, or tells it that there is none.
+// Sends the next packet to the decoder, or signals the end.
 arhost_status Decoder::feed() {
     if (host_.cancelled())
         return ARHOST_STATUS_ERROR_CANCELLED;
@@ -136,13 +133,13 @@ arhost_status Decoder::feed() {
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
         read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
-        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" is in no error code
+        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" has no error code
         checked(avcodec_send_packet(codec_.get(), nullptr));
         return ARHOST_STATUS_OK;
     }
     if (packet_->stream_index != stream_->index)
         return ARHOST_STATUS_OK;
-    // Half a packet is left out: a picture that is half grey would pass for a real one.
+    // Drop a truncated packet: a half-grey picture would look like a valid one.
     if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
         return ARHOST_STATUS_OK;
@@ -171,7 +168,7 @@ void Decoder::finish() {
     const bool has_all = short_avi_ ? !*short_avi_ : packets_ >= declared;
     if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
-    cut_short_ = name_ + " is cut short: it ends after frame " + std::to_string(count_ - 1);
+    cut_short_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);
     if (declared > count_ && !short_avi_)
         cut_short_ += " of " + std::to_string(declared);
     cut_short_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
@@ -199,8 +196,8 @@ int Decoder::quarter_turns() const {
     const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
     if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      name_ + " asks to be shown " + (mirrored ? "mirrored" : "at an angle") +
-                          ", which is not supported: write it out upright with ffmpeg -i … -c:v libx264 …");
+                      name_ + " is marked as " + (mirrored ? "mirrored" : "rotated by an angle") +
+                          ", which is unsupported; convert it with ffmpeg -i … -c:v libx264 …");
     return (static_cast<int>(quarters) + 4) % 4;
 }
 
@@ -212,12 +209,12 @@ Video::Video(std::filesystem::path file, const Host &host) : file_(std::move(fil
     if (width_ > ARHOST_MAX_IMAGE_SIDE || height_ > ARHOST_MAX_IMAGE_SIDE)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the video " + quoted(file_) + " is " + std::to_string(width_) + "×" + std::to_string(height_) +
-                          " px: no side may be longer than " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
+                          " px; the limit per side is " + std::to_string(ARHOST_MAX_IMAGE_SIDE));
     converter_.emplace(first, decoder_->quarter_turns());
     const AVRational aspect = first.sample_aspect_ratio;
     if (aspect.num > 0 && aspect.num != aspect.den)
         host_.info("the video's pixels are not square (" + std::to_string(aspect.num) + ":" +
-                   std::to_string(aspect.den) + "); its frames are given as stored, " + std::to_string(width_) + "×" +
+                   std::to_string(aspect.den) + "); frames are delivered as stored, " + std::to_string(width_) + "×" +
                    std::to_string(height_));
 }
 
@@ -236,8 +233,8 @@ std::uint64_t Video::frame_count() const {
 }
 
 arhost_status Video::go_to(std::uint64_t index) {
-    // Back means from the start again: every picture is then decoded from the same data in the same order
-    // as the first time, which seeking to a keyframe can't promise. At its end the decoder has no picture.
+    // Seeking back reopens the file: every picture is then decoded from the same data in the same order, which
+    // seeking to a keyframe does not guarantee. At the end the decoder has no picture.
     if (index < (decoder_->ended() ? decoder_->count() : decoder_->index()))
         open();
     const std::uint64_t from = decoder_->index();
@@ -264,11 +261,11 @@ void Video::check_size() const {
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) +
                                                              ": frame " + std::to_string(decoder_->index()) + " is " +
                                                              std::to_string(picture.width) + "×" +
-                                                             std::to_string(picture.height) + ", those before it " +
+                                                             std::to_string(picture.height) + ", earlier ones " +
                                                              std::to_string(width_) + "×" + std::to_string(height_));
 }
 
-// Once: a loop meets the same place again and again.
+// Reports once: a loop reaches the same position repeatedly.
 void Video::tell(const std::string &fault, bool &told) const {
     if (fault.empty() || told)
         return;

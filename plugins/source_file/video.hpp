@@ -11,11 +11,11 @@
 
 namespace arhost {
 
-// The pictures of a file's first video stream, in order of display, one after the other.
+// Decodes the first video stream of a file in display order.
 class Decoder {
 public:
     Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log);
-    Decoder(const Decoder &) = delete; // libav holds its address
+    Decoder(const Decoder &) = delete; // libav stores its address
     Decoder &operator=(const Decoder &) = delete;
 
     // Decodes the next picture: ARHOST_STATUS_OK, ARHOST_STATUS_END, ARHOST_STATUS_END_TRUNCATED or
@@ -23,17 +23,17 @@ public:
     arhost_status next();
 
     const AVFrame &picture() const { return *frame_; }
-    std::uint64_t index() const { return count_ - 1; } // of the picture, from 0
-    std::uint64_t count() const { return count_; }     // of the pictures so far
+    std::uint64_t index() const { return count_ - 1; } // of the current picture, from 0
+    std::uint64_t count() const { return count_; }     // pictures so far
     std::int64_t media_ns() const { return media_ns_; }
     std::int64_t end_ns() const { return media_ns_ + period_ns_; }
     bool ended() const { return ended_; }
 
     double fps() const { return fps_; }
-    std::uint64_t declared_count() const; // as the header has it, 0: not told
-    int quarter_turns() const;            // clockwise, to be applied to the pictures
+    std::uint64_t declared_count() const; // from the header; 0: unknown
+    int quarter_turns() const;            // clockwise rotation to apply
 
-    // What was wrong with the data so far, and with its end, in words for the user; "" where all is well.
+    // Messages about damaged data so far and about truncation; "" if there is none.
     const std::string &damage() const { return damage_; }
     const std::string &cut_short() const { return cut_short_; }
 
@@ -45,20 +45,20 @@ private:
     std::string name_;
     Host host_;
     LibavLog &log_;
-    FormatPointer file_;
+    libav::InputPointer file_;
     AVStream *stream_ = nullptr; // owned by file_
-    CodecPointer codec_;
-    PacketPointer packet_;
-    FramePointer frame_;
+    libav::CodecPointer codec_;
+    libav::PacketPointer packet_;
+    libav::FramePointer frame_;
     double fps_ = 0;
     std::int64_t period_ns_ = 0;
     std::uint64_t count_ = 0, packets_ = 0;
     std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
-    bool lost_data_ = false; // since the last picture
+    bool lost_data_ = false; // since the previous picture
     bool ended_ = false;
     std::optional<bool> short_avi_;
-    int read_error_ = 0;                    // what ended the reading, if not the file's end
-    std::string decoder_fault_, end_fault_; // what libav said in passing, and when it met the end
+    int read_error_ = 0;                    // why reading ended, if not at the end of the file
+    std::string decoder_fault_, end_fault_; // libav's messages while decoding, and at the end
     std::string damage_, cut_short_;
 };
 
@@ -74,7 +74,7 @@ public:
     void copy_to(const arhost_frame_buffer &buffer) override;
 
 private:
-    void open(); // from frame 0
+    void open(); // at frame 0
     void check_size() const;
     void tell(const std::string &fault, bool &told) const;
 
@@ -83,7 +83,7 @@ private:
     LibavLog log_;
     std::optional<Decoder> decoder_;
     std::optional<PictureConverter> converter_;
-    int width_ = 0, height_ = 0; // of all pictures, before any turn
+    int width_ = 0, height_ = 0; // of all pictures, before rotation
     bool damage_told_ = false, cut_short_told_ = false;
 };
 

@@ -40,9 +40,9 @@ std::string existing_devices() {
 std::string other_devices() {
     const std::string existing = existing_devices();
     if (existing.empty())
-        return "this machine has no /dev/video* at all: plug the camera in, or use 'source_synthetic' or "
+        return "there is no /dev/video*; connect a camera, or use 'source_synthetic' or "
                "'source_file' instead";
-    return "there are " + existing + "; set 'device' to one of them ('v4l2-ctl --list-devices' tells which is which)";
+    return "there are " + existing + "; set 'device' to one of them (list them with 'v4l2-ctl --list-devices')";
 }
 
 double rate(const v4l2_fract &interval) {
@@ -134,29 +134,29 @@ CaptureDevice::CaptureDevice(const std::string &path)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices());
         if (error == EACCES || error == EPERM)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          start +
-                              "may not be opened by this user: cameras belong to the group 'video' ('sudo usermod "
-                              "-aG video $USER', then log in again)");
+                          start + "cannot be opened by this user: cameras belong to the group 'video' ('sudo usermod "
+                                  "-aG video $USER', then log in again)");
         if (error == EISDIR)
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, no camera; " + other_devices());
-        fail("opening it", error);
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, not a camera; " + other_devices());
+        fail("open", error);
     }
     v4l2_capability capability{};
     if (const int error = control(VIDIOC_QUERYCAP, &capability); error == ENODEV)
-        fail("asking what it is", error);
+        fail("querying its capabilities", error);
     else if (error != 0)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "device: '" + path + "' is no video device; " + other_devices());
+                      "device: '" + path + "' is not a video device; " + other_devices());
     card_ = reinterpret_cast<const char *>(capability.card);
     const std::uint32_t able =
         capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
     if (!(able & V4L2_CAP_VIDEO_CAPTURE) || !(able & V4L2_CAP_STREAMING))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "device: '" + path + "' (" + card_ + ") does not capture pictures" +
-                          (able & V4L2_CAP_META_CAPTURE ? " (it gives a camera's metadata; the camera itself is "
-                                                          "mostly the node with the number below)"
-                           : able & V4L2_CAP_VIDEO_CAPTURE_MPLANE ? " in one plane, and others are not supported"
-                                                                  : "") +
+                          (able & V4L2_CAP_META_CAPTURE ? " (it delivers metadata; the camera itself is "
+                                                          "usually the node with the next lower number)"
+                           : able & V4L2_CAP_VIDEO_CAPTURE_MPLANE
+                               ? " in single-plane formats; multi-planar ones are unsupported"
+                               : "") +
                           "; " + other_devices());
     formats_ = list_formats(fd_.get());
 }
@@ -168,13 +168,13 @@ int CaptureDevice::control(unsigned long request, void *argument) const {
 void CaptureDevice::fail(const std::string &what, int error) const {
     const std::string start = "the camera '" + path_ + "'" + (card_.empty() ? "" : " (" + card_ + ")") + " ";
     if (error == ENODEV || error == ENXIO || error == ESHUTDOWN)
-        throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has gone away: was it unplugged?");
+        throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has disappeared; was it unplugged?");
     if (error == EBUSY)
         throw Failure(ARHOST_STATUS_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
-                                                  "' tells which): end that, or set 'device' to another camera");
+                                                  "' shows which); close it, or set 'device' to another camera");
     if (error == ENOSPC)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      start + "finds not enough bandwidth on its USB bus: choose a smaller size, 'format: mjpeg', or "
+                      start + "lacks bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "
                               "another port");
     throw Failure(ARHOST_STATUS_ERROR_IO, start + "failed at " + what + ": " + std::strerror(error));
 }
@@ -223,7 +223,7 @@ v4l2_format CaptureDevice::current_format() const {
     v4l2_format format{};
     format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     if (const int error = control(VIDIOC_G_FMT, &format))
-        fail("asking for its format", error);
+        fail("querying its format", error);
     return format;
 }
 
@@ -233,7 +233,7 @@ v4l2_format CaptureDevice::set_format(std::uint32_t fourcc, std::uint32_t width,
     format.fmt.pix.height = height;
     format.fmt.pix.pixelformat = fourcc;
     format.fmt.pix.field = V4L2_FIELD_NONE;
-    format.fmt.pix.bytesperline = 0; // the driver's own
+    format.fmt.pix.bytesperline = 0; // chosen by the driver
     format.fmt.pix.sizeimage = 0;
     if (const int error = control(VIDIOC_S_FMT, &format))
         fail("setting " + fourcc_text(fourcc) + " " + size_text(width, height), error);
@@ -267,7 +267,7 @@ CaptureStream::CaptureStream(const CaptureDevice &device, std::uint32_t buffer_c
         buffer.memory = request.memory;
         buffer.index = i;
         if (const int error = device_.control(VIDIOC_QUERYBUF, &buffer))
-            device_.fail("describing a buffer", error);
+            device_.fail("querying a buffer", error);
         void *address =
             mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, device_.fd(), buffer.m.offset);
         if (address == MAP_FAILED)
@@ -278,14 +278,14 @@ CaptureStream::CaptureStream(const CaptureDevice &device, std::uint32_t buffer_c
         queue(i);
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     if (const int error = device_.control(VIDIOC_STREAMON, &type))
-        device_.fail("starting to stream", error);
+        device_.fail("starting the stream", error);
 }
 
 CaptureStream::~CaptureStream() {
-    // Both may fail after the camera has gone; closing it then frees the rest.
+    // Both may fail after an unplug; closing the device then frees the buffers.
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     device_.control(VIDIOC_STREAMOFF, &type);
-    mappings_.clear(); // a mapped buffer can't be given back
+    mappings_.clear(); // mapped buffers cannot be freed
     v4l2_requestbuffers none{};
     none.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     none.memory = V4L2_MEMORY_MMAP;
@@ -303,7 +303,7 @@ void CaptureStream::queue(std::uint32_t index) const {
     buffer.memory = V4L2_MEMORY_MMAP;
     buffer.index = index;
     if (const int error = device_.control(VIDIOC_QBUF, &buffer))
-        device_.fail("handing a buffer back", error);
+        device_.fail("queueing a buffer", error);
 }
 
 std::span<const std::uint8_t> CaptureStream::bytes(const v4l2_buffer &buffer) const {
@@ -324,7 +324,7 @@ std::optional<v4l2_buffer> CaptureStream::dequeue() const {
     if (error != 0)
         device_.fail("capturing", error);
     if (buffer.index >= mappings_.size())
-        device_.fail("capturing: it names a buffer that there is not", EPROTO);
+        device_.fail("capturing: the driver returned an invalid buffer index", EPROTO);
     return buffer;
 }
 

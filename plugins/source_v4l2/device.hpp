@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A V4L2 capture device: what it offers, and its stream of memory-mapped buffers. Everything it holds
-// goes with the objects. Errors are Failures in words for the user.
+// A V4L2 capture device: its formats and its stream of memory-mapped buffers. Errors are thrown as Failure with a
+// message for the user.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -34,38 +34,38 @@ private:
 
 struct CaptureSize {
     std::uint32_t width = 0, height = 0;
-    double max_fps = 0; // 0: the driver does not tell
+    double max_fps = 0; // 0: unknown
 };
 
-// What a driver offers in one pixel format. A range of sizes is listed by its ends.
+// The sizes of one pixel format. A range is listed as its minimum and maximum.
 struct CaptureFormat {
     std::uint32_t fourcc = 0;
     std::vector<CaptureSize> sizes;
-    bool any_size = false; // between the ends
+    bool any_size = false; // between minimum and maximum
 };
 
 std::string fourcc_text(std::uint32_t fourcc); // "YUYV"
 
 class CaptureDevice {
 public:
-    // Opens it and checks that it is a camera.
+    // Opens the device and checks that it captures video.
     explicit CaptureDevice(const std::string &path);
 
     const std::string &path() const { return path_; }
-    const std::string &card() const { return card_; } // the camera's name
+    const std::string &card() const { return card_; } // name of the camera
     const std::vector<CaptureFormat> &formats() const { return formats_; }
     const CaptureFormat *find(std::uint32_t fourcc) const;
-    double max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const; // 0: not told
+    double max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const; // 0: unknown
     std::string describe_formats() const; // "YUYV (640×480 30 fps, …), MJPG (…)"
     std::string describe_sizes_near(const CaptureFormat &format, std::uint32_t width, std::uint32_t height) const;
 
     v4l2_format current_format() const;
     v4l2_format set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
-    double set_fps(double fps); // 0: leave it. What the driver then does; 0: it does not tell
+    double set_fps(double fps); // 0: unchanged. Returns the resulting rate; 0: unknown
 
-    // ioctl, again where a signal broke it off. Zero or an errno.
+    // ioctl, repeated on EINTR. Returns 0 or an errno.
     int control(unsigned long request, void *argument) const;
-    // Throws for an errno of `what`.
+    // Throws Failure for errno `error` of operation `what`.
     [[noreturn]] void fail(const std::string &what, int error) const;
     int fd() const { return fd_.get(); }
 
@@ -77,16 +77,16 @@ private:
 
 class CaptureStream {
 public:
-    CaptureStream(const CaptureDevice &device, std::uint32_t buffer_count); // and starts it
+    CaptureStream(const CaptureDevice &device, std::uint32_t buffer_count); // starts streaming
     ~CaptureStream();
     CaptureStream(const CaptureStream &) = delete;
     CaptureStream &operator=(const CaptureStream &) = delete;
 
-    // The oldest filled buffer; none where no frame is waiting. It is queued again by whoever took it.
+    // The oldest filled buffer; nullopt if there is none. The caller queues it again.
     std::optional<v4l2_buffer> dequeue() const;
     void queue(std::uint32_t index) const;
-    std::span<const std::uint8_t> bytes(const v4l2_buffer &buffer) const; // what the driver says it wrote
-    // Waits for a frame, at most so long. False: not yet.
+    std::span<const std::uint8_t> bytes(const v4l2_buffer &buffer) const; // as reported by the driver
+    // Waits for a frame; false on timeout.
     bool wait(int timeout_ms) const;
 
 private:

@@ -10,8 +10,8 @@ namespace arhost {
 
 namespace {
 
-// Many cameras pad their pictures before the end marker (0xd9), when all of the picture has been read.
-// libjpeg warns of it as it does of damage.
+// Many cameras pad pictures before the end marker (0xd9). libjpeg reports this like damage, though the picture is
+// complete.
 bool is_harmless(const std::string &warning) {
     return warning.find("extraneous bytes before marker 0xd9") != std::string::npos;
 }
@@ -40,7 +40,7 @@ bool JpegDecoder::describe(std::span<const std::uint8_t> jpeg, arhost_frame_form
                               : ARHOST_PIXEL_FORMAT_BGR8;
     format.width = static_cast<std::uint32_t>(width);
     format.height = static_cast<std::uint32_t>(height);
-    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601; // by JFIF
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601; // defined by JFIF
     format.yuv_range = ARHOST_YUV_RANGE_FULL;
     return true;
 }

@@ -10,17 +10,17 @@
 
 namespace arhost {
 
-// Decodes the pictures of a Motion-JPEG camera.
+// Decodes Motion-JPEG pictures.
 class JpegDecoder {
 public:
     JpegDecoder();
 
-    // Sets the first group of `format` for pictures like this one, but for fps: 4:2:0 of even size becomes
-    // I420, grey GREY8, all else BGR8. False where it is no JPEG.
+    // Sets pixel format, size and colour fields of `format` for pictures like this one: 4:2:0 of even size gives
+    // I420, grey gives GREY8, everything else BGR8. False if `bytes` are not a JPEG.
     bool describe(std::span<const std::uint8_t> jpeg, arhost_frame_format &format);
 
-    // Decodes into planes of that format. False where the picture is damaged, cut short or of another size
-    // or kind; `fault` then says what is wrong with it, and the planes may be half written.
+    // Decodes into planes of that format. Returns false if the picture is damaged, truncated or of another size or
+    // format; `fault` then has the reason, and the planes may be partly written.
     bool decode(std::span<const std::uint8_t> jpeg, const arhost_frame_format &format, std::uint8_t *const *planes,
                 std::string &fault);
 

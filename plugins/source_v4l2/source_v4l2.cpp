@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// source_v4l2: frames from a camera of the kernel's (USB, built-in, capture cards).
+// source_v4l2: frames from a Video4Linux camera (USB, built-in, capture cards).
 #include "device.hpp"
 #include "jpeg.hpp"
 
@@ -23,7 +23,7 @@ using arhost::CaptureStream;
 using arhost::Failure;
 using Clock = std::chrono::steady_clock;
 
-// A camera that gives nothing for so long counts as lost.
+// A camera that delivers no frame for this long counts as lost.
 constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr int poll_slice_ms = 50;
 
@@ -37,7 +37,7 @@ bool offers(const CaptureFormat &format, const Size &size) {
     if (format.any_size)
         return size.width >= format.sizes.front().width && size.width <= format.sizes.back().width &&
                size.height >= format.sizes.front().height && size.height <= format.sizes.back().height;
-    return format.sizes.empty() || // the driver does not tell
+    return format.sizes.empty() || // unknown
            std::any_of(format.sizes.begin(), format.sizes.end(), [&](const arhost::CaptureSize &offered) {
                return offered.width == size.width && offered.height == size.height;
            });
@@ -57,7 +57,7 @@ public:
           format_option_(options.text("format")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
         if ((asked_.width == 0) != (asked_.height == 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: give both or neither");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
@@ -68,8 +68,8 @@ public:
         const std::string mode =
             arhost::fourcc_text(pixels.pixelformat) + " " + Size{pixels.width, pixels.height}.text();
         if (setup.fps > 0 && fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
-            host_.warn("the camera gives " + std::to_string(fps) + " frames a second at " + mode + ", not the " +
-                       std::to_string(setup.fps) + " asked for; it offers " + device_->describe_formats());
+            host_.warn("the camera delivers " + std::to_string(fps) + " fps at " + mode + ", not the configured " +
+                       std::to_string(setup.fps) + " fps; it offers " + device_->describe_formats());
 
         arhost_frame_format format{};
         format.struct_size = properties.format.struct_size;
@@ -90,9 +90,9 @@ public:
         format.fps = fps > 0 ? fps : setup.fps;
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "the camera '" + path_ + "' gives " + mode + ", a size that can't be used here");
+                          "the camera '" + path_ + "' delivers " + mode + ", which is unsupported");
         properties.format = format;
-        host_.info(device_->card() + " at " + path_ + ": " + mode + ", " + std::to_string(fps) + " frames a second");
+        host_.info(device_->card() + " at " + path_ + ": " + mode + ", " + std::to_string(fps) + " fps");
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
@@ -127,10 +127,11 @@ private:
             const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
             if (size != Size{} && size != calibrated)
                 throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                              "width, height: " + size.text() +
-                                  " is asked for, but the camera's calibration is for " + calibrated.text());
+                              "width, height: " + size.text() + " is configured, but the camera calibration is for " +
+                                  calibrated.text());
             if (size == Size{})
-                wanted_by = "the camera's calibration is for " + calibrated.text() + ": calibrate for the size used";
+                wanted_by =
+                    "the camera calibration is for " + calibrated.text() + "; calibrate at the size that you use";
             size = calibrated;
         }
         const bool demanded = size != Size{};
@@ -143,21 +144,21 @@ private:
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
         if (set.pixelformat != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          camera + " does not give " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                          camera + " does not deliver " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
                               ", though it offers " + device_->describe_formats());
         if (demanded && size != Size{set.width, set.height})
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
-                              " (it would give " + Size{set.width, set.height}.text() + "); the nearest are " +
+                              " (it would deliver " + Size{set.width, set.height}.text() + "); the nearest are " +
                               device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted_by);
         if (set.pixelformat == V4L2_PIX_FMT_YUYV && set.bytesperline < 2 * set.width)
-            throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a broken driver: rows of " +
+            throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a defective driver: rows of " +
                                                       std::to_string(set.bytesperline) + " bytes for " +
                                                       std::to_string(set.width) + " px");
         return set;
     }
 
-    // YUYV where that comes at the size and rate wanted, since it needs no decoding; else Motion-JPEG.
+    // YUYV, which needs no decoding, if the camera delivers it at the configured size and rate; else Motion-JPEG.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
         std::vector<const CaptureFormat *> known;
         for (const std::uint32_t fourcc : {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG})
@@ -200,7 +201,7 @@ private:
         format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     }
 
-    // Only a picture tells how its chroma is subsampled.
+    // The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
         for (const auto give_up = Clock::now() + silence_limit;;) {
             host_.progress(-1, "waiting for the camera's first picture");
@@ -211,11 +212,11 @@ private:
             stream_->queue(captured->index);
             if (good)
                 return;
-            fault_ = "it is no JPEG";
+            fault_ = "it is not a JPEG";
         }
     }
 
-    // A frame that the driver holds for good: the newest in live use, else the oldest. None: cancelled.
+    // An intact frame from the driver's queue: the newest in live mode, else the oldest. nullopt: cancelled.
     std::optional<v4l2_buffer> next(Clock::time_point give_up) {
         for (;;) {
             if (host_.cancelled())
@@ -239,9 +240,9 @@ private:
                 return found;
             if (Clock::now() > give_up)
                 throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
-                              "the camera '" + path_ + "' (" + device_->card() + ") has given no good picture for " +
-                                  std::to_string(silence_limit.count()) + " s" +
-                                  (fault_.empty() ? "" : "; of the last one: " + fault_));
+                              "the camera '" + path_ + "' (" + device_->card() +
+                                  ") has delivered no intact picture for " + std::to_string(silence_limit.count()) +
+                                  " s" + (fault_.empty() ? "" : "; the last one: " + fault_));
             stream_->wait(poll_slice_ms);
         }
     }
@@ -268,27 +269,27 @@ private:
                                       captured.timestamp.tv_usec * std::int64_t{1'000};
         if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
             return stamp_ns;
-        // Old drivers stamp with the wall clock, or with one that nothing is known of.
+        // Old drivers use the wall clock or an unknown clock.
         const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC), age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
         const bool wall_clock = std::abs(age_ns) < 10'000'000'000;
         if (!clock_told_)
-            host_.warn("the camera's driver does not stamp its frames with CLOCK_MONOTONIC; " +
-                       std::string(wall_clock ? "its wall-clock times are converted"
-                                              : "the time of their arrival is taken instead"));
+            host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +
+                       std::string(wall_clock ? "its wall-clock time stamps are converted"
+                                              : "arrival times are used instead"));
         clock_told_ = true;
         return wall_clock ? now_ns - age_ns : now_ns;
     }
 
-    // Frames lost since the last one given. The driver's numbers include what was dropped here, unless it
-    // does not number.
+    // Frames lost since the last one delivered. The driver's sequence numbers include frames dropped here, unless the
+    // driver does not count.
     std::uint32_t skipped_before(std::uint32_t sequence) {
         std::uint32_t skipped = dropped_;
         if (last_sequence_) {
             const std::uint32_t gap = sequence - *last_sequence_ - 1;
-            if (gap < 1'000'000) // else it went back
+            if (gap < 1'000'000) // otherwise the counter was reset
                 skipped = std::max(skipped, gap);
         } else {
-            skipped = 0; // before the first frame nothing can have been lost
+            skipped = 0; // nothing is lost before the first frame
         }
         last_sequence_ = sequence;
         dropped_ = 0;
@@ -297,17 +298,17 @@ private:
 
     arhost::Host host_;
     std::string path_;
-    Size asked_; // 0×0: as the calibration or the driver has it
+    Size asked_; // 0×0: that of the calibration or the driver
     std::string format_option_;
     std::uint32_t buffer_count_;
 
     std::optional<CaptureDevice> device_;
-    std::optional<CaptureStream> stream_; // after device_: it must go first
+    std::optional<CaptureStream> stream_; // declared after device_, so that it is destroyed first
     arhost::JpegDecoder jpeg_;
     bool newest_only_ = false;
     std::uint32_t yuyv_stride_ = 0;
     std::optional<std::uint32_t> last_sequence_;
-    std::uint32_t dropped_ = 0; // frames since the last one given
+    std::uint32_t dropped_ = 0; // frames since the last one delivered
     std::int64_t last_ns_ = 0;
     bool clock_told_ = false;
     std::string fault_; // of the last damaged picture
@@ -316,14 +317,14 @@ private:
 using arhost::option;
 constexpr const char *formats[] = {"auto", "yuyv", "mjpeg", nullptr};
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_TEXT, "device", "/dev/video0", "The camera's device node."),
+    option(ARHOST_OPTION_TEXT, "device", "/dev/video0", "Device node of the camera."),
     option(ARHOST_OPTION_INTEGER, "width", "0",
-           "Of the frames, in px; 0: the calibration's, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+           "Frame size in px; 0: that of the calibration, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_INTEGER, "height", "0",
-           "Of the frames, in px; 0: the calibration's, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+           "Frame size in px; 0: that of the calibration, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_TEXT, "format", "auto",
-           "How the camera sends its pictures; auto: yuyv if that is fast enough, else mjpeg.", 0, 0, formats),
-    option(ARHOST_OPTION_INTEGER, "buffers", "4", "How many frames the driver may hold.", 2, 32),
+           "Pixel format of the camera; auto: yuyv if it is fast enough, else mjpeg.", 0, 0, formats),
+    option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
 };
 constexpr const char *needs[] = {"video", nullptr};
 
@@ -334,7 +335,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "Frames from a camera through Video4Linux, uncompressed or Motion-JPEG.",
+                                          "Captures from a Video4Linux camera, uncompressed or Motion-JPEG.",
                                           ARHOST_CAPABILITY_LIVE,
                                           std::size(options),
                                           options,

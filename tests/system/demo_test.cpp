@@ -95,7 +95,7 @@ TEST(Film, CutShortIsKeptAndTheExitStatusTells) {
     run.write("again.yaml", "version: 1\nsource: {plugin: source_file, path: film.mkv}\n"
                             "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
     EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("film.mkv' is cut short: it ends after frame "));
+    EXPECT_THAT(run.output(), HasSubstr("film.mkv' is truncated: it ends after frame "));
     EXPECT_THAT(run.output(), HasSubstr("again.yaml:2:9: source: its input is cut short; what there was is kept"));
     const std::string poses = run.read("poses.jsonl");
     const auto kept = std::count(poses.begin(), poses.end(), '\n');

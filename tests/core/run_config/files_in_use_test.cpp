@@ -83,7 +83,7 @@ TEST_F(FilesInUseTest, KnowsTheFilesOfAPattern) {
     file("f-%.png");
     EXPECT_NE(refusal("f-%.png", "f-%.png"), "");
     file("f-0.png");
-    EXPECT_NE(refusal("f-0.png", "f-%0d.png"), "");
+    EXPECT_NE(refusal("f-0.png", "f-%01d.png"), "");
     EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "no digit is left";
     file("100%f-12345.png");
     EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "more digits than at least";

@@ -32,9 +32,9 @@ template <class Call> std::pair<arhost_status, std::string> failure_of(Call &&ca
 
 } // namespace
 
-TEST(Files, ReplacePutsTheWholeFileInPlaceAndLeavesNothingElse) {
+TEST(Files, ReplaceIsAtomicAndLeavesNoTemporaryFile) {
     const test::ScratchFolder folder;
-    const auto target = folder.path() / "a.txt", scratch = hidden_beside(target, ".partial");
+    const auto target = folder.path() / "a.txt", scratch = hidden_sibling(target, ".partial");
     EXPECT_EQ(scratch.filename(), ".a.txt.partial");
     replace_file(target, scratch, bytes_of("first, and long"));
     replace_file(target, scratch, bytes_of("second"));
@@ -42,9 +42,9 @@ TEST(Files, ReplacePutsTheWholeFileInPlaceAndLeavesNothingElse) {
     EXPECT_THAT(test::names_in(folder.path()), ElementsAre("a.txt"));
 }
 
-TEST(Files, ReplaceKeepsTheOldFileWhereTheNewOneDoesNotFit) {
+TEST(Files, ReplaceKeepsTheOldFileIfTheDiskIsFull) {
     const test::ScratchFolder folder;
-    const auto target = folder.path() / "a.txt", scratch = hidden_beside(target, ".partial");
+    const auto target = folder.path() / "a.txt", scratch = hidden_sibling(target, ".partial");
     replace_file(target, scratch, bytes_of("old"));
     const auto [status, message] = failure_of([&] {
         const test::FileSizeLimit limit(1000);
@@ -61,19 +61,19 @@ TEST(Files, ReplaceOfAFolderFailsAndNamesIt) {
     const auto target = folder.path() / "sub";
     std::filesystem::create_directory(target);
     const auto [status, message] =
-        failure_of([&] { replace_file(target, hidden_beside(target, ".partial"), bytes_of("x")); });
+        failure_of([&] { replace_file(target, hidden_sibling(target, ".partial"), bytes_of("x")); });
     EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(message, HasSubstr(target.string()));
 }
 
-TEST(Files, ParentFoldersAreMade) {
+TEST(Files, ParentFoldersAreCreated) {
     const test::ScratchFolder folder;
     make_parent_folders(folder.path() / "a/b/c.txt");
     EXPECT_TRUE(std::filesystem::is_directory(folder.path() / "a/b"));
-    make_parent_folders("c.txt"); // in the working directory: nothing to make
+    make_parent_folders("c.txt"); // in the working directory: no folder to create
 }
 
-TEST(Files, AFileWhereAFolderShouldBeIsNamed) {
+TEST(Files, AFileInPlaceOfAFolderIsNamed) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "a") << "x";
     const auto [status, message] = failure_of([&] { make_parent_folders(folder.path() / "a/b/c.txt"); });
@@ -87,15 +87,15 @@ TEST(Files, AnUnwritableFolderIsNamed) {
     const auto [status, message] = failure_of([&] { File(folder.path() / "locked/a", O_WRONLY | O_CREAT); });
     EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(message, HasSubstr("locked/a"));
-    EXPECT_THAT(message, HasSubstr("may write to"));
+    EXPECT_THAT(message, HasSubstr("writable path"));
 }
 
-TEST(Files, APipeIsRefusedRatherThanWaitedFor) {
+TEST(Files, APipeIsRefusedWithoutBlocking) {
     const test::ScratchFolder folder;
     ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0666), 0);
     const auto [status, message] = failure_of([&] { File(folder.path() / "pipe", O_RDWR); });
     EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(message, HasSubstr("no regular file"));
+    EXPECT_THAT(message, HasSubstr("not a regular file"));
 }
 
 TEST(Files, ReadingPastTheEndIsAnError) {
@@ -111,20 +111,20 @@ TEST(Files, ReadingPastTheEndIsAnError) {
     EXPECT_EQ(file.size(), 2u);
 }
 
-TEST(Files, RemovingWhatIsNotThereIsNoError) {
+TEST(Files, RemovingAMissingFileSucceeds) {
     const test::ScratchFolder folder;
     remove_file(folder.path() / "nothing");
     const auto [status, message] = failure_of([&] { remove_file(folder.path()); });
     EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(message, HasSubstr("can't delete"));
+    EXPECT_THAT(message, HasSubstr("cannot delete"));
 }
 
-TEST(Files, CheckingRefusesWhatIsNoRegularFile) {
+TEST(Files, CheckRefusesNonRegularFiles) {
     EXPECT_THROW(check_can_write("/dev/full"), arhost::Failure);
     EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
-TEST(Files, CheckingThatOneCanBeWrittenChangesNothing) {
+TEST(Files, CheckChangesNothing) {
     const test::ScratchFolder folder;
     const auto file = folder.path() / "log.txt", link = folder.path() / "link.txt",
                target = folder.path() / "far.txt";
@@ -133,7 +133,7 @@ TEST(Files, CheckingThatOneCanBeWrittenChangesNothing) {
     std::ofstream(file) << "old";
     check_can_write(file);
     EXPECT_EQ(std::filesystem::file_size(file), 3u);
-    std::filesystem::create_symlink("far.txt", link); // to what is not there yet
+    std::filesystem::create_symlink("far.txt", link); // to a missing file
     check_can_write(link);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
     EXPECT_FALSE(std::filesystem::exists(target));

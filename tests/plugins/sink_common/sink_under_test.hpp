@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A sink as the worker drives it, pictures to feed it with, and ways to make its life hard.
+// Drives a sink like the worker, with test pictures and fault injection.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -31,7 +31,7 @@ namespace arhost::test {
 class Picture {
 public:
     // Soft gradients that drift with `number`, and `number` in binary as black and white squares of 8 px
-    // along the top, where the picture is at least 128 px wide. `stride` 0: the rows lie close together.
+    // along the top, if the picture is at least 128 px wide. `stride` 0: rows without padding.
     Picture(int width, int height, std::uint64_t number, int stride = 0)
         : width_(width), height_(height), stride_(stride ? stride : 3 * width) {
         const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
@@ -92,7 +92,7 @@ inline arhost_record make_record(std::uint64_t sequence) {
     return record;
 }
 
-// A camera for pictures of that size, its numbers awkward.
+// A camera for pictures of that size, with numbers that are not exactly representable.
 inline arhost_intrinsics make_intrinsics(int width, int height) {
     arhost_intrinsics intrinsics{};
     intrinsics.struct_size = sizeof intrinsics;
@@ -109,14 +109,14 @@ inline arhost_intrinsics make_intrinsics(int width, int height) {
     return intrinsics;
 }
 
-// One process's life of a sink. Destroying it without `stop` is as near to a kill as one process gets.
+// A sink from start to end. Destroying it without `stop` simulates a kill within one process.
 class SinkUnderTest {
 public:
     SinkUnderTest(const std::string &id, const std::map<std::string, std::string> &options) : plugin_(id) {
         created_ = plugin_.create(options);
     }
 
-    bool knows_camera = true; // start() tells the intrinsics
+    bool knows_camera = true; // start() passes the intrinsics
 
     arhost_status created() const { return created_; }
     arhost_status start(int width, int height, std::uint64_t first_sequence = 0, double fps = 30) {
@@ -167,9 +167,8 @@ private:
     int width_ = 0, height_ = 0;
 };
 
-// Runs a sink in a process of its own from `first_sequence` on and kills that process while it works,
-// once at least `frames` frames have been acknowledged. Returns the number of the first frame that was
-// not: where the host would go on.
+// Runs a sink in a separate process from `first_sequence` on and kills it after at least `frames` acknowledged
+// frames. Returns the number of the first unacknowledged frame, where the host would continue.
 inline std::uint64_t write_until_killed(const std::string &id, const std::map<std::string, std::string> &options,
                                         int width, int height, std::uint64_t first_sequence, std::uint64_t frames,
                                         arhost_record (*record)(std::uint64_t) = make_record) {
@@ -201,7 +200,7 @@ inline std::uint64_t write_until_killed(const std::string &id, const std::map<st
     return first_sequence + acknowledged;
 }
 
-// A full disk, as far as a process can tell: no file grows past `bytes`.
+// Simulates a full disk: no file grows past `bytes`.
 class FileSizeLimit {
 public:
     explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -221,7 +220,7 @@ private:
     rlimit before_{};
 };
 
-// A folder that nobody may write to; root, whom nothing stops, becomes nobody for a while.
+// A read-only folder; root temporarily becomes nobody.
 class UnwritableFolder {
 public:
     explicit UnwritableFolder(const std::filesystem::path &path) : path_(path) {

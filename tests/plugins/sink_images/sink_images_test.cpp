@@ -44,7 +44,7 @@ protected:
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
         EXPECT_EQ(s.log(), "");
     }
-    // Frames [0, end) and then a kill.
+    // Frames [0, end), then a kill.
     void run_and_die(SinkUnderTest &&s, std::uint64_t end) const {
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(0, end), ARHOST_STATUS_OK) << s.log();
@@ -70,7 +70,7 @@ TEST_F(SinkImages, EveryNthFrameIsWritten) {
     EXPECT_THAT(names(), ElementsAre("0.png", "3.png", "6.png"));
 }
 
-TEST_F(SinkImages, AnImageIsWholeOnceItsFrameIsAcknowledged) {
+TEST_F(SinkImages, AnImageIsCompleteWhenItsFrameIsAcknowledged) {
     SinkUnderTest s = sink("%d.png");
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 4; ++i) {
@@ -89,17 +89,17 @@ TEST_F(SinkImages, ARestartGivesTheSameBytesAsARunWithoutOne) {
     EXPECT_EQ(names().size(), 16u);
 }
 
-TEST_F(SinkImages, SurvivesTheDeathOfItsProcessAtAnyMoment) {
+TEST_F(SinkImages, SurvivesAKillAtAnyMoment) {
     std::uint64_t next = 0;
     for (const std::uint64_t frames : {1, 5, 2})
         next = write_until_killed("sink_images", {{"path", path("%d.png").string()}}, width, height, next, frames);
     run(sink("%d.png"), next, next + 1);
-    EXPECT_EQ(names().size(), next + 1); // and no leftover
+    EXPECT_EQ(names().size(), next + 1); // and no temporary file
     for (std::uint64_t i = 0; i <= next; ++i)
         EXPECT_TRUE(shows(path(std::to_string(i) + ".png"), i)) << i;
 }
 
-TEST_F(SinkImages, ImagesOfAnEarlierRunAreNamedAndStay) {
+TEST_F(SinkImages, ImagesOfAnEarlierRunAreReportedAndKept) {
     run(sink("%d.png"), 0, 4);
     SinkUnderTest s = sink("%d.png");
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
@@ -123,7 +123,7 @@ TEST_F(SinkImages, APngIsSmallerWithMoreCompressionAndHasTheSamePixels) {
     EXPECT_LT(read_text(path("small_0.png")).size(), read_text(path("fast_0.png")).size());
 }
 
-TEST_F(SinkImages, TakesOddSizesAndPaddedRowsWithoutTouchingOtherBytes) {
+TEST_F(SinkImages, AcceptsOddSizesAndPaddedRowsWithoutTouchingOtherBytes) {
     for (const auto &[w, h] : {std::pair{1, 1}, {7, 5}, {33, 17}, {129, 3}}) {
         const Picture picture(w, h, 1, 3 * w + 64);
         for (const std::string name : {"odd_%d.png", "odd_%d.jpg"}) {
@@ -138,16 +138,16 @@ TEST_F(SinkImages, TakesOddSizesAndPaddedRowsWithoutTouchingOtherBytes) {
 
 // One image
 
-TEST_F(SinkImages, APlainNameHoldsTheLastFrame) {
+TEST_F(SinkImages, APathWithoutNumberHoldsTheLastFrame) {
     run(sink("demo.png"), 0, 5);
     EXPECT_THAT(names(), ElementsAre("demo.png"));
     EXPECT_TRUE(shows(path("demo.png"), 4));
 }
 
-TEST_F(SinkImages, TheLastFrameSurvivesAKillThoughItIsNotSentAgain) {
+TEST_F(SinkImages, TheLastFrameSurvivesAKillWithoutBeingSentAgain) {
     for (std::uint64_t frames = 1; frames < 4; ++frames) {
         run_and_die(sink("demo.png"), frames);
-        run(sink("demo.png"), frames, frames); // no further frame
+        run(sink("demo.png"), frames, frames); // no more frames
         EXPECT_THAT(names(), ElementsAre("demo.png"));
         EXPECT_TRUE(shows(path("demo.png"), frames - 1)) << frames;
     }
@@ -161,25 +161,25 @@ TEST_F(SinkImages, TheLastFrameAfterAKillAtAnyMomentIsTheLastAcknowledgedOne) {
     EXPECT_TRUE(shows(path("demo.png"), next - 1));
 }
 
-TEST_F(SinkImages, AFrameThatWasKeptButNotAcknowledgedIsNotTakenForTheLast) {
+TEST_F(SinkImages, AKeptButUnacknowledgedFrameIsNotTheLast) {
     run_and_die(sink("demo.png"), 4);
     run(sink("demo.png"), 3, 3);
     EXPECT_TRUE(shows(path("demo.png"), 2));
 }
 
-TEST_F(SinkImages, AKillAfterTheEndLeavesTheImage) {
+TEST_F(SinkImages, AKillAfterTheEndKeepsTheImage) {
     run(sink("demo.png"), 0, 3);
-    run(sink("demo.png"), 3, 3); // started anew only to be stopped
+    run(sink("demo.png"), 3, 3); // restarted only to be stopped
     EXPECT_TRUE(shows(path("demo.png"), 2));
 }
 
-TEST_F(SinkImages, TheChosenFrameIsWrittenAndNoOther) {
+TEST_F(SinkImages, OnlyTheChosenFrameIsWritten) {
     run(sink("demo.png", {{"frame", "2"}}), 0, 5);
     EXPECT_THAT(names(), ElementsAre("demo.png"));
     EXPECT_TRUE(shows(path("demo.png"), 2));
 }
 
-TEST_F(SinkImages, WhereTheChosenFrameWasDroppedTheNextOneStandsIn) {
+TEST_F(SinkImages, TheNextFrameReplacesADroppedChosenFrame) {
     SinkUnderTest s = sink("demo.png", {{"frame", "2"}});
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (const std::uint64_t i : {0, 1, 4, 5})
@@ -195,12 +195,12 @@ TEST_F(SinkImages, TheChosenFrameSurvivesARestartBeforeAndAfterIt) {
     }
 }
 
-TEST_F(SinkImages, AnImageOfAnEarlierRunIsNotTakenForThisOnesButStaysUntilAFrameComes) {
+TEST_F(SinkImages, AnImageOfAnEarlierRunIsDeletedAtTheFirstFrame) {
     for (const char *frame : {"-1", "9"}) {
         std::ofstream(path("demo.png")) << "old";
         SinkUnderTest s = sink("demo.png", {{"frame", frame}});
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_text(path("demo.png")), "old") << "the run may yet be refused";
+        EXPECT_EQ(read_text(path("demo.png")), "old") << "the run may still fail to start";
         ASSERT_EQ(s.write(0, 1), ARHOST_STATUS_OK);
         if (frame == std::string("-1")) {
             ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
@@ -213,24 +213,25 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsNotTakenForThisOnesButStaysUntilAFrame
     }
 }
 
-// What can go wrong
+// Errors
 
-TEST_F(SinkImages, OptionsThatDoNotGoTogetherAreRefused) {
+TEST_F(SinkImages, ConflictingOptionsAreRefused) {
     struct Case {
         std::string path;
         std::map<std::string, std::string> options;
         std::string message;
     };
-    for (const Case &c : {Case{"a.bmp", {}, "neither .png nor .jpg"}, Case{"a", {}, "neither .png nor .jpg"},
-                          Case{"%s.png", {}, "%05d"}, Case{"%d.png", {{"frame", "3"}}, "frame: picks one"},
-                          Case{"a.png", {{"every", "2"}}, "every: needs"}}) {
+    for (const Case &c :
+         {Case{"a.bmp", {}, "must end in .png, .jpg or .jpeg"}, Case{"a", {}, "must end in .png, .jpg or .jpeg"},
+          Case{"%s.png", {}, "%05d"}, Case{"%d.png", {{"frame", "3"}}, "frame: selects one"},
+          Case{"a.png", {{"every", "2"}}, "every: needs"}}) {
         SinkUnderTest s = sink(c.path, c.options);
         EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << c.path;
         EXPECT_THAT(s.log(), HasSubstr(c.message));
     }
 }
 
-TEST_F(SinkImages, AFullDiskLeavesNoHalfOfAnImage) {
+TEST_F(SinkImages, AFullDiskLeavesNoPartialImage) {
     SinkUnderTest s = sink("%d.png");
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     ASSERT_EQ(s.write(0), ARHOST_STATUS_OK);
@@ -244,7 +245,7 @@ TEST_F(SinkImages, AFullDiskLeavesNoHalfOfAnImage) {
     EXPECT_TRUE(shows(path("1.png"), 1));
 }
 
-TEST_F(SinkImages, AFullDiskFailsTheKeepingOfTheLastFrame) {
+TEST_F(SinkImages, AFullDiskFailsWhenKeepingTheLastFrame) {
     SinkUnderTest s = sink("demo.png");
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     {
@@ -257,7 +258,7 @@ TEST_F(SinkImages, AFullDiskFailsTheKeepingOfTheLastFrame) {
         EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_FALSE(std::filesystem::exists(path("demo.png")));
-    run(sink("demo.png"), 1, 1); // with room again, a restart finishes it
+    run(sink("demo.png"), 1, 1); // with free space, a restart finishes it
     EXPECT_TRUE(shows(path("demo.png"), 0));
     EXPECT_THAT(names(), ElementsAre("demo.png"));
 }
@@ -271,7 +272,7 @@ TEST_F(SinkImages, AnUnwritableFolderFailsAtTheStart) {
     }
 }
 
-TEST_F(SinkImages, MissingFoldersAreMade) {
+TEST_F(SinkImages, MissingFoldersAreCreated) {
     run(sink("a/b/%d.png"), 0, 1);
     EXPECT_TRUE(shows(path("a/b/0.png"), 0));
 }

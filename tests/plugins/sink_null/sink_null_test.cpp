@@ -8,7 +8,7 @@ using arhost::test::SinkUnderTest;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-TEST(SinkNull, TakesEveryFrameAtOnce) {
+TEST(SinkNull, AcceptsEveryFrameImmediately) {
     SinkUnderTest sink("sink_null", {});
     ASSERT_EQ(sink.start(64, 48), ARHOST_STATUS_OK);
     EXPECT_EQ(sink.write(0, 100), ARHOST_STATUS_OK);
@@ -26,7 +26,7 @@ TEST(SinkNull, TakesAsLongAsItsDelay) {
     EXPECT_GE(Clock::now() - begin, 100ms);
 }
 
-TEST(SinkNull, EndsADelayWhenItIsCancelled) {
+TEST(SinkNull, CancellingEndsTheDelay) {
     SinkUnderTest sink("sink_null", {{"delay_ms", "600000"}});
     ASSERT_EQ(sink.start(64, 48), ARHOST_STATUS_OK);
     std::jthread canceller([&] {

@@ -19,7 +19,8 @@ namespace {
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A frame with two markers, a camera and the truth, its numbers awkward and different in each frame.
+// A frame with two markers, a camera and the truth, with numbers that are not exactly representable and differ per
+// frame.
 arhost_record full_record(std::uint64_t sequence) {
     arhost_record record = make_record(sequence);
     const double seed = 1.0 / (3.0 + static_cast<double>(sequence));
@@ -70,7 +71,7 @@ std::vector<std::string> keys_of(const Json &json) {
     return keys;
 }
 
-// As JSON holds it, of one array within another too.
+// A number by its path in the JSON, also in nested arrays.
 template <class Array> Json array(const Array &values) {
     Json json = Json::array();
     for (const auto &value : values) {
@@ -100,7 +101,7 @@ protected:
         for (; first < end; ++first)
             ASSERT_EQ(sink.write(picture, full_record(first)), ARHOST_STATUS_OK) << sink.log();
     }
-    // The one line that a record makes.
+    // The line of one record.
     std::string line_of(const arhost_record &record) const {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
@@ -116,7 +117,7 @@ protected:
 
 } // namespace
 
-TEST_F(SinkPoses, WritesAFrameWithoutMarkersAsThisVeryLine) {
+TEST_F(SinkPoses, WritesAFrameWithoutMarkersAsDocumented) {
     EXPECT_EQ(
         line_of(make_record(3)),
         R"({"frame": 3, "capture_ns": 99999999, "clock": "media", "overlay": "none", "markers": [], "camera": null})");
@@ -157,7 +158,7 @@ TEST_F(SinkPoses, EveryNumberReadsBackAsTheSameDouble) {
     EXPECT_EQ(line["overlay"], "rendered");
 }
 
-TEST_F(SinkPoses, NamesClockOverlayAndStateAsTheyAre) {
+TEST_F(SinkPoses, NamesClockOverlayAndState) {
     arhost_record record = full_record(0);
     record.clock = ARHOST_CLOCK_MONOTONIC;
     record.overlay = ARHOST_OVERLAY_HELD;
@@ -168,7 +169,7 @@ TEST_F(SinkPoses, NamesClockOverlayAndStateAsTheyAre) {
     EXPECT_EQ(line["markers"][0]["state"], "lost");
 }
 
-TEST_F(SinkPoses, WhatIsNotFiniteIsNull) {
+TEST_F(SinkPoses, NonFiniteNumbersAreNull) {
     arhost_record record = full_record(0);
     record.markers[0].mt[3] = nan_value;
     record.markers[0].reprojection_px = infinity;
@@ -186,7 +187,7 @@ TEST_F(SinkPoses, WhatIsNotFiniteIsNull) {
     EXPECT_TRUE(line["truth"]["mt"][0].is_null());
 }
 
-TEST_F(SinkPoses, AFamilyThatABrokenTrackerMadeUpDoesNotBreakTheLine) {
+TEST_F(SinkPoses, AnInvalidFamilyNameDoesNotCorruptTheLine) {
     arhost_record record = full_record(0);
     std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // no NUL
     std::memcpy(record.markers[0].family, "a\"\\\n\xff", 5);
@@ -195,7 +196,7 @@ TEST_F(SinkPoses, AFamilyThatABrokenTrackerMadeUpDoesNotBreakTheLine) {
               "a\"\\??" + std::string(sizeof record.markers[0].family - 5, 'x'));
 }
 
-TEST_F(SinkPoses, AsManyMarkersAsThereCanBeAreAllWritten) {
+TEST_F(SinkPoses, TheMaximumNumberOfMarkersIsWritten) {
     arhost_record record = full_record(0);
     for (arhost_marker &marker : record.markers)
         marker = record.markers[0];
@@ -203,7 +204,7 @@ TEST_F(SinkPoses, AsManyMarkersAsThereCanBeAreAllWritten) {
     EXPECT_EQ(Json::parse(line_of(record))["markers"].size(), std::size_t{ARHOST_MAX_MARKERS});
 }
 
-TEST_F(SinkPoses, TheLogIsWholeAfterEveryFrame) {
+TEST_F(SinkPoses, TheLogHasWholeLinesAfterEveryFrame) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 20; ++i) {
@@ -220,14 +221,14 @@ TEST_F(SinkPoses, AFreshRunReplacesAnOlderLogAtItsFirstFrame) {
     std::ofstream(log()) << "something else\n";
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(log()), "something else\n") << "the run may yet be refused";
+    EXPECT_EQ(read_text(log()), "something else\n") << "the run may still fail to start";
     write(s, 0, 2);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(log()), uninterrupted(2));
     EXPECT_EQ(s.log(), "");
 }
 
-TEST_F(SinkPoses, ARestartKeepsWhatCameBeforeAndReplacesTheRest) {
+TEST_F(SinkPoses, ARestartKeepsEarlierLinesAndReplacesTheRest) {
     for (const std::uint64_t restart : {1, 5, 9, 10}) {
         {
             SinkUnderTest killed = sink();
@@ -243,18 +244,18 @@ TEST_F(SinkPoses, ARestartKeepsWhatCameBeforeAndReplacesTheRest) {
     }
 }
 
-TEST_F(SinkPoses, ALineThatAKillCutShortIsDropped) {
+TEST_F(SinkPoses, APartialLineIsRemovedAfterAKill) {
     const std::string whole = uninterrupted(3);
     const std::size_t third = whole.find("{\"frame\": 2");
     for (std::size_t size = third + 1; size < whole.size(); size += 7) {
         std::ofstream(log(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // even where the host takes the frame for written
+        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // even if the host considers the frame written
         EXPECT_EQ(read_text(log()), whole.substr(0, third)) << "cut at " << size;
     }
 }
 
-TEST_F(SinkPoses, FramesThatTheLiveModeLeftOutStayLeftOutAfterARestart) {
+TEST_F(SinkPoses, FramesDroppedInLiveModeStayDroppedAfterARestart) {
     const Picture picture(8, 8, 0);
     {
         SinkUnderTest killed = sink();
@@ -272,7 +273,7 @@ TEST_F(SinkPoses, FramesThatTheLiveModeLeftOutStayLeftOutAfterARestart) {
     EXPECT_EQ(Json::parse(lines[2])["frame"], 15);
 }
 
-TEST_F(SinkPoses, SurvivesTheDeathOfItsProcessAtAnyMoment) {
+TEST_F(SinkPoses, SurvivesAKillAtAnyMoment) {
     const std::map<std::string, std::string> options{{"path", log().string()}};
     std::uint64_t next = 0;
     for (const std::uint64_t frames : {1, 40, 3, 200})
@@ -284,16 +285,16 @@ TEST_F(SinkPoses, SurvivesTheDeathOfItsProcessAtAnyMoment) {
     EXPECT_EQ(read_text(log()), uninterrupted(next + 5));
 }
 
-TEST_F(SinkPoses, ARestartWithoutItsOldLogSaysSo) {
+TEST_F(SinkPoses, ARestartWithoutTheOldLogGivesAWarning) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 '" + log().string() + "' holds no frame before 5"));
+    EXPECT_THAT(s.log(), HasSubstr("3 '" + log().string() + "' has no frame before 5"));
 }
 
-TEST_F(SinkPoses, MakesMissingFolders) {
+TEST_F(SinkPoses, CreatesMissingFolders) {
     SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "a/b/log.jsonl").string()}});
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl")) << "no frame came yet";
+    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl")) << "there was no frame yet";
     write(s, 0, 1);
     EXPECT_TRUE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"));
 }
@@ -304,12 +305,12 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(log());
     {
-        const FileSizeLimit limit(before.size() + 100); // takes a part of the next line
+        const FileSizeLimit limit(before.size() + 100); // the next line fits only partly
         EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(log()), before);
-    EXPECT_THAT(s.log(), HasSubstr("4 can't write '" + log().string() + "': File too large"));
-    write(s, 2, 4); // and goes on where there is room again
+    EXPECT_THAT(s.log(), HasSubstr("4 cannot write '" + log().string() + "': File too large"));
+    write(s, 2, 4); // continues when there is space again
     EXPECT_EQ(read_text(log()), uninterrupted(4));
 }
 
@@ -326,7 +327,7 @@ TEST_F(SinkPoses, AFolderAsPathIsRefused) {
     EXPECT_THAT(s.log(), HasSubstr("add a file's name"));
 }
 
-TEST_F(SinkPoses, TheExampleInTheReadmeHasTheKeysThatAreWritten) {
+TEST_F(SinkPoses, TheReadmeExampleHasTheSameKeys) {
     const std::string readme =
         read_text(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "plugins/sink_poses/README.md");
     const std::size_t begin = readme.find("```json\n") + 8;

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// Cameras of awkward numbers; every fourth frame has none.
+// Cameras with numbers that are not exactly representable; every fourth frame has none.
 arhost_record camera_record(std::uint64_t sequence) {
     arhost_record record = make_record(sequence);
     if (sequence % 4 == 3)
@@ -76,7 +76,7 @@ std::vector<std::uint64_t> numbers_of(const Trajectory &trajectory) {
 
 } // namespace
 
-TEST_F(SinkTrajectory, WritesAHeaderAndALineAFrame) {
+TEST_F(SinkTrajectory, WritesAHeaderAndOneLinePerFrame) {
     arhost_record record = make_record(0);
     record.has_camera = 1;
     record.camera.eye[2] = 500;
@@ -135,7 +135,7 @@ TEST_F(SinkTrajectory, WritesTheDissertationsNineNumbersOfSixDigits) {
     EXPECT_EQ(read_text(file()), "7.39486 -721.148 500.637 1e-07 1.23457e+06 0 0 1 0.333333 \n\n");
 }
 
-TEST_F(SinkTrajectory, ALineOfTheDissertationsStandsForTheFrameOfItsNumber) {
+TEST_F(SinkTrajectory, InFormatDissertationLineNumbersAreFrameNumbers) {
     write_frames("dissertation", {1, 2, 3, 6, 9});
     const Trajectory trajectory = read_trajectory(file());
     EXPECT_EQ(trajectory.end(), 10u);
@@ -143,13 +143,13 @@ TEST_F(SinkTrajectory, ALineOfTheDissertationsStandsForTheFrameOfItsNumber) {
     EXPECT_NEAR(trajectory.frames[6].view->eye_mm[0], camera_record(6).camera.eye[0], 1e-3);
 }
 
-TEST_F(SinkTrajectory, FramesThatTheLiveModeLeftOutHaveNoLine) {
+TEST_F(SinkTrajectory, FramesDroppedInLiveModeHaveNoLine) {
     write_frames("arhost", {1, 2, 6, 9});
     EXPECT_EQ(read_trajectory(file()).frames.size(), 4u);
     EXPECT_THAT(numbers_of(read_trajectory(file())), testing::ElementsAre(1, 2, 6, 9));
 }
 
-TEST_F(SinkTrajectory, ACameraThatIsNotFiniteIsNone) {
+TEST_F(SinkTrajectory, ANonFiniteCameraIsTreatedAsMissing) {
     arhost_record record = camera_record(0);
     record.camera.up[1] = std::numeric_limits<double>::quiet_NaN();
     for (const char *format : {"arhost", "dissertation"}) {
@@ -164,11 +164,11 @@ TEST_F(SinkTrajectory, ARunWithoutACameraIsRefused) {
     SinkUnderTest s = sink("arhost");
     s.knows_camera = false;
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(s.log(), HasSubstr("there is no camera to record: add a tracker"));
+    EXPECT_THAT(s.log(), HasSubstr("there is no camera to record; add a tracker"));
     EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
-TEST_P(SinkTrajectoryInEachFormat, IsWholeAfterEveryFrame) {
+TEST_P(SinkTrajectoryInEachFormat, HasWholeLinesAfterEveryFrame) {
     SinkUnderTest s = sink(GetParam());
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
     for (std::uint64_t i = 0; i < 10; ++i) {
@@ -182,12 +182,12 @@ TEST_P(SinkTrajectoryInEachFormat, AFreshRunReplacesAnOlderFileAtItsFirstFrame) 
     std::ofstream(file()) << "something else\n";
     SinkUnderTest s = sink(GetParam());
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(file()), "something else\n") << "the run may yet be refused";
+    EXPECT_EQ(read_text(file()), "something else\n") << "the run may still fail to start";
     write(s, 0, 2);
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 2));
 }
 
-TEST_P(SinkTrajectoryInEachFormat, ARestartKeepsWhatCameBeforeAndReplacesTheRest) {
+TEST_P(SinkTrajectoryInEachFormat, ARestartKeepsEarlierLinesAndReplacesTheRest) {
     for (const std::uint64_t restart : {1, 4, 5, 10}) {
         {
             SinkUnderTest killed = sink(GetParam());
@@ -203,7 +203,7 @@ TEST_P(SinkTrajectoryInEachFormat, ARestartKeepsWhatCameBeforeAndReplacesTheRest
     }
 }
 
-TEST_P(SinkTrajectoryInEachFormat, ALineThatAKillCutShortIsDropped) {
+TEST_P(SinkTrajectoryInEachFormat, APartialLineIsRemovedAfterAKill) {
     const std::string whole = uninterrupted(GetParam(), 3), two = uninterrupted(GetParam(), 2);
     for (std::size_t size = two.size(); size < whole.size(); size += 7) {
         std::ofstream(file(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
@@ -215,7 +215,7 @@ TEST_P(SinkTrajectoryInEachFormat, ALineThatAKillCutShortIsDropped) {
     }
 }
 
-TEST_P(SinkTrajectoryInEachFormat, SurvivesTheDeathOfItsProcessAtAnyMoment) {
+TEST_P(SinkTrajectoryInEachFormat, SurvivesAKillAtAnyMoment) {
     const std::map<std::string, std::string> options{{"path", file().string()}, {"format", GetParam()}};
     std::uint64_t next = 0;
     for (const std::uint64_t frames : {1, 40, 3, 200})
@@ -227,10 +227,10 @@ TEST_P(SinkTrajectoryInEachFormat, SurvivesTheDeathOfItsProcessAtAnyMoment) {
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), next + 5));
 }
 
-TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutItsOldFileSaysSoAndStillWritesWhatCanBeRead) {
+TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutTheOldFileGivesAWarningAndAReadableFile) {
     SinkUnderTest s = sink(GetParam());
     ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("holds no frame before 5"));
+    EXPECT_THAT(s.log(), HasSubstr("has no frame before 5"));
     write(s, 5, 7);
     EXPECT_THAT(numbers_of(read_trajectory(file())), testing::ElementsAre(5, 6));
 }
@@ -241,12 +241,12 @@ TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(file());
     {
-        const FileSizeLimit limit(before.size() + 20); // takes a part of the next line
+        const FileSizeLimit limit(before.size() + 20); // the next line fits only partly
         EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(file()), before);
-    EXPECT_THAT(s.log(), HasSubstr("can't write '" + file().string() + "': File too large"));
-    write(s, 2, 4); // and goes on where there is room again
+    EXPECT_THAT(s.log(), HasSubstr("cannot write '" + file().string() + "': File too large"));
+    write(s, 2, 4); // continues when there is space again
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 4));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reads a film back: its frames as BGR, converted as the film's own tags say, and the numbers in them.
+// Reads a film back: its frames as BGR, converted according to the film's tags, and their numbers.
 #pragma once
 
 #include "sink_under_test.hpp"
@@ -27,7 +27,7 @@ struct FilmFrame {
     std::vector<std::uint8_t> bgr;
 
     const std::uint8_t *pixel(int x, int y) const { return &bgr[3 * (static_cast<std::size_t>(y) * width + x)]; }
-    // The number that Picture paints along the top.
+    // The number that Picture draws along the top.
     std::uint64_t number() const {
         std::uint64_t bits = 0;
         for (int i = 0; i < Picture::squares; ++i)
@@ -73,7 +73,7 @@ inline FilmFrame to_bgr(const AVFrame &frame) {
                              1 << 16);
     std::uint8_t *planes[] = {out.bgr.data()};
     const int strides[] = {3 * frame.width};
-    // swscale may write a little past a row: into a buffer with room, then out of it.
+    // swscale may write past a row: convert into a larger buffer, then copy.
     std::vector<std::uint8_t> roomy(out.bgr.size() + 64);
     planes[0] = roomy.data();
     sws_scale(sws.get(), frame.data, frame.linesize, 0, frame.height, planes, strides);

@@ -72,7 +72,7 @@ protected:
 
 // The film
 
-TEST_F(SinkVideo, HoldsEveryFrameOnceInOrder) {
+TEST_F(SinkVideo, HasEveryFrameOnceInOrder) {
     run(sink(), 0, 40);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
     const Film film = read_film(path());
@@ -82,7 +82,7 @@ TEST_F(SinkVideo, HoldsEveryFrameOnceInOrder) {
     EXPECT_NEAR(film.duration_s, 40 / 30.0, 1e-3);
 }
 
-TEST_F(SinkVideo, IsTaggedAsBt709OfLimitedRange) {
+TEST_F(SinkVideo, IsTaggedAsBt709LimitedRange) {
     for (const std::string name : {"a.mp4", "a.mkv", "a.mov"}) {
         run(sink({{"path", path(name).string()}}), 0, 1);
         const Film film = read_film(path(name));
@@ -93,7 +93,7 @@ TEST_F(SinkVideo, IsTaggedAsBt709OfLimitedRange) {
     }
 }
 
-TEST_F(SinkVideo, ColoursAreRight) {
+TEST_F(SinkVideo, ColoursAreCorrect) {
     for (const std::string codec : {"h264", "mpeg4"}) {
         SinkUnderTest s = sink({{"codec", codec}});
         ASSERT_EQ(s.start(320, 240), ARHOST_STATUS_OK);
@@ -154,18 +154,18 @@ TEST_F(SinkVideo, KeepsTheFrameRate) {
     }
 }
 
-TEST_F(SinkVideo, EveryFrameIsFoundAgainAtHighAndLowFrameRates) {
+TEST_F(SinkVideo, FrameNumbersAreRecoveredAtHighAndLowRates) {
     for (const double fps : {500.0, 499.7, 240.0, 0.5}) {
         SinkUnderTest s = sink();
         ASSERT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_OK);
         ASSERT_EQ(s.write(0, 50), ARHOST_STATUS_OK);
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_EQ(read_film(path()).numbers(), numbers(0, 50)) << fps;
-        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3) << fps; // MP4 has it in whole ms
+        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3) << fps; // MP4 stores whole ms
     }
 }
 
-TEST_F(SinkVideo, AFrameRateThatNoFilmHasIsRefused) {
+TEST_F(SinkVideo, AnInvalidFrameRateIsRefused) {
     for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_ERROR_CONFIGURATION) << fps;
@@ -173,7 +173,7 @@ TEST_F(SinkVideo, AFrameRateThatNoFilmHasIsRefused) {
     }
 }
 
-TEST_F(SinkVideo, FramesThatTheLiveModeLeftOutLeaveTheirTime) {
+TEST_F(SinkVideo, DroppedFramesKeepTheirDuration) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     for (const std::uint64_t i : {3, 4, 9, 10, 20})
@@ -181,7 +181,7 @@ TEST_F(SinkVideo, FramesThatTheLiveModeLeftOutLeaveTheirTime) {
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     const Film film = read_film(path());
     EXPECT_THAT(film.numbers(), ElementsAre(3, 4, 9, 10, 20));
-    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // begins with the first frame
+    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // starts with the first frame
 }
 
 TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
@@ -190,14 +190,14 @@ TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
 }
 
-TEST_F(SinkVideo, SeveralThreadsMakeTheSameFilmEachTime) {
+TEST_F(SinkVideo, SeveralThreadsGiveDeterministicFilms) {
     run(sink({{"threads", "3"}}), 0, 10);
     run(sink({{"threads", "3"}, {"path", path("again.mp4").string()}}), 0, 10);
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 10));
 }
 
-TEST_F(SinkVideo, AHigherCrfMakesASmallerFilm) {
+TEST_F(SinkVideo, AHigherCrfGivesASmallerFilm) {
     for (const std::string codec : {"h264", "mpeg4"}) {
         run(sink({{"codec", codec}, {"path", path("fine.mp4").string()}}), 0, 5);
         run(sink({{"codec", codec}, {"crf", "40"}, {"path", path("coarse.mp4").string()}}), 0, 5);
@@ -205,7 +205,7 @@ TEST_F(SinkVideo, AHigherCrfMakesASmallerFilm) {
     }
 }
 
-TEST_F(SinkVideo, TheIndexStandsInFrontSoThatTheFilmCanBeStreamed) {
+TEST_F(SinkVideo, TheIndexIsAtTheStartForStreaming) {
     run(sink(), 0, 5);
     const std::string film = read_text(path());
     EXPECT_LT(film.find("moov"), film.find("mdat"));
@@ -225,9 +225,9 @@ TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
 TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
     run_and_die(0, 1);
     run_and_die(1, 2);
-    run_and_die(2, 2); // died before its first frame
+    run_and_die(2, 2); // killed before its first frame
     run_and_die(2, 9);
-    run_and_die(5, 6); // went back
+    run_and_die(5, 6); // the host repeated a frame
     run_and_die(6, 6);
     run(sink(), 6, 12);
     const Film film = read_film(path());
@@ -238,7 +238,7 @@ TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, ARestartWithoutAFurtherFrameStillMakesTheFilm) {
+TEST_F(SinkVideo, ARestartWithoutFurtherFramesStillWritesTheFilm) {
     run_and_die(0, 5);
     run(sink(), 5, 5);
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 5));
@@ -258,7 +258,7 @@ TEST_F(SinkVideo, RestartsWorkForEveryCodecAndContainer) {
         }
 }
 
-TEST_F(SinkVideo, SurvivesTheDeathOfItsProcessAtAnyMoment) {
+TEST_F(SinkVideo, SurvivesAKillAtAnyMoment) {
     std::uint64_t next = 0;
     for (const std::uint64_t frames : {1, 12, 3, 5})
         next = write_until_killed("sink_video", with_path(), width, height, next, frames);
@@ -267,7 +267,7 @@ TEST_F(SinkVideo, SurvivesTheDeathOfItsProcessAtAnyMoment) {
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, ASegmentCanBeWatchedAfterAKillWhateverItsLastByte) {
+TEST_F(SinkVideo, ATruncatedSegmentIsPlayable) {
     run_and_die(0, 6);
     const auto segment = path(".demo.mp4.from0.mkv");
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
@@ -281,52 +281,52 @@ TEST_F(SinkVideo, ASegmentCanBeWatchedAfterAKillWhateverItsLastByte) {
     }
 }
 
-TEST_F(SinkVideo, ASegmentThatDiedBeforeItsFirstByteHoldsNothing) {
+TEST_F(SinkVideo, AnEmptySegmentHasNoFrames) {
     run_and_die(0, 3);
     std::ofstream(path(".demo.mp4.from3.mkv")) << "";
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height, 4), ARHOST_STATUS_OK);
     ASSERT_EQ(s.write(4, 6), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 no frame can be read from '" + path(".demo.mp4.from3.mkv").string()));
+    EXPECT_THAT(s.log(), HasSubstr("3 cannot read a frame from '" + path(".demo.mp4.from3.mkv").string()));
     EXPECT_THAT(read_film(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
 }
 
-TEST_F(SinkVideo, AKillInTheMidstOfTheEndLeavesAWholeFilm) {
+TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeFilm) {
     run_and_die(0, 5);
     run_and_die(5, 8);
     const std::string first = read_text(path(".demo.mp4.from0.mkv")), second = read_text(path(".demo.mp4.from5.mkv"));
     run(sink(), 8, 8);
     const std::string film = read_text(path());
 
-    // The film is in place and no segment gone yet.
+    // The film is in place; all segments still exist.
     std::ofstream(path(".demo.mp4.from0.mkv")) << first;
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
 
-    // The first segment is gone.
+    // The first segment is deleted.
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
 
-    // All are.
+    // All segments are deleted.
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, AFreshStartRemovesWhatAnEarlierRunLeft) {
+TEST_F(SinkVideo, AFreshStartRemovesSegmentsOfAnEarlierRun) {
     run_and_die(0, 5);
     run_and_die(5, 9);
     std::ofstream(path(".demo.mp4.partial")) << "x";
-    std::ofstream(path(".demo.mp4.from7.txt")) << "another's";
+    std::ofstream(path(".demo.mp4.from7.txt")) << "unrelated";
     run(sink(), 0, 3);
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 3));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from7.txt", "demo.mp4"));
 }
 
-TEST_F(SinkVideo, ARunThatIsRefusedLeavesWhatAnEarlierOneCouldNotFinish) {
+TEST_F(SinkVideo, ARunThatFailsToStartKeepsEarlierSegments) {
     run_and_die(0, 5);
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
@@ -334,7 +334,7 @@ TEST_F(SinkVideo, ARunThatIsRefusedLeavesWhatAnEarlierOneCouldNotFinish) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
-TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsWhole) {
+TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsComplete) {
     run(sink(), 0, 3);
     const std::string old = read_text(path());
     run_and_die(0, 5);
@@ -343,44 +343,44 @@ TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsWhole) {
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
 }
 
-TEST_F(SinkVideo, ARestartWhoseFirstPartIsGoneSaysSoAndKeepsTheRest) {
+TEST_F(SinkVideo, ARestartWithoutItsFirstSegmentWarnsAndKeepsTheRest) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 the film's part before frame 5 is gone"));
+    EXPECT_THAT(s.log(), HasSubstr("3 the part of the film before frame 5 is lost"));
     ASSERT_EQ(s.write(5, 8), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_film(path()).numbers(), numbers(5, 8));
 }
 
-TEST_F(SinkVideo, SegmentsOfOtherOptionsAreNotJoined) {
+TEST_F(SinkVideo, SegmentsWithOtherOptionsAreNotJoined) {
     run_and_die(0, 3);
     SinkUnderTest s = sink({{"preset", "ultrafast"}});
     ASSERT_EQ(s.start(width, height, 3), ARHOST_STATUS_OK);
     ASSERT_EQ(s.write(3, 5), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(s.log(), HasSubstr("encoded with other options"));
+    EXPECT_THAT(s.log(), HasSubstr("encoded with different options"));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // nothing is lost
 }
 
-TEST_F(SinkVideo, NoFrameMakesNoFilmAndAWarning) {
+TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(names(), IsEmpty());
-    EXPECT_THAT(s.log(), HasSubstr("3 no frame came: '" + path().string() + "' was not written"));
+    EXPECT_THAT(s.log(), HasSubstr("3 there was no frame: '" + path().string() + "' was not written"));
 }
 
-// What can go wrong
+// Errors
 
-TEST_F(SinkVideo, AnUnknownEndingIsRefused) {
+TEST_F(SinkVideo, AnUnknownExtensionIsRefused) {
     for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
         SinkUnderTest s = sink({{"path", path(name).string()}});
         EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-        EXPECT_THAT(s.log(), HasSubstr(".mp4, .mkv and .mov"));
+        EXPECT_THAT(s.log(), HasSubstr(".mp4, .mkv or .mov"));
     }
 }
 
-TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndWhatWasWrittenBeforeStays) {
+TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndEarlierFramesAreKept) {
     {
         SinkUnderTest s = sink();
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
@@ -394,7 +394,7 @@ TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndWhatWasWrittenBeforeStays) {
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
 }
 
-TEST_F(SinkVideo, ADiskThatIsFullAtTheEndKeepsTheFramesAndTheOlderFilm) {
+TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderFilm) {
     run(sink(), 0, 2);
     const std::string old = read_text(path());
     {
@@ -403,11 +403,11 @@ TEST_F(SinkVideo, ADiskThatIsFullAtTheEndKeepsTheFramesAndTheOlderFilm) {
         ASSERT_EQ(s.write(0, 8), ARHOST_STATUS_OK);
         const FileSizeLimit limit(1500);
         EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_IO);
-        EXPECT_THAT(s.log(), HasSubstr("the film's frames are kept in"));
+        EXPECT_THAT(s.log(), HasSubstr("the frames are kept in"));
     }
     EXPECT_EQ(read_text(path()), old);
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", "demo.mp4"));
-    run(sink(), 8, 8); // with room again, a restart finishes it
+    run(sink(), 8, 8); // with free space, a restart finishes it
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 8));
 }
 
@@ -418,14 +418,14 @@ TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
     EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.partial': Permission denied"));
 }
 
-TEST_F(SinkVideo, NoPartOfThePathIsTakenForAProtocolOrPattern) {
+TEST_F(SinkVideo, ThePathIsNotParsedAsAUrlOrPattern) {
     const auto odd = path("a:b %d, c'd.mp4");
     run(sink({{"path", odd.string()}}), 0, 2);
     EXPECT_THAT(names(), ElementsAre("a:b %d, c'd.mp4"));
     EXPECT_EQ(read_film(odd).numbers(), numbers(0, 2));
 }
 
-TEST_F(SinkVideo, MissingFoldersAreMade) {
+TEST_F(SinkVideo, MissingFoldersAreCreated) {
     run(sink({{"path", path("a/b/demo.mp4").string()}}), 0, 2);
     EXPECT_EQ(read_film(path("a/b/demo.mp4")).numbers(), numbers(0, 2));
 }

@@ -15,7 +15,7 @@ using namespace arhost::test;
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Mesa's and Xlib's caches, which live as long as the process, are no leaks of the sink.
+// Caches of Mesa and Xlib live as long as the process and are not leaks of the sink.
 extern "C" const char *__lsan_default_suppressions();
 extern "C" const char *__lsan_default_suppressions() {
     return "leak:libX11\nleak:libGL\nleak:_dri.so\nleak:libLLVM\nleak:libxcb\n";
@@ -23,7 +23,7 @@ extern "C" const char *__lsan_default_suppressions() {
 
 namespace {
 
-// Keeps the drivers loaded after the window is closed: the leak checker names only what is still there.
+// Keeps the drivers loaded after the window is closed: the leak checker can name only loaded libraries.
 void keep_libraries() {
     dl_iterate_phdr(
         [](dl_phdr_info *info, std::size_t, void *) {
@@ -35,7 +35,7 @@ void keep_libraries() {
 
 constexpr int screen_width = 640, screen_height = 480;
 
-// Where a pixel of the window lies in the frame, and what colour bilinear filtering gives it.
+// The bilinear sample of the frame at a pixel of the window.
 double sampled(const Picture &picture, double x, double y, int channel) {
     x = std::clamp(x, 0.0, picture.width() - 1.0);
     y = std::clamp(y, 0.0, picture.height() - 1.0);
@@ -47,7 +47,7 @@ double sampled(const Picture &picture, double x, double y, int channel) {
 }
 
 // The largest difference between a window and the frame that should fill [left, left + width) × … of it,
-// black elsewhere. The outermost pixels of the image are left out: there drivers' rounding differs.
+// black elsewhere. The border pixels of the image are skipped: rounding there depends on the driver.
 double worst_difference(const Screenshot &shot, const Picture &picture, int left, int top, int width, int height) {
     double worst = 0;
     for (int y = 0; y < shot.height; ++y)
@@ -79,7 +79,7 @@ protected:
         observer_.emplace(server_->name());
     }
     void TearDown() override {
-        sink_.reset(); // the clients first: Xlib ends the process of a client whose server is gone
+        sink_.reset(); // before the server: Xlib exits the process of a client that loses its server
         observer_.reset();
         server_.reset();
     }
@@ -100,7 +100,7 @@ protected:
         }
         return false;
     }
-    // The difference between the window and the frame in that part of it, once it is small, or at last.
+    // Waits until the window shows the frame in that part and returns the remaining difference.
     double difference(const Picture &picture, int left, int top, int width, int height) {
         double worst = 255;
         becomes(
@@ -123,7 +123,7 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
         ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_STATUS_OK) << sink.log();
         EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
     }
-    const Screenshot shot = observer_->screen(); // and it is on the screen, not in the window's memory alone
+    const Screenshot shot = observer_->screen(); // on the screen, not only in the window's memory
     const XWindowAttributes where = observer_->attributes();
     const Picture picture(320, 200, 300);
     for (int c = 0; c < 3; ++c)
@@ -131,7 +131,7 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
     EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
 }
 
-TEST_F(SinkWindow, TakesOddSizesAndPaddedRows) {
+TEST_F(SinkWindow, AcceptsOddSizesAndPaddedRows) {
     for (const auto &[width, height] : {std::pair{131, 97}, {130, 33}}) {
         SinkUnderTest &sink = start(width, height);
         const Picture picture(width, height, 9, 3 * width + 61);
@@ -148,7 +148,7 @@ TEST_F(SinkWindow, IsBlackUntilTheFirstFrame) {
     }));
 }
 
-TEST_F(SinkWindow, KeepsTheAspectWhenTheWindowIsResized) {
+TEST_F(SinkWindow, KeepsTheAspectRatioWhenResized) {
     SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
     ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
@@ -158,7 +158,7 @@ TEST_F(SinkWindow, KeepsTheAspectWhenTheWindowIsResized) {
     EXPECT_LE(difference(picture, 0, 140, 160, 120), 2);
 }
 
-TEST_F(SinkWindow, BeginsAtTheScaleThatIsAskedFor) {
+TEST_F(SinkWindow, StartsAtTheConfiguredScale) {
     SinkUnderTest &sink = start(160, 120, {{"scale", "2.5"}});
     const Picture picture(160, 120, 0);
     ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
@@ -195,7 +195,7 @@ TEST_F(SinkWindow, ClosingTheWindowEndsTheRun) {
     EXPECT_TRUE(becomes([&] { return sink.idle() == ARHOST_STATUS_END; }));
 }
 
-TEST_F(SinkWindow, FGoesToFullScreenAndBack) {
+TEST_F(SinkWindow, FTogglesFullScreen) {
     SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
     ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
@@ -213,7 +213,7 @@ TEST_F(SinkWindow, FGoesToFullScreenAndBack) {
     EXPECT_LE(difference(picture, 0, 0, 160, 120), 2);
 }
 
-TEST_F(SinkWindow, CanBeOpenedAgain) {
+TEST_F(SinkWindow, CanBeReopened) {
     for (int i = 0; i < 2; ++i) {
         SinkUnderTest &sink = start(160, 120);
         EXPECT_EQ(sink.write(0), ARHOST_STATUS_OK);
@@ -221,17 +221,17 @@ TEST_F(SinkWindow, CanBeOpenedAgain) {
     }
 }
 
-TEST(SinkWindowWithoutScreen, SaysWhatIsMissingAndWhatToTry) {
+TEST(SinkWindowWithoutScreen, NamesWhatIsMissingAndWhatToTry) {
     for (const char *display : {"", ":54321"}) {
         setenv("DISPLAY", display, 1);
         SinkUnderTest sink("sink_window", {});
         EXPECT_EQ(sink.start(160, 120), ARHOST_STATUS_ERROR_CONFIGURATION);
-        EXPECT_THAT(sink.log(), AllOf(HasSubstr("4 can't open a window: X11:"), HasSubstr("DISPLAY"),
+        EXPECT_THAT(sink.log(), AllOf(HasSubstr("4 cannot open a window: X11:"), HasSubstr("DISPLAY"),
                                       HasSubstr("xvfb-run -a"), HasSubstr("sink_video")));
     }
 }
 
-TEST(SinkWindowWithoutScreen, DeclaresThatItNeedsADisplayAndWantsTheNewestFrame) {
+TEST(SinkWindowWithoutScreen, DeclaresDisplayNeedsAndRealtimeCapability) {
     const SinkUnderTest sink("sink_window", {});
     EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_CAPABILITY_REALTIME_SINK});
     EXPECT_NE(sink.functions().idle, nullptr);

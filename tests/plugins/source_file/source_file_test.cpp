@@ -43,7 +43,7 @@ Bytes bytes_of(const cv::Mat &image) {
     return bytes;
 }
 
-// Runs ffmpeg in `folder`; the arguments have nothing in them that a shell minds.
+// Runs ffmpeg in `folder`; the arguments need no shell quoting.
 void ffmpeg(const fs::path &folder, const std::string &arguments) {
     const std::string command = "cd '" + folder.string() + "' && " ARHOST_FFMPEG " -nostdin -v error -y " + arguments;
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
@@ -86,7 +86,7 @@ std::string pattern_in(const ScratchFolder &folder) {
     return (folder.path() / "image_%04d.png").string();
 }
 
-// A status and a message at once, so that a test says both.
+// A status and a message, compared together.
 void expect_refusal(const std::map<std::string, std::string> &options, arhost_status status,
                     const std::vector<std::string> &words, arhost_source_setup setup = {}) {
     SourceUnderTest source("source_file");
@@ -129,7 +129,7 @@ const char *const h264 = "-c:v libx264 -preset veryfast -g 12 -bf 2 -pix_fmt yuv
 
 // ---- images ----
 
-TEST(ImageSequence, GivesARealSequenceByteForByteAsOpenCvReadsIt) {
+TEST(ImageSequence, MatchesOpenCvByteForByteOnARealSequence) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
     SourceUnderTest source("source_file");
     const fs::path folder = shared_data("markers/rbt_sequence");
@@ -152,7 +152,7 @@ TEST(ImageSequence, GivesARealSequenceByteForByteAsOpenCvReadsIt) {
     EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
 }
 
-TEST(ImageSequence, StartsAtTheLowestNumberOrWhereItIsTold) {
+TEST(ImageSequence, StartsAtTheLowestNumberOrTheOptionStart) {
     ScratchFolder folder;
     write_images(folder.path(), {1, 2, 3, 4});
     SourceUnderTest source("source_file");
@@ -164,7 +164,7 @@ TEST(ImageSequence, StartsAtTheLowestNumberOrWhereItIsTold) {
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 3)));
 }
 
-TEST(ImageSequence, EndsBeforeAMissingFileAndSaysSo) {
+TEST(ImageSequence, EndsBeforeAMissingFileWithAWarning) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 5});
     SourceUnderTest source("source_file");
@@ -174,7 +174,7 @@ TEST(ImageSequence, EndsBeforeAMissingFileAndSaysSo) {
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to number 5"));
 }
 
-TEST(ImageSequence, TakesTheRateAskedFor) {
+TEST(ImageSequence, UsesTheConfiguredRate) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2});
     SourceUnderTest source("source_file");
@@ -185,7 +185,7 @@ TEST(ImageSequence, TakesTheRateAskedFor) {
     EXPECT_EQ(source.read(2).info.capture_ns, 250'000'000);
 }
 
-TEST(ImageSequence, RefusesASizeThatChangesAndNamesTheFile) {
+TEST(ImageSequence, RefusesAChangedSizeAndNamesTheFile) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
     write_images(folder.path(), {2}, 50, 32);
@@ -197,7 +197,7 @@ TEST(ImageSequence, RefusesASizeThatChangesAndNamesTheFile) {
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0000.png' is 48×32"));
 }
 
-TEST(ImageSequence, KeepsTheFirstImagesChoiceOfGreyOrColour) {
+TEST(ImageSequence, FirstImageDeterminesGreyOrColour) {
     ScratchFolder folder;
     cv::Mat grey(32, 48, CV_8UC1, cv::Scalar(77));
     cv::imwrite((folder.path() / "image_0000.png").string(), grey);
@@ -210,7 +210,7 @@ TEST(ImageSequence, KeepsTheFirstImagesChoiceOfGreyOrColour) {
               bytes_of(cv::imread((folder.path() / "image_0001.png").string(), cv::IMREAD_GRAYSCALE)));
 }
 
-TEST(ImageSequence, NamesAnImageThatIsDamaged) {
+TEST(ImageSequence, NamesADamagedImage) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2});
     Bytes half = bytes_of(folder.path() / "image_0001.png");
@@ -220,12 +220,12 @@ TEST(ImageSequence, NamesAnImageThatIsDamaged) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' can't be read: it is damaged"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' cannot be read: damaged"));
     EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' can't be read: it is empty"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' cannot be read: the file is empty"));
 }
 
-TEST(ImageSequence, GivesAnyFrameAfterARestart) {
+TEST(ImageSequence, DeliversAnyFrameAfterARestart) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4});
     SourceUnderTest source("source_file");
@@ -256,9 +256,9 @@ TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
     EXPECT_EQ(source.read_all().size(), 3u);
 }
 
-TEST(SingleImage, IsGivenOnceOrAsOftenAsAskedFor) {
+TEST(SingleImage, IsDeliveredOnceOrFramesTimes) {
     ScratchFolder folder;
-    const fs::path file = folder.path() / "100%.png"; // an existing file is no pattern
+    const fs::path file = folder.path() / "100%.png"; // an existing file is not a numbered name
     cv::imwrite(file.string(), colourful(33, 21));
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_STATUS_OK) << source.log();
@@ -274,7 +274,7 @@ TEST(SingleImage, IsGivenOnceOrAsOftenAsAskedFor) {
     EXPECT_EQ(source.read(100'000).status, ARHOST_STATUS_OK);
 }
 
-TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
+TEST(SingleImage, ConvertsSixteenBitsToEightAndDropsAlpha) {
     ScratchFolder folder;
     SourceUnderTest source("source_file");
 
@@ -301,17 +301,17 @@ TEST(SingleImage, ScalesSixteenBitsDownAndDropsAlpha) {
     EXPECT_EQ(source.read(0).bytes, bytes_of(colour));
 }
 
-// ---- what can't be read ----
+// ---- unreadable input ----
 
-TEST(Refusal, NamesAFileThatIsNotThereAndWhatIs) {
+TEST(Refusal, NamesAMissingFileAndListsTheFolder) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
     expect_refusal({{"path", (folder.path() / "film.mp4").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"film.mp4' can't be opened", "image_0000.png"});
+                   {"film.mp4' cannot be opened", "image_0000.png"});
     expect_refusal({{"path", "/nowhere/film.mp4"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"'/nowhere/film.mp4'"});
 }
 
-TEST(Refusal, TellsWhatAPatternLookedForAndWhatTheFolderHas) {
+TEST(Refusal, NamesTheFirstNumberedFileAndListsTheFolder) {
     ScratchFolder folder;
     expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"no file matches", "looked for", "image_0000.png' first", "is empty"});
@@ -324,20 +324,20 @@ TEST(Refusal, TellsWhatAPatternLookedForAndWhatTheFolderHas) {
     expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"image_0000.png' first", "2 from number 3 to 4", "'start'"});
     expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"/nowhere/image_0.png", "can't be listed"});
+                   {"/nowhere/image_0.png", "cannot be listed"});
 }
 
-TEST(Refusal, AllowsNothingInAPatternButOneDecimalNumber) {
+TEST(Refusal, AllowsOneDecimalNumberInANumberedName) {
     for (const char *name : {"a_%s.png", "a_%n.png", "a_%4d.png", "a_%04x.png", "a_%00d.png", "a_%099d.png",
                              "a_%-4d.png", "a_%*d.png", "a_%ld.png", "a_%", "a_%04", "a_%1$d.png"})
         expect_refusal({{"path", std::string("/frames/") + name}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "is not allowed", "%04d"});
-    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"a second '%d'"});
-    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"no %d in its name"});
-    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"no %d in its name"});
+                       {name, "is not %d or %0Nd", "%05d"});
+    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"a second number, '%d'"});
+    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
+    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
 }
 
-TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
+TEST(Refusal, NumberedNamesMayHavePercentSignsAndVaryingDigits) {
     ScratchFolder folder;
     cv::imwrite((folder.path() / "50%_9.png").string(), colourful(8, 8, 9));
     cv::imwrite((folder.path() / "50%_10.png").string(), colourful(8, 8, 10));
@@ -347,15 +347,15 @@ TEST(Refusal, PatternsMayHaveAPercentSignAndAnyCountOfDigits) {
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(8, 8, 10)));
 }
 
-TEST(Refusal, TellsThatAFolderIsNone) {
+TEST(Refusal, ReportsAFolder) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
     expect_refusal({{"path", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"is a folder", "image_%04d.png", "image_0000.png"});
-    expect_refusal({{"path", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"is no file"});
+    expect_refusal({{"path", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"is not a regular file"});
 }
 
-TEST(Refusal, EmptyAndGarbageFilesAreOneMessageEach) {
+TEST(Refusal, ReportsEmptyAndInvalidFilesOnce) {
     ScratchFolder folder;
     Bytes garbage(20'000);
     std::uint32_t random = 1;
@@ -364,17 +364,17 @@ TEST(Refusal, EmptyAndGarbageFilesAreOneMessageEach) {
     for (const char *name : {"film.mp4", "film.avi", "film"}) {
         write_bytes(folder.path() / name, {});
         expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "can't be read"});
+                       {name, "cannot be read"});
         write_bytes(folder.path() / name, garbage);
         expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "can't be read"});
+                       {name, "cannot be read"});
     }
     write_bytes(folder.path() / "image.png", garbage);
     expect_refusal({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_IO,
-                   {"image.png' can't be read"});
+                   {"image.png' cannot be read"});
 }
 
-TEST(Refusal, NoPermissionIsToldAsSuch) {
+TEST(Refusal, ReportsMissingPermission) {
     ScratchFolder folder;
     const fs::path file = folder.path() / "film.mp4";
     write_bytes(file, {1, 2, 3});
@@ -386,7 +386,7 @@ TEST(Refusal, NoPermissionIsToldAsSuch) {
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
 }
 
-TEST(Refusal, AFileWithoutVideoIsTold) {
+TEST(Refusal, ReportsAFileWithoutVideo) {
     ARHOST_REQUIRE_FFMPEG();
     ScratchFolder folder;
     ffmpeg(folder.path(), "-f lavfi -i sine=duration=0.2 tone.wav");
@@ -394,7 +394,7 @@ TEST(Refusal, AFileWithoutVideoIsTold) {
                    {"tone.wav", "no video stream"});
 }
 
-TEST(Refusal, AnUnknownCodecIsTold) {
+TEST(Refusal, ReportsAnUnknownCodec) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.avi", "-c:v mpeg4");
     Bytes bytes = bytes_of(video.file());
@@ -405,7 +405,7 @@ TEST(Refusal, AnUnknownCodecIsTold) {
     expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.avi", "no decoder"});
 }
 
-TEST(Refusal, ACameraOfAnotherSizeIsTold) {
+TEST(Refusal, ReportsACameraOfAnotherSize) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
     arhost_intrinsics camera{};
@@ -420,7 +420,7 @@ TEST(Refusal, ACameraOfAnotherSizeIsTold) {
 
 // ---- videos ----
 
-TEST(Video, GivesPlanarYuvAsTheDecoderMadeIt) {
+TEST(Video, PassesPlanarYuvUnchanged) {
     ARHOST_REQUIRE_FFMPEG();
     struct Case {
         const char *name, *codec;
@@ -479,7 +479,7 @@ TEST(Video, GreyStaysGrey) {
         EXPECT_EQ(source.read(n).bytes, expected[n]);
 }
 
-TEST(Video, GreyOfLimitedRangeIsWidened) {
+TEST(Video, GreyOfLimitedRangeIsExpanded) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("grey.mkv", "-c:v ffv1 -pix_fmt gray -color_range tv", "64x48", 1);
     SourceUnderTest source("source_file");
@@ -491,7 +491,7 @@ TEST(Video, GreyOfLimitedRangeIsWidened) {
         ASSERT_NEAR(given[i], std::clamp((stored[i] - 16) * 255.0 / 219, 0.0, 255.0), 0.51);
 }
 
-TEST(Video, OddSizesAndOtherFormatsBecomeBgrOfTheRightColours) {
+TEST(Video, OddSizesAndOtherFormatsBecomeBgrWithCorrectColours) {
     ARHOST_REQUIRE_FFMPEG();
     struct Case {
         const char *name, *codec, *size;
@@ -531,8 +531,8 @@ TEST(Video, RgbIsLossless) {
         EXPECT_EQ(source.read(n).bytes, expected.at(n));
 }
 
-// As ffmpeg turns it, which is the reference for players.
-TEST(Video, IsTurnedAsItsMetadataAsks) {
+// The reference is ffmpeg's rotation.
+TEST(Video, AppliesTheRotationOfItsMetadata) {
     ARHOST_REQUIRE_FFMPEG();
     for (const char *codec : {"-c:v libx264 -pix_fmt yuv420p", "-c:v libx264rgb -qp 0 -pix_fmt rgb24"})
         for (const char *degrees : {"90", "180", "270"}) {
@@ -559,7 +559,7 @@ TEST(Video, IsTurnedAsItsMetadataAsks) {
         }
 }
 
-TEST(Video, EveryFrameIsTheSameAfterARestartThere) {
+TEST(Video, ARestartAtAnyFrameGivesTheSameFrames) {
     ARHOST_REQUIRE_FFMPEG();
     for (const char *codec :
          {h264, "-c:v libx264 -x264-params open-gop=1:keyint=10:bframes=3:b-pyramid=strict", "-c:v mpeg4 -bf 2"}) {
@@ -584,7 +584,7 @@ TEST(Video, EveryFrameIsTheSameAfterARestartThere) {
     }
 }
 
-TEST(Video, LoopsWithTimeThatGoesOn) {
+TEST(Video, TimeContinuesInALoop) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264, "96x64", 6);
     SourceUnderTest source("source_file");
@@ -606,7 +606,7 @@ TEST(Video, LoopsWithTimeThatGoesOn) {
     }
 }
 
-TEST(Video, KeepsTimesOfAVariableRateUnlessARateIsAskedFor) {
+TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
     SourceUnderTest source("source_file");
@@ -620,7 +620,7 @@ TEST(Video, KeepsTimesOfAVariableRateUnlessARateIsAskedFor) {
     EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
 }
 
-TEST(Video, OfOneFrameHasOneFrame) {
+TEST(Video, WithOneFrameDeliversOneFrame) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("one.mp4", h264, "96x64", 1);
     SourceUnderTest source("source_file");
@@ -631,7 +631,7 @@ TEST(Video, OfOneFrameHasOneFrame) {
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
-TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
+TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
     ARHOST_REQUIRE_FFMPEG();
     struct Case {
         const char *name, *codec;
@@ -652,7 +652,7 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
         ASSERT_LT(frames.size(), 38u);
         EXPECT_EQ(frames.back().status, ARHOST_STATUS_END_TRUNCATED);
         const std::size_t good = frames.size() - 1;
-        // The last few may have gaps between them: pictures that were stored after the cut.
+        // The last few may have gaps: pictures that are stored after the cut.
         for (std::size_t n = 0, same = 0; n < good; ++n, ++same) {
             while (whole.at(same).info.capture_ns < frames[n].info.capture_ns)
                 ++same;
@@ -660,12 +660,12 @@ TEST(Video, CutShortIsKeptSoFarAndToldAfterWhichFrame) {
         }
         EXPECT_THAT(
             source.log(ARHOST_SEVERITY_WARNING),
-            HasSubstr(std::string(c.name) + "' is cut short: it ends after frame " + std::to_string(good - 1)));
+            HasSubstr(std::string(c.name) + "' is truncated: it ends after frame " + std::to_string(good - 1)));
         EXPECT_EQ(source.read(good).status, ARHOST_STATUS_END_TRUNCATED);
     }
 }
 
-TEST(Video, InAviMayHaveFewerFramesThanItsHeaderHasSlots) {
+TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
     ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // its header says 80
@@ -677,16 +677,16 @@ TEST(Video, InAviMayHaveFewerFramesThanItsHeaderHasSlots) {
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
-TEST(Video, WithoutItsIndexSaysWhatIsMissing) {
+TEST(Video, WithoutIndexNamesWhatIsMissing) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264); // its index lies at the end
+    const VideoFile video("film.mp4", h264); // its index is at the end
     Bytes half = bytes_of(video.file());
     half.resize(half.size() / 2);
     write_bytes(video.file(), half);
     expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "moov atom not found"});
 }
 
-TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
+TEST(Video, DamagedInTheMiddleContinuesWithAWarningAndSeeksToTheSameBytes) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 40);
     Bytes bytes = bytes_of(video.file());
@@ -702,7 +702,7 @@ TEST(Video, DamagedInTheMiddleGoesOnWithAWarningAndSeeksToTheSameBytes) {
     EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
 }
 
-TEST(Video, RefusesASizeThatChanges) {
+TEST(Video, RefusesAChangedSize) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile small("a.ts", "-c:v libx264", "96x64", 10), large("b.ts", "-c:v libx264", "128x96", 10);
     Bytes both = bytes_of(small.file());
@@ -712,10 +712,10 @@ TEST(Video, RefusesASizeThatChanges) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(small.options()), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, those before it 96×64"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, earlier ones 96×64"));
 }
 
-TEST(Video, NoisyDecodersReachTheLogAsDebugAndNotStderr) {
+TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 20);
     Bytes bytes = bytes_of(video.file());
@@ -758,7 +758,7 @@ arhost_source_setup paced(double fps = 0) {
 
 } // namespace
 
-TEST(Paced, GivesNoFrameBeforeItsTime) {
+TEST(Paced, DeliversNoFrameEarly) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
     SourceUnderTest source("source_file");
@@ -776,7 +776,7 @@ TEST(Paced, GivesNoFrameBeforeItsTime) {
     }
 }
 
-TEST(Paced, SkipsWhatIsLateAndCountsIt) {
+TEST(Paced, SkipsAndCountsLateFrames) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264);
     SourceUnderTest source("source_file");
@@ -805,6 +805,6 @@ TEST(Paced, StopsWaitingWhenCancelled) {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         source.plugin().cancel();
     });
-    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // would be due after 20 s
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // due after 20 s
     canceller.join();
 }

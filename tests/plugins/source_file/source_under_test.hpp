@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Calls a source as arhost-worker would, and hands its frames out without the padding of their rows.
+// Drives a source like arhost-worker; frames are returned without row padding.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -25,7 +25,7 @@ public:
     explicit SourceUnderTest(const std::string &id) : plugin_(id), source_(plugin_.functions<arhost_source>()) {}
     ~SourceUnderTest() { stop(); }
 
-    // Creates and starts; the status of whichever failed first.
+    // Creates and starts; returns the first failure.
     arhost_status start(const std::map<std::string, std::string> &options, arhost_source_setup setup = {}) {
         stop();
         if (const arhost_status status = plugin_.create(options); status != ARHOST_STATUS_OK)
@@ -40,7 +40,7 @@ public:
         if (running_) {
             arhost_frame_format again = properties_.format;
             EXPECT_TRUE(arhost_frame_layout(&again));
-            EXPECT_EQ(again.byte_size, properties_.format.byte_size) << "the format was not laid out";
+            EXPECT_EQ(again.byte_size, properties_.format.byte_size) << "the format has no plane layout";
             buffer_.emplace(properties_.format.byte_size);
         }
         return status;
@@ -67,7 +67,7 @@ public:
         return frame;
     }
 
-    // Up to the first that is no ARHOST_STATUS_OK, which is the last in the list.
+    // Up to and including the first frame whose status is not ARHOST_STATUS_OK.
     std::vector<SourceFrame> read_all(std::uint64_t from = 0, std::size_t at_most = 1000) {
         std::vector<SourceFrame> frames;
         do
@@ -88,7 +88,7 @@ public:
     PluginUnderTest &plugin() { return plugin_; }
     std::string log() const { return plugin_.log(); }
 
-    // The messages of one severity, which is how tests tell warnings from debug chatter.
+    // The messages of one severity.
     std::string log(arhost_severity severity) const {
         std::string found, line;
         for (const char c : plugin_.log()) {

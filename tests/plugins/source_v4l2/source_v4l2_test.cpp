@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What needs no camera: the messages where there is none, and damaged pictures. vivid_test.cpp captures.
+// Tests without a camera: error messages and damaged pictures. vivid_test.cpp captures.
 #include "../source_file/source_under_test.hpp"
 
 #include "jpeg.hpp"
@@ -66,7 +66,7 @@ struct Decoded {
     }
 };
 
-// As the format of `like`, the stream's first picture.
+// Decodes with the format of `like`, the first picture of the stream.
 Decoded decode(const Bytes &jpeg, const Bytes &like) {
     JpegDecoder decoder;
     Decoded result;
@@ -100,30 +100,30 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 
 // ---- messages ----
 
-TEST(V4l2Refusal, NamesADeviceThatIsNotThereAndTheWayOut) {
+TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
     const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(text, HasSubstr("device: '/dev/video-none' does not exist"));
     if (fs::exists("/dev/video0")) {
         EXPECT_THAT(text, HasSubstr("/dev/video0"));
         EXPECT_THAT(text, HasSubstr("v4l2-ctl --list-devices"));
     } else {
-        EXPECT_THAT(text, HasSubstr("no /dev/video* at all"));
+        EXPECT_THAT(text, HasSubstr("there is no /dev/video*"));
         EXPECT_THAT(text, HasSubstr("source_synthetic"));
     }
 }
 
-TEST(V4l2Refusal, TellsThatADeviceIsNoVideoDevice) {
+TEST(V4l2Refusal, ReportsADeviceThatIsNotAVideoDevice) {
     EXPECT_THAT(refusal({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
-                HasSubstr("'/dev/null' is no video device"));
+                HasSubstr("'/dev/null' is not a video device"));
     ScratchFolder folder;
     std::ofstream(folder.path() / "file") << "text";
     EXPECT_THAT(refusal({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
-                HasSubstr("is no video device"));
+                HasSubstr("is not a video device"));
     EXPECT_THAT(refusal({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is a folder"));
 }
 
-TEST(V4l2Refusal, TellsWhichGroupMayOpenACamera) {
+TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
     ScratchFolder folder;
     std::ofstream(folder.path() / "video0") << "";
     fs::permissions(folder.path() / "video0", fs::perms::none);
@@ -136,11 +136,11 @@ TEST(V4l2Refusal, TellsWhichGroupMayOpenACamera) {
     EXPECT_THAT(text, HasSubstr("group 'video'"));
 }
 
-TEST(V4l2Refusal, WantsBothSidesOfASizeOrNeither) {
-    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("give both or neither"));
+TEST(V4l2Refusal, RequiresBothSidesOfASizeOrNeither) {
+    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
 }
 
-TEST(V4l2, DeclaresItsDevicesAndThatItIsLive) {
+TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
     SourceUnderTest source("source_v4l2");
     const arhost_descriptor &descriptor = source.plugin().descriptor();
     EXPECT_STREQ(descriptor.id, "source_v4l2");
@@ -152,14 +152,14 @@ TEST(V4l2, DeclaresItsDevicesAndThatItIsLive) {
 
 // ---- Motion-JPEG ----
 
-TEST(Jpeg, Of420BecomesI420WithoutAnyConversion) {
+TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
     const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
     ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_I420);
     EXPECT_EQ(frame.format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
     EXPECT_EQ(frame.format.yuv_range, ARHOST_YUV_RANGE_FULL);
-    // JFIF's formula, of the picture that was put in.
+    // The JFIF formula, applied to the original picture.
     const Bytes pixels = smooth_bgr(96, 64);
     for (std::size_t y = 0; y < 64; ++y)
         for (std::size_t x = 0; x < 96; ++x) {
@@ -170,7 +170,7 @@ TEST(Jpeg, Of420BecomesI420WithoutAnyConversion) {
         }
 }
 
-TEST(Jpeg, OfOtherSubsamplingsOrOddSizesBecomesBgr) {
+TEST(Jpeg, WithOtherSubsamplingsOrOddSizesBecomesBgr) {
     struct Case {
         int width, height, subsampling;
     };
@@ -188,7 +188,7 @@ TEST(Jpeg, OfOtherSubsamplingsOrOddSizesBecomesBgr) {
     }
 }
 
-TEST(Jpeg, OfGreyStaysGrey) {
+TEST(Jpeg, GreyStaysGrey) {
     const Bytes jpeg = make_jpeg(33, 21, TJSAMP_GRAY);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
@@ -201,7 +201,7 @@ TEST(Jpeg, OfGreyStaysGrey) {
         }
 }
 
-TEST(Jpeg, WithoutHuffmanTablesIsReadAsCamerasMeanIt) {
+TEST(Jpeg, WithoutHuffmanTablesUsesTheStandardTables) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_420), bare = without_segments(whole, 0xc4);
     ASSERT_LT(bare.size(), whole.size());
     const Decoded expected = decode(whole, whole), frame = decode(bare, whole);
@@ -211,7 +211,7 @@ TEST(Jpeg, WithoutHuffmanTablesIsReadAsCamerasMeanIt) {
             ASSERT_EQ(frame.at(0, x, y), expected.at(0, x, y));
 }
 
-TEST(Jpeg, WithPaddingBeforeOrAfterItsEndIsWhole) {
+TEST(Jpeg, WithPaddingAroundItsEndIsIntact) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_422);
     Bytes padded = whole;
     padded.insert(padded.end() - 2, 5, 0);
@@ -220,7 +220,7 @@ TEST(Jpeg, WithPaddingBeforeOrAfterItsEndIsWhole) {
     EXPECT_TRUE(frame.good) << frame.fault;
 }
 
-TEST(Jpeg, CutShortAnywhereIsDamaged) {
+TEST(Jpeg, TruncatedAnywhereIsDamaged) {
     for (const int subsampling : {TJSAMP_420, TJSAMP_422, TJSAMP_GRAY}) {
         const Bytes whole = make_jpeg(96, 64, subsampling);
         for (std::size_t size = 0; size < whole.size() - 2; size += size < 700 ? 1 : 37) {
@@ -232,15 +232,16 @@ TEST(Jpeg, CutShortAnywhereIsDamaged) {
     }
 }
 
-TEST(Jpeg, OfAnotherSizeOrSubsamplingThanTheFirstIsDamaged) {
+TEST(Jpeg, WithChangedSizeOrSubsamplingIsDamaged) {
     const Bytes first = make_jpeg(96, 64, TJSAMP_420);
     EXPECT_THAT(decode(make_jpeg(80, 64, TJSAMP_420), first).fault, HasSubstr("80×64"));
     EXPECT_THAT(decode(make_jpeg(192, 128, TJSAMP_420), first).fault, HasSubstr("192×128"));
     EXPECT_THAT(decode(make_jpeg(96, 64, TJSAMP_422), first).fault, HasSubstr("subsampling"));
-    EXPECT_TRUE(decode(make_jpeg(96, 64, TJSAMP_420), make_jpeg(96, 64, TJSAMP_422)).good) << "into BGR all go";
+    EXPECT_TRUE(decode(make_jpeg(96, 64, TJSAMP_420), make_jpeg(96, 64, TJSAMP_422)).good)
+        << "all of them convert to BGR";
 }
 
-TEST(Jpeg, GarbageIsNoPicture) {
+TEST(Jpeg, GarbageIsRejected) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_420);
     Bytes garbage(4000);
     std::minstd_rand random(7);
@@ -251,7 +252,7 @@ TEST(Jpeg, GarbageIsNoPicture) {
     EXPECT_FALSE(JpegDecoder().describe({}, format));
     EXPECT_FALSE(decode(garbage, whole).good);
     EXPECT_FALSE(decode({}, whole).good);
-    // Damage anywhere must stay inside the slot, whatever the decoder makes of it.
+    // The decoder must not write outside the slot, wherever the damage is.
     for (int round = 0; round < 300; ++round) {
         Bytes damaged = whole;
         for (int i = 0; i < 8; ++i)

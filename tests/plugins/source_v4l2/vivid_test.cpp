@@ -27,7 +27,7 @@ namespace {
 
 const char *const device = "/dev/video0";
 
-// vivid's own controls, by number: its header is not installed.
+// vivid's control ids; its header is not installed.
 enum : std::uint32_t {
     test_pattern = 0x00f0f000,     // 1: 100% colour bars
     osd_text_mode = 0x00f0f001,    // 2: no text over the picture
@@ -50,10 +50,10 @@ protected:
         v4l2_capability capability{};
         ASSERT_TRUE(fd_ >= 0 && ioctl(fd_, VIDIOC_QUERYCAP, &capability) == 0 &&
                     std::string(reinterpret_cast<const char *>(capability.driver)) == "vivid")
-            << device << " is not vivid's: run this program through tools/vm/run-in-vm";
+            << device << " is not vivid; run this program with tools/vm/run-in-vm";
         set(test_pattern, 1);
         set(osd_text_mode, 2);
-        // Its frames end when the next one begins, by its count: some 30 ms after it hands them out.
+        // vivid stamps the end of a frame: about 30 ms after it delivers it.
         set(timestamp_source, 1);
         set(colorspace, 2);
         set(quantization, 0);
@@ -116,7 +116,7 @@ std::size_t device_mappings() {
     return 0;
 }
 
-// What YUV of 8 bits shows, by the standard's formula.
+// 8-bit YUV to RGB by the formula of the standard.
 std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb, bool full) {
     const double luma = full ? y : (y - 16) * 255 / 219;
     const double scale = full ? 1 : 255.0 / 224;
@@ -127,7 +127,7 @@ std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb,
 
 } // namespace
 
-TEST_F(Vivid, GivesYuyvAtTheSizeAndRateAskedFor) {
+TEST_F(Vivid, DeliversYuyvAtTheConfiguredSizeAndRate) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_YUYV);
     EXPECT_EQ(source_.format().width, 320u);
@@ -138,7 +138,7 @@ TEST_F(Vivid, GivesYuyvAtTheSizeAndRateAskedFor) {
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
 }
 
-TEST_F(Vivid, ShowsItsColourBarsInTheRightColours) {
+TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
     struct Case {
         int colorspace, quantization;
         arhost_yuv_matrix matrix;
@@ -195,7 +195,7 @@ TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
     }
 }
 
-TEST_F(Vivid, GivesTheNewestFrameInLiveUseAndCountsTheOthers) {
+TEST_F(Vivid, LiveModeDeliversTheNewestFrameAndCountsTheOthers) {
     ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
@@ -203,20 +203,20 @@ TEST_F(Vivid, GivesTheNewestFrameInLiveUseAndCountsTheOthers) {
     const SourceFrame frame = source_.read(1);
     ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
     EXPECT_GE(frame.info.skipped, 2u) << "the driver had four buffers to fill";
-    // It had none left after that, but has them back now.
+    // The driver then ran out of buffers; now they are queued again.
     EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "all older frames were drained";
 }
 
-TEST_F(Vivid, GivesEveryFrameInOrderInLockstep) {
+TEST_F(Vivid, LockstepDeliversEveryFrameInOrder) {
     ASSERT_EQ(start(50, {}, false), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
     for (std::uint64_t n = 1; n < 4; ++n)
-        EXPECT_LT(source_.read(n).info.capture_ns, asked - 200'000'000) << "the oldest that the driver holds";
+        EXPECT_LT(source_.read(n).info.capture_ns, asked - 200'000'000) << "the oldest in the driver's queue";
 }
 
-TEST_F(Vivid, CountsWhatTheDriverDropped) {
+TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
     set(percentage_of_dropped_buffers, 50);
     ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
     std::uint64_t skipped = 0;
@@ -229,11 +229,11 @@ TEST_F(Vivid, CountsWhatTheDriverDropped) {
         last = frame.info.capture_ns;
     }
     EXPECT_GT(skipped, 5u);
-    // Frames given and frames lost make up the time that passed.
+    // Delivered and lost frames add up to the elapsed time.
     EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
 }
 
-TEST_F(Vivid, DropsAFrameThatTheDriverMarksAsDamaged) {
+TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_buffer_error, 1);
@@ -246,7 +246,7 @@ TEST_F(Vivid, DropsAFrameThatTheDriverMarksAsDamaged) {
     EXPECT_GE(skipped, 1u);
 }
 
-TEST_F(Vivid, GivesThreeHundredFramesAndLeaksNothing) {
+TEST_F(Vivid, DeliversThreeHundredFramesWithoutLeaks) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     source_.stop();
@@ -261,24 +261,24 @@ TEST_F(Vivid, GivesThreeHundredFramesAndLeaksNothing) {
         EXPECT_EQ(device_mappings(), 0u);
         EXPECT_EQ(open_files(), files);
     }
-#ifndef __SANITIZE_ADDRESS__ // that keeps freed memory for a while, and looks for leaks itself
+#ifndef __SANITIZE_ADDRESS__ // ASan delays freeing memory and has its own leak checker
     EXPECT_LT(resident_kib(), memory + 2048);
 #endif
 }
 
-TEST_F(Vivid, TakesTheBuffersAskedFor) {
+TEST_F(Vivid, UsesTheConfiguredNumberOfBuffers) {
     ASSERT_EQ(start(60, {{"buffers", "8"}}), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(device_mappings(), 8u);
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
 }
 
-TEST_F(Vivid, TakesTheDriversSizeWhereNoneIsAskedFor) {
+TEST_F(Vivid, UsesTheDriversSizeByDefault) {
     ASSERT_EQ(start(25, {{"width", "0"}, {"height", "0"}}), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     EXPECT_EQ(source_.format().width * 9, source_.format().height * 16);
 }
 
-TEST_F(Vivid, TakesTheCalibrationsSize) {
+TEST_F(Vivid, UsesTheSizeOfTheCalibration) {
     arhost_intrinsics camera{};
     camera.struct_size = sizeof camera;
     camera.width = 640;
@@ -291,28 +291,28 @@ TEST_F(Vivid, TakesTheCalibrationsSize) {
     EXPECT_EQ(source_.start({{"device", device}, {"width", "320"}, {"height", "180"}}, setup),
               ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
-                HasSubstr("320×180 is asked for, but the camera's calibration is for 640×480"));
+                HasSubstr("320×180 is configured, but the camera calibration is for 640×480"));
 }
 
-TEST_F(Vivid, RefusesASizeThatItDoesNotOfferAndNamesTheNearest) {
+TEST_F(Vivid, RefusesAnUnsupportedSizeAndNamesTheNearest) {
     EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has no size 650×470 in YUYV"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("the nearest are 640×480"));
 }
 
-TEST_F(Vivid, RefusesAFormatThatItDoesNotOfferAndListsThoseThatItDoes) {
+TEST_F(Vivid, RefusesAnUnsupportedFormatAndListsTheSupportedOnes) {
     EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("offers no mjpeg"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
 }
 
-TEST_F(Vivid, WarnsOfARateThatItCantReach) {
+TEST_F(Vivid, WarnsAboutAnUnreachableRate) {
     ASSERT_EQ(start(120), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.format().fps, 60.0);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("asked for"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("not the configured"));
 }
 
-TEST_F(Vivid, TellsThatAnotherProgramHasTheCamera) {
+TEST_F(Vivid, ReportsACameraInUse) {
     SourceUnderTest first("source_v4l2");
     ASSERT_EQ(first.start({{"device", device}}), ARHOST_STATUS_OK) << first.log();
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
@@ -321,7 +321,7 @@ TEST_F(Vivid, TellsThatAnotherProgramHasTheCamera) {
     EXPECT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
 }
 
-TEST_F(Vivid, ListsTheCamerasThereAreWhereTheNamedOneIsMissing) {
+TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
     EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
 }
@@ -340,7 +340,7 @@ TEST_F(Vivid, StopsWaitingWhenCancelled) {
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_ERROR), "");
 }
 
-TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
+TEST_F(Vivid, ReportsAnUnplugAndReconnects) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(disconnect, 1);
@@ -350,17 +350,17 @@ TEST_F(Vivid, TellsThatItWasUnpluggedAndComesBackAfterwards) {
         frame = source_.read(n);
     while (frame.status == ARHOST_STATUS_OK && ++n < 10);
     EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has gone away: was it unplugged?"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
     source_.stop();
     EXPECT_EQ(device_mappings(), 0u);
-    // vivid plugs itself in again once everyone has let go of it.
+    // vivid reconnects once all its users have closed it.
     close(fd_);
     fd_ = open(device, O_RDWR | O_CLOEXEC);
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
 }
 
-TEST_F(Vivid, TellsThatItsDriverGaveUp) {
+TEST_F(Vivid, ReportsAFatalDriverError) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_fatal_streaming_error, 1);
@@ -373,16 +373,16 @@ TEST_F(Vivid, TellsThatItsDriverGaveUp) {
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has stopped streaming"));
 }
 
-TEST_F(Vivid, ReportsFaultsOfTheDriverAtTheStart) {
+TEST_F(Vivid, ReportsDriverErrorsAtStart) {
     set(inject_reqbufs_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at reserving 4 buffers"));
     set(inject_qbuf_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at handing a buffer"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at queueing a buffer"));
     set(inject_streamon_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at starting to stream"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at starting the stream"));
     EXPECT_EQ(device_mappings(), 0u);
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Paths in messages.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace arhost {
+
+std::string quoted(const std::filesystem::path &path); // 'path'
+
+// "the folder '/x/frames' has 3 entries: a.png, b.png, c.png".
+std::string describe_folder(const std::filesystem::path &folder);
+
+} // namespace arhost
