@@ -17,7 +17,7 @@ namespace arhost::scene {
 namespace {
 
 constexpr float extinction_limit = 1e6f;
-// Of lengths, sums of weights and the bounds' fit: what float arithmetic may lose.
+// Rounding tolerance of lengths, weight sums and bounds.
 constexpr float tolerance = 1e-3f;
 
 struct Fault {
@@ -45,8 +45,8 @@ void check_floats(std::span<const float> values, float low, float high, const st
             fault(what + " is " + number(value) + ", outside " + number(low) + " to " + number(high));
 }
 
-// A float with its sign cleared orders like the integer of its bits; infinities and NaN come last. This
-// loop is all integers, so it runs at the speed of memory.
+// A float with a cleared sign bit compares like the integer of its bits; infinity and NaN are largest. The integer
+// loop is limited by memory bandwidth only.
 bool all_within_limit(std::span<const float> values) {
     const std::int32_t limit = std::bit_cast<std::int32_t>(coordinate_limit_mm);
     std::int32_t outside = 0;
@@ -55,7 +55,7 @@ bool all_within_limit(std::span<const float> values) {
     return !outside;
 }
 
-// Likewise for 0 to 1e6: a float below 0 has the sign bit, which makes it the largest of integers.
+// Likewise for 0 to 1e6: the sign bit of a negative float makes it the largest unsigned integer.
 bool all_radiances(std::span<const float> values) {
     std::uint32_t highest = 0;
     for (const float value : values)
@@ -115,7 +115,7 @@ public:
 private:
     void check_header() {
         if (reinterpret_cast<std::uintptr_t>(arena_.data()) % arena_alignment != 0)
-            fault("it does not lie at a multiple of 64 bytes in memory");
+            fault("it is not aligned to 64 bytes in memory");
         if (arena_.size() < sizeof(arhost_scene))
             fault("it is too short for its header");
         scene_ = reinterpret_cast<const arhost_scene *>(arena_.data());
@@ -127,12 +127,12 @@ private:
         if (scene_->struct_size != sizeof(arhost_scene))
             fault("its header has the wrong size");
         if (scene_->byte_size < sizeof(arhost_scene) || scene_->byte_size > arena_.size())
-            fault("its header says that it has " + std::to_string(scene_->byte_size) + " bytes, but " +
-                  std::to_string(arena_.size()) + " are there");
+            fault("its header states " + std::to_string(scene_->byte_size) + " bytes, but the arena has " +
+                  std::to_string(arena_.size()));
         arena_ = arena_.first(scene_->byte_size);
-        unclaimed_ = scene_->byte_size - sizeof(arhost_scene);
+        unused_bytes_ = scene_->byte_size - sizeof(arhost_scene);
         if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
-            fault("its axes are of no known kind");
+            fault("its axes are unknown");
         if (scene_->max_depth > max_depth_limit)
             fault("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
                   std::to_string(max_depth_limit));
@@ -145,40 +145,40 @@ private:
         check_floats(scene_->bounds_max, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_max");
     }
 
-    // The elements of a buffer, once it is known that they and the spare bytes lie in the arena. No byte
-    // may belong to two buffers: else a small arena could name one large buffer a million times.
+    // The elements of a buffer, after checking that they and the spare bytes lie in the arena. The sizes of all
+    // buffers may not exceed the arena's: else a small arena could refer to one large buffer a million times.
     template <class T> std::span<const T> view(const arhost_buffer &buffer, const std::string &what) {
         if (buffer.count == 0) {
             if (buffer.offset != 0 || buffer.stride != 0)
-                fault(what + " is absent, yet its offset and stride are not 0");
+                fault(what + " is absent, but its offset or stride is not 0");
             return {};
         }
         if (buffer.stride != sizeof(T))
             fault(what + " has a stride of " + std::to_string(buffer.stride) + " bytes, not " +
                   std::to_string(sizeof(T)));
         if (buffer.offset % arena_alignment != 0)
-            fault(what + " does not begin at a multiple of 64 bytes");
+            fault(what + " is not aligned to 64 bytes");
         if (buffer.offset < sizeof(arhost_scene))
-            fault(what + " lies over the header");
+            fault(what + " overlaps the header");
         const std::uint64_t needed = std::uint64_t(buffer.count) * sizeof(T) + arena_spare_bytes; // < 2^32 · 2^7
         if (buffer.offset > arena_.size() || needed > arena_.size() - buffer.offset)
-            fault(what + " reaches past the end of the scene");
-        if (needed > unclaimed_)
-            fault(what + " shares bytes with other buffers");
-        unclaimed_ -= needed;
+            fault(what + " extends past the end of the scene");
+        if (needed > unused_bytes_)
+            fault(what + " overlaps other buffers");
+        unused_bytes_ -= needed;
         return {reinterpret_cast<const T *>(arena_.data() + buffer.offset), buffer.count};
     }
 
     void check_names() {
         if (!names_.empty() && names_.back() != '\0')
-            fault("the last name has no end");
+            fault("the last name is not terminated");
         for (const char c : names_)
             if (c != '\0' && (static_cast<unsigned char>(c) < 0x20 || c == 0x7f))
-                fault("a name holds a control character");
+                fault("a name contains a control character");
     }
 
     std::string name_of(std::size_t object) const {
-        constexpr std::size_t shown = 64; // a million objects may share one name of a gigabyte
+        constexpr std::size_t shown = 64; // a million objects could share a name of one gigabyte
         const char *name = names_.data() + objects_[object].name;
         return "object " + std::to_string(object) + " '" + std::string(name, strnlen(name, shown)) + "'";
     }
@@ -200,7 +200,7 @@ private:
             if (texture != ARHOST_NONE && geometries_[object.geometry].texcoords.count == 0)
                 fault(name_of(i) + " has a textured material, but its geometry has no texcoords");
         if (object.role < ARHOST_ROLE_VIRTUAL || object.role > ARHOST_ROLE_OCCLUDER)
-            fault(name_of(i) + " has a role of no known kind");
+            fault(name_of(i) + " has an unknown role");
         const float *m = object.world_from_object;
         check_floats(object.world_from_object, -coordinate_limit_mm, coordinate_limit_mm,
                      name_of(i) + ": a number of world_from_object");
@@ -233,7 +233,7 @@ private:
         return true;
     }
 
-    // Which object deforms a geometry; no other may have it.
+    // Finds the object that deforms each geometry; no other object may use it.
     void check_deforming() {
         deformers_.assign(geometries_.size(), ARHOST_NONE);
         std::vector<std::uint32_t> uses(geometries_.size(), 0);
@@ -245,17 +245,17 @@ private:
         for (std::size_t i = 0; i < geometries_.size(); ++i)
             if (deformers_[i] != ARHOST_NONE && uses[i] > 1)
                 fault(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
-                      ", which another object has too");
+                      ", which another object uses too");
     }
 
     void check_texture(std::size_t i) {
         const arhost_texture &texture = textures_[i];
         const std::string what = "texture " + std::to_string(i) + ": ";
         if (texture.format < ARHOST_TEXEL_SRGB8 || texture.format > ARHOST_TEXEL_RGBA32F)
-            fault(what + "its format is of no known kind");
+            fault(what + "its format is unknown");
         for (const arhost_wrap wrap : {texture.wrap_u, texture.wrap_v})
             if (wrap < ARHOST_WRAP_REPEAT || wrap > ARHOST_WRAP_MIRROR)
-                fault(what + "its wrapping is of no known kind");
+                fault(what + "its wrap mode is unknown");
         if (texture.name >= names_.size())
             fault(what + "its name lies outside the names");
         if (texture.width - 1 >= texture_side_limit || texture.height - 1 >= texture_side_limit)
@@ -280,7 +280,7 @@ private:
         const auto columns = view<float>(environment.columns, "the environment's columns");
         if (environment.texture == ARHOST_NONE) {
             if (!rows.empty() || !columns.empty())
-                fault("there is no environment, yet it has rows or columns");
+                fault("there is no environment, but it has rows or columns");
             return;
         }
         if (environment.texture >= textures_.size())
@@ -288,7 +288,7 @@ private:
                   std::to_string(textures_.size()));
         const arhost_texture &texture = textures_[environment.texture];
         if (texture.format != ARHOST_TEXEL_RGBA32F)
-            fault("the environment's texture is not of floats");
+            fault("the environment's texture is not RGBA32F");
         check_floats({&environment.intensity, 1}, 0, radiance_limit, "the environment's intensity");
         const float *m = environment.environment_from_world;
         check_floats(environment.environment_from_world, -1 - tolerance, 1 + tolerance,
@@ -307,20 +307,20 @@ private:
     }
 
     static void check_cumulative(std::span<const float> sums, const char *what) {
-        bool rises = sums.front() >= 0;
+        bool ascending = sums.front() >= 0;
         for (std::size_t i = 1; i < sums.size(); ++i)
-            rises &= sums[i] >= sums[i - 1];
-        if (!rises)
+            ascending &= sums[i] >= sums[i - 1];
+        if (!ascending)
             fault(std::string(what) + " are not cumulative sums");
         if (!within(sums.back(), 1 - tolerance, 1 + tolerance))
-            fault(std::string(what) + " end with " + number(sums.back()) + ", not with 1");
+            fault(std::string(what) + " end at " + number(sums.back()) + ", not at 1");
     }
 
     void check_node(std::size_t i) {
         const arhost_node &node = nodes_[i];
         const std::string what = "node " + std::to_string(i) + ": ";
         if (node.parent != ARHOST_NONE && node.parent >= i)
-            fault(what + "its parent " + std::to_string(node.parent) + " does not come before it");
+            fault(what + "its parent " + std::to_string(node.parent) + " does not precede it");
         check_floats(node.parent_from_node, -coordinate_limit_mm, coordinate_limit_mm, what + "parent_from_node");
         check_floats(node.translation, -coordinate_limit_mm, coordinate_limit_mm, what + "translation");
         check_floats(node.rotation, -1 - tolerance, 1 + tolerance, what + "rotation");
@@ -338,9 +338,9 @@ private:
             fault(what + "it has node " + std::to_string(channel.node) + ", but there are " +
                   std::to_string(nodes_.size()));
         if (channel.target < ARHOST_CHANNEL_TRANSLATION || channel.target > ARHOST_CHANNEL_MORPH_WEIGHTS)
-            fault(what + "its target is of no known kind");
+            fault(what + "its target is unknown");
         if (channel.interpolation < ARHOST_INTERPOLATION_STEP || channel.interpolation > ARHOST_INTERPOLATION_CUBIC)
-            fault(what + "its interpolation is of no known kind");
+            fault(what + "its interpolation is unknown");
         if (channel.reserved != 0)
             fault(what + "a reserved field is not 0");
         const bool weights = channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS;
@@ -353,7 +353,7 @@ private:
         check_floats(times, 0, duration_limit_s, what + "a time");
         for (std::size_t t = 1; t < times.size(); ++t)
             if (!(times[t] > times[t - 1]))
-                fault(what + "its times don't ascend");
+                fault(what + "its times are not strictly increasing");
         const std::uint64_t width = weights ? nodes_[channel.node].morph_weights.count
                                     : channel.target == ARHOST_CHANNEL_ROTATION ? 4
                                                                                 : 3;
@@ -386,7 +386,7 @@ private:
         const arhost_material &material = materials_[i];
         const std::string what = "material " + std::to_string(i) + ": ";
         if (material.model < ARHOST_MATERIAL_DIFFUSE || material.model > ARHOST_MATERIAL_METALLIC_ROUGHNESS)
-            fault(what + "its model is of no known kind");
+            fault(what + "its model is unknown");
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && texture >= textures_.size())
@@ -416,9 +416,9 @@ private:
         const arhost_light &light = lights_[i];
         const std::string what = "light " + std::to_string(i) + ": ";
         if (light.type < ARHOST_LIGHT_POINT || light.type > ARHOST_LIGHT_SPHERE)
-            fault(what + "its type is of no known kind");
+            fault(what + "its type is unknown");
         if (light.falloff != ARHOST_FALLOFF_NONE && light.falloff != ARHOST_FALLOFF_INVERSE_SQUARE)
-            fault(what + "its falloff is of no known kind");
+            fault(what + "its falloff is unknown");
         check_floats(light.position, -coordinate_limit_mm, coordinate_limit_mm, what + "position");
         check_floats(light.intensity, 0, std::numeric_limits<float>::max(), what + "intensity");
         const auto length_of = [](const float(&v)[3]) { return glm::length(glm::dvec3(v[0], v[1], v[2])); };
@@ -432,7 +432,7 @@ private:
         check_floats({&light.cosine_outer, 1}, -1, 1, what + "cosine_outer");
         check_floats({&light.cosine_inner, 1}, light.cosine_outer, 1, what + "cosine_inner");
         if (light.type == ARHOST_LIGHT_DIRECTIONAL && light.falloff != ARHOST_FALLOFF_NONE)
-            fault(what + "light from infinitely far can't fall off");
+            fault(what + "a directional light can't have a falloff");
     }
 
     // "geometry 3 (object 1 'bunny')"
@@ -456,14 +456,14 @@ private:
             case ARHOST_GEOMETRY_SPHERES:
                 return check_spheres(geometry);
             default:
-                fault("its type is of no known kind");
+                fault("its type is unknown");
             }
         } catch (const Fault &inner) {
             fault(geometry_name(i) + ": " + inner.text);
         }
     }
 
-    // Joints and morph targets are there where an object uses them, and only there.
+    // Joints and morph targets must be present exactly if an object uses them.
     void check_deformation(const arhost_geometry &geometry, std::size_t i) {
         const std::uint64_t vertices = geometry.positions.count;
         const auto joints = view<glm::u16vec4>(geometry.joints, "the buffer of joints");
@@ -498,7 +498,7 @@ private:
                       std::to_string(joint_count));
             const glm::vec4 &w = weights[v];
             if (!(std::min({w.x, w.y, w.z, w.w}) >= 0 && within(w.x + w.y + w.z + w.w, 1 - tolerance, 1 + tolerance)))
-                fault("vertex " + std::to_string(v) + " has weights below 0, or of a sum other than 1");
+                fault("vertex " + std::to_string(v) + " has negative weights, or weights whose sum is not 1");
         }
     }
 
@@ -562,7 +562,7 @@ private:
         for (const arhost_buffer &other : {geometry.normals, geometry.texcoords, geometry.indices, geometry.joints,
                                            geometry.weights, geometry.morph_positions, geometry.morph_normals})
             if (other.count != 0 || other.offset != 0 || other.stride != 0)
-                fault("spheres have no normals, texcoords or indices, nor do they deform");
+                fault("spheres can't have normals, texcoords, indices or deformation");
         if (spheres.empty())
             fault("it has no spheres");
         check_coordinates(floats_of(spheres), 4, "sphere");
@@ -577,12 +577,12 @@ private:
         const glm::vec3 high(scene_->bounds_max[0], scene_->bounds_max[1], scene_->bounds_max[2]);
         if (!(low.x <= high.x && low.y <= high.y && low.z <= high.z))
             fault("bounds_min is above bounds_max");
-        const glm::vec3 slack = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
+        const glm::vec3 margin = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
         for (std::size_t i = 0; i < objects_.size(); ++i) {
-            if (objects_[i].deforms) // where it is then, only its motion tells
+            if (objects_[i].deforms) // its extent depends on its motion
                 continue;
             const Box box = transformed(objects_[i].world_from_object, boxes[objects_[i].geometry]);
-            const glm::vec3 below = low - box.min - slack, above = box.max - high - slack;
+            const glm::vec3 below = low - box.min - margin, above = box.max - high - margin;
             if (!(std::max({below.x, below.y, below.z, above.x, above.y, above.z}) <= 0))
                 fault(name_of(i) + " lies outside the scene's bounds");
         }
@@ -590,7 +590,7 @@ private:
 
     std::span<const std::byte> arena_;
     const arhost_scene *scene_ = nullptr;
-    std::uint64_t unclaimed_ = 0; // bytes that no buffer has claimed yet
+    std::uint64_t unused_bytes_ = 0; // bytes not used by any buffer yet
     std::span<const arhost_geometry> geometries_;
     std::span<const arhost_texture> textures_;
     std::span<const arhost_material> materials_;
@@ -600,7 +600,7 @@ private:
     std::span<const arhost_channel> channels_;
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
-    std::vector<std::uint32_t> deformers_; // of each geometry: an object or ARHOST_NONE
+    std::vector<std::uint32_t> deformers_; // per geometry: object index or ARHOST_NONE
 };
 
 } // namespace

@@ -7,6 +7,7 @@
 
 #include "scene/gltf.hpp"
 #include "scene/loader.hpp"
+#include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
 
 #include <stdexcept>
