@@ -76,14 +76,14 @@ std::string_view json_of(const MeshFile &text) {
 // Checks that tinygltf lacks: out-of-bounds reads and unbounded recursion.
 void check_structure(const MeshFile &text) {
     using Json = nlohmann::json;
-    const auto refuse_depth = [&](int depth, Json::parse_event_t, Json &) {
+    const auto check_depth = [&](int depth, Json::parse_event_t, Json &) {
         constexpr int max_depth = 64;
         if (depth > max_depth)
             text.fail("is nested more than 64 deep");
         return true;
     };
     const std::string_view json = json_of(text);
-    const Json root = Json::parse(json.begin(), json.end(), refuse_depth, false); // tinygltf reports invalid JSON
+    const Json root = Json::parse(json.begin(), json.end(), check_depth, false); // tinygltf reports invalid JSON
     if (!root.is_object())
         return;
     const auto list = [&](const char *key) {

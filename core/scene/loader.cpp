@@ -53,17 +53,17 @@ double linear_from_srgb(double encoded) {
 
 // "#rrggbb" in sRGB; a number, or a list of three, in linear light.
 glm::vec3 colour_of(const Node &node, double maximum = 1) {
-    const std::string wrong = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
+    const std::string requirement = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
                               std::string(maximum == 1 ? "1)" : "1e6)");
     if (!node.is_scalar() && !node.is_sequence())
-        node.fail(wrong);
+        node.fail(requirement);
     glm::dvec3 colour;
     if (node.is_scalar() && node.text().starts_with('#')) {
         const std::string text = node.text();
         unsigned value = 0;
         const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
         if (text.size() != 7 || error != std::errc() || end != text.data() + 7)
-            node.fail(wrong + ", is '" + text + "'");
+            node.fail(requirement + ", is '" + text + "'");
         for (int i = 0; i < 3; ++i)
             colour[i] = linear_from_srgb((value >> (16 - 8 * i) & 0xff) / 255.0);
     } else {
@@ -71,7 +71,7 @@ glm::vec3 colour_of(const Node &node, double maximum = 1) {
     }
     for (int i = 0; i < 3; ++i)
         if (colour[i] < 0 || colour[i] > maximum)
-            node.fail(wrong);
+            node.fail(requirement);
     return colour;
 }
 

@@ -215,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"BoundsInverted", [](Arena &a) { header(a).bounds_min[0] = 11; },
                    "bounds_min is above bounds_max"},
         Corruption{"BoundsTooSmall", [](Arena &a) { header(a).bounds_max[2] = 20; },
-                   "object 1 'ball' lies outside the scene's bounds"},
+                   "object 1 'ball' is outside the scene's bounds"},
         Corruption{"GeometryTableStride", [](Arena &a) { header(a).geometries.stride = 8; },
                    "the table of geometries has a stride of 8 bytes"},
         Corruption{"MaterialTableCount", [](Arena &a) { header(a).materials.count = 0xffffffff; },
@@ -225,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"LightTableOffsetHuge", [](Arena &a) { header(a).lights.offset = ~0ull & ~63ull; },
                    "the table of lights extends past the end"},
         Corruption{"NamesOverHeader", [](Arena &a) { header(a).names.offset = 64; },
-                   "the names overlaps the header"},
+                   "the table of names overlaps the header"},
         Corruption{"NamesNotTerminated",
                    [](Arena &a) { elements<char>(a, header(a).names)[header(a).names.count - 1] = 'x'; },
                    "the last name is not terminated"},
@@ -237,7 +237,7 @@ INSTANTIATE_TEST_SUITE_P(
                    },
                    "is absent, but"},
         Corruption{"ObjectName", [](Arena &a) { objects(a)[1].name = header(a).names.count; },
-                   "name of object 1 lies outside"},
+                   "name of object 1 is outside"},
         Corruption{"ObjectGeometry", [](Arena &a) { objects(a)[0].geometry = 2; },
                    "object 0 'square' has geometry 2, but there are 2"},
         Corruption{"ObjectMaterial", [](Arena &a) { objects(a)[1].material = ARHOST_NONE; },
@@ -334,7 +334,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"NoSpheres", [](Arena &a) { geometries(a)[1].positions = {}; }, "it has no spheres"}),
     [](const auto &info) { return std::string(info.param.field); });
 
-TEST(Validate, AsksForSixteenReadableBytesBehindTheLastBuffer) {
+TEST(Validate, RequiresSixteenReadableBytesAfterTheLastBuffer) {
     Arena arena = small_scene().build();
     const arhost_buffer &last = header(arena).geometries;
     const std::uint64_t end = last.offset + std::uint64_t(last.count) * last.stride;
@@ -397,7 +397,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "texture 0: the buffer of texels has a stride of 4 bytes, not 16"},
         Corruption{"WrapU", [](Arena &a) { textures(a)[0].wrap_u = 0; }, "its wrap mode is unknown"},
         Corruption{"WrapV", [](Arena &a) { textures(a)[1].wrap_v = 4; }, "texture 1: its wrap mode"},
-        Corruption{"Name", [](Arena &a) { textures(a)[1].name = header(a).names.count; }, "outside the names"},
+        Corruption{"Name", [](Arena &a) { textures(a)[1].name = header(a).names.count; }, "outside the table of names"},
         Corruption{"Width", [](Arena &a) { textures(a)[0].width = 0; }, "has 0 x 3 texels, outside 1 to 16384"},
         Corruption{"Height", [](Arena &a) { textures(a)[0].height = 16385; }, "2 x 16385 texels"},
         Corruption{"TexelCount", [](Arena &a) { textures(a)[0].height = 2; }, "has 6 texels for 2 x 2"},

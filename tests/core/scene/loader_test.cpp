@@ -275,15 +275,15 @@ TEST(Shapes, PlanesFaceAlongTheirNormal) {
     expect_near(facing(ceiling, 0), {0, 0, -1});
 }
 
-TEST(Shapes, PlanesLieFlatWhereverUpIs) {
+TEST(Shapes, PlanesAreHorizontalByDefault) {
     const Arena arena = load("version: 1\naxes: y-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
                              "  - {plane: {size: [4, 2]}, material: a}\n");
     expect_near(facing(arena, 0), {0, 1, 0});
     EXPECT_THAT(arena.scene().bounds_min, ElementsAre(-2, 0, -1));
 }
 
-// Seen from outside, a face's texture stands upright: right is where u grows, up where v falls.
-TEST(Shapes, FacesShowTheirTextureWholeAndUpright) {
+// Seen from outside, each face's texture is upright: u increases to the right, v decreases upwards.
+TEST(Shapes, FacesShowTheWholeTextureUpright) {
     for (const std::string axes : {"z-up", "y-up"}) {
         const Arena arena = load("version: 1\naxes: " + axes + "\nmaterials: {a: {model: mirror}}\nobjects:\n" +
                                  "  - {cuboid: {size: [2, 4, 6]}, material: a}\n");
@@ -320,14 +320,14 @@ TEST(Transforms, AreAppliedInOrder) {
 }
 
 TEST(Transforms, RotateRightHanded) {
-    const auto turned = [](const std::string &axis) {
+    const auto rotated = [](const std::string &axis) {
         return load_object("sphere: {centre: [1, 2, 3], radius: 1}",
                            ", transform: [{rotate: {axis: " + axis + ", degrees: 90}}]");
     };
-    expect_near(glm::vec3(sphere(turned("[1, 0, 0]"))), {1, -3, 2});
-    expect_near(glm::vec3(sphere(turned("[0, 1, 0]"))), {3, 2, -1});
-    expect_near(glm::vec3(sphere(turned("[0, 0, 1]"))), {-2, 1, 3});
-    expect_near(glm::vec3(sphere(turned("[1, 1, 1]"))), {2.5773503f, 0.8452995f, 2.5773503f});
+    expect_near(glm::vec3(sphere(rotated("[1, 0, 0]"))), {1, -3, 2});
+    expect_near(glm::vec3(sphere(rotated("[0, 1, 0]"))), {3, 2, -1});
+    expect_near(glm::vec3(sphere(rotated("[0, 0, 1]"))), {-2, 1, 3});
+    expect_near(glm::vec3(sphere(rotated("[1, 1, 1]"))), {2.5773503f, 0.8452995f, 2.5773503f});
 }
 
 TEST(Transforms, TransformNormalsByTheInverseTranspose) {

@@ -59,8 +59,8 @@ TEST(Yaml, RejectsASecondDocument) {
                 HasSubstr("a.yaml:2:1: YAML syntax: a second document starts here; keep one"));
     // Content after the end of a document.
     EXPECT_THAT(error_of([] { Node::parse("[1, 2], 3\n", "a.yaml"); }),
-                HasSubstr("a.yaml:1:7: YAML syntax: another"));
-    EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: YAML syntax: another"));
+                HasSubstr("a.yaml:1:7: YAML syntax: a second"));
+    EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: YAML syntax: a second"));
 }
 
 // yaml-cpp accepts the end of the text as the closing quote, which would swallow the keys in between.
