@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/loader.hpp"
 
+#include "scene/box.hpp"
 #include "scene/gltf.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/shapes.hpp"
@@ -54,7 +55,7 @@ double linear_from_srgb(double encoded) {
 // "#rrggbb" in sRGB; a number, or a list of three, in linear light.
 glm::vec3 colour_of(const Node &node, double maximum = 1) {
     const std::string requirement = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
-                              std::string(maximum == 1 ? "1)" : "1e6)");
+                                    std::string(maximum == 1 ? "1)" : "1e6)");
     if (!node.is_scalar() && !node.is_sequence())
         node.fail(requirement);
     glm::dvec3 colour;
@@ -456,14 +457,18 @@ glm::dvec3 centre_of(const Node &shape) {
     return centre ? position_of(*centre) : glm::dvec3(0);
 }
 
-TriangleMesh cuboid_of(const Node &shape, arhost_axes axes) {
-    shape.allow_keys({"size", "centre"});
-    const Node size_node = shape.require("size");
-    const glm::dvec3 size = number_or_vector(size_node);
+// The sides of a box.
+glm::dvec3 size_of(const Node &node) {
+    const glm::dvec3 size = number_or_vector(node);
     for (int i = 0; i < 3; ++i)
         if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
-            size_node.fail("each side must be 1e-6 to 1e9 mm");
-    return cuboid(centre_of(shape), up_of(axes), size);
+            node.fail("each side must be 1e-6 to 1e9 mm");
+    return size;
+}
+
+TriangleMesh cuboid_of(const Node &shape, arhost_axes axes) {
+    shape.allow_keys({"size", "centre"});
+    return cuboid(centre_of(shape), up_of(axes), size_of(shape.require("size")));
 }
 
 TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
@@ -475,13 +480,8 @@ TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
             size_node.fail("each side must be 1e-6 to 1e9 mm");
     const glm::dvec3 up = up_of(axes);
     glm::dvec3 normal = up;
-    if (const auto node = shape.find("normal")) {
-        normal = vector_of(*node);
-        const double length = glm::length(normal);
-        if (!(length > 1e-9 && length < 1e9))
-            node->fail("must have a length between 1e-9 and 1e9");
-        normal /= length;
-    }
+    if (const auto node = shape.find("normal"))
+        normal = direction_of(*node);
     return rectangle(centre_of(shape), normal, up, {size[0], size[1]});
 }
 
@@ -503,13 +503,10 @@ template <class Points> void check_extent(const Node &shape, const Points &point
 }
 
 std::string extent_of(const TriangleMesh &mesh) {
-    glm::vec3 low = mesh.positions.front(), high = low;
-    for (const glm::vec3 &p : mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
+    const Box box = box_of(std::span<const glm::vec3>(mesh.positions));
+    const glm::vec3 size = box.max - box.min;
     char text[96];
-    std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", high.x - low.x, high.y - low.y, high.z - low.z);
+    std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", size.x, size.y, size.z);
     return text;
 }
 
@@ -517,12 +514,7 @@ std::string extent_of(const TriangleMesh &mesh) {
 TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
     node.allow_keys({"faces", "size"});
     const std::int64_t faces = node.require("faces").integer(stand_in_faces_minimum, stand_in_faces_maximum);
-    const Node size_node = node.require("size");
-    const glm::dvec3 size = number_or_vector(size_node);
-    for (int i = 0; i < 3; ++i)
-        if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
-            size_node.fail("each side must be 1e-6 to 1e9 mm");
-    TriangleMesh mesh = stand_in(static_cast<std::uint32_t>(faces), size);
+    TriangleMesh mesh = stand_in(static_cast<std::uint32_t>(faces), size_of(node.require("size")));
     if (options.smooth.value_or(true))
         mesh.normals = smooth_normals(mesh);
     return mesh;

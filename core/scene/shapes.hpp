@@ -3,7 +3,7 @@
 // Transforms that are baked into vertices, and the built-in shapes of scene files. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/mesh.hpp"
 
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>

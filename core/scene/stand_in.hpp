@@ -3,7 +3,9 @@
 // Replacement mesh for a missing mesh file. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/mesh.hpp"
+
+#include <cstdint>
 
 namespace arhost::scene {
 

@@ -123,19 +123,19 @@ private:
             fail("it does not begin with the magic number of scenes");
         if (scene_->version != ARHOST_SCENE_VERSION)
             fail("its version is " + std::to_string(scene_->version) + ", not " +
-                  std::to_string(ARHOST_SCENE_VERSION));
+                 std::to_string(ARHOST_SCENE_VERSION));
         if (scene_->struct_size != sizeof(arhost_scene))
             fail("its header has the wrong size");
         if (scene_->byte_size < sizeof(arhost_scene) || scene_->byte_size > arena_.size())
             fail("its header states " + std::to_string(scene_->byte_size) + " bytes, but the arena has " +
-                  std::to_string(arena_.size()));
+                 std::to_string(arena_.size()));
         arena_ = arena_.first(scene_->byte_size);
         unused_bytes_ = scene_->byte_size - sizeof(arhost_scene);
         if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
             fail("its axes are unknown");
         if (scene_->max_depth > max_depth_limit)
             fail("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
-                  std::to_string(max_depth_limit));
+                 std::to_string(max_depth_limit));
         check_floats(scene_->ambient, 0, coordinate_limit_mm, "the ambient light");
         check_floats(scene_->background, 0, coordinate_limit_mm, "the background");
         check_floats({&scene_->duration_s, 1}, 0, duration_limit_s, "duration_s");
@@ -155,7 +155,7 @@ private:
         }
         if (buffer.stride != sizeof(T))
             fail(what + " has a stride of " + std::to_string(buffer.stride) + " bytes, not " +
-                  std::to_string(sizeof(T)));
+                 std::to_string(sizeof(T)));
         if (buffer.offset % arena_alignment != 0)
             fail(what + " is not aligned to 64 bytes");
         if (buffer.offset < sizeof(arhost_scene))
@@ -190,7 +190,7 @@ private:
         const auto in_table = [&](std::uint32_t index, std::size_t count, const char *what) {
             if (index >= count)
                 fail(name_of(i) + " has " + what + " " + std::to_string(index) + ", but there are " +
-                      std::to_string(count));
+                     std::to_string(count));
         };
         in_table(object.geometry, geometries_.size(), "geometry");
         in_table(object.material, materials_.size(), "material");
@@ -220,8 +220,7 @@ private:
         if (object.skin != ARHOST_NONE)
             in_table(object.skin, skins_.size(), "skin");
         if (object.skin != ARHOST_NONE && (object.moves || !object.deforms || !is_identity(object.world_from_object)))
-            fail(name_of(i) +
-                  " has a skin, so it must deform, not move, and have the identity as world_from_object");
+            fail(name_of(i) + " has a skin, so it must deform, not move, and have the identity as world_from_object");
         if (object.deforms && geometries_[object.geometry].type != ARHOST_GEOMETRY_TRIANGLES)
             fail(name_of(i) + " deforms, but has no triangles");
     }
@@ -245,7 +244,7 @@ private:
         for (std::size_t i = 0; i < geometries_.size(); ++i)
             if (deformers_[i] != ARHOST_NONE && uses[i] > 1)
                 fail(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
-                      ", which another object uses too");
+                     ", which another object uses too");
     }
 
     void check_texture(std::size_t i) {
@@ -260,10 +259,10 @@ private:
             fail(what + "its name is outside the table of names");
         if (texture.width - 1 >= texture_side_limit || texture.height - 1 >= texture_side_limit)
             fail(what + "it has " + std::to_string(texture.width) + " x " + std::to_string(texture.height) +
-                  " texels, outside 1 to " + std::to_string(texture_side_limit) + " a side");
+                 " texels, outside 1 to " + std::to_string(texture_side_limit) + " a side");
         if (texture.texels.count != std::uint64_t(texture.width) * texture.height)
             fail(what + "it has " + std::to_string(texture.texels.count) + " texels for " +
-                  std::to_string(texture.width) + " x " + std::to_string(texture.height));
+                 std::to_string(texture.width) + " x " + std::to_string(texture.height));
         if (texture.format != ARHOST_TEXEL_RGBA32F) {
             view<std::uint32_t>(texture.texels, what + "the buffer of texels");
         } else if (const auto texels = floats_of(view<glm::vec4>(texture.texels, what + "the buffer of texels"));
@@ -285,7 +284,7 @@ private:
         }
         if (environment.texture >= textures_.size())
             fail("the environment has texture " + std::to_string(environment.texture) + ", but there are " +
-                  std::to_string(textures_.size()));
+                 std::to_string(textures_.size()));
         const arhost_texture &texture = textures_[environment.texture];
         if (texture.format != ARHOST_TEXEL_RGBA32F)
             fail("the environment's texture is not RGBA32F");
@@ -299,8 +298,8 @@ private:
             fail("environment_from_world is not a rotation");
         if (rows.size() != texture.height || columns.size() != texture.texels.count)
             fail("the environment has " + std::to_string(rows.size()) + " rows and " +
-                  std::to_string(columns.size()) + " columns for a texture of " + std::to_string(texture.width) +
-                  " x " + std::to_string(texture.height));
+                 std::to_string(columns.size()) + " columns for a texture of " + std::to_string(texture.width) +
+                 " x " + std::to_string(texture.height));
         check_cumulative(rows, "the environment's rows");
         for (std::size_t row = 0; row < rows.size(); ++row)
             check_cumulative(columns.subspan(row * texture.width, texture.width), "the environment's columns");
@@ -336,7 +335,7 @@ private:
         const std::string what = "channel " + std::to_string(i) + ": ";
         if (channel.node >= nodes_.size())
             fail(what + "it has node " + std::to_string(channel.node) + ", but there are " +
-                  std::to_string(nodes_.size()));
+                 std::to_string(nodes_.size()));
         if (channel.target < ARHOST_CHANNEL_TRANSLATION || channel.target > ARHOST_CHANNEL_MORPH_WEIGHTS)
             fail(what + "its target is unknown");
         if (channel.interpolation < ARHOST_INTERPOLATION_STEP || channel.interpolation > ARHOST_INTERPOLATION_CUBIC)
@@ -360,7 +359,7 @@ private:
         const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
         if (width == 0 || values.size() != times.size() * width * (cubic ? 3 : 1))
             fail(what + "it has " + std::to_string(values.size()) + " values for " + std::to_string(times.size()) +
-                  " keys of " + std::to_string(width));
+                 " keys of " + std::to_string(width));
         check_floats(values, -coordinate_limit_mm, coordinate_limit_mm, what + "a value");
         if (channel.target == ARHOST_CHANNEL_ROTATION)
             for (std::size_t key = 0; key < times.size(); ++key)
@@ -373,12 +372,12 @@ private:
         const auto joints = view<std::uint32_t>(skins_[i].joints, what + "the buffer of joints");
         const auto matrices = view<glm::mat4x3>(skins_[i].node_from_mesh, what + "the buffer of node_from_mesh");
         if (joints.empty() || matrices.size() != joints.size())
-            fail(what + "it has " + std::to_string(joints.size()) + " joints and " +
-                  std::to_string(matrices.size()) + " matrices");
+            fail(what + "it has " + std::to_string(joints.size()) + " joints and " + std::to_string(matrices.size()) +
+                 " matrices");
         for (const std::uint32_t joint : joints)
             if (joint >= nodes_.size())
                 fail(what + "it has node " + std::to_string(joint) + ", but there are " +
-                      std::to_string(nodes_.size()));
+                     std::to_string(nodes_.size()));
         check_floats(floats_of(matrices), -coordinate_limit_mm, coordinate_limit_mm, what + "node_from_mesh");
     }
 
@@ -391,7 +390,7 @@ private:
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && texture >= textures_.size())
                 fail(what + "it has texture " + std::to_string(texture) + ", but there are " +
-                      std::to_string(textures_.size()));
+                     std::to_string(textures_.size()));
         check_floats(material.ambient, 0, 1, what + "ambient");
         check_floats(material.diffuse, 0, 1, what + "diffuse");
         check_floats(material.specular, 0, 1, what + "specular");
@@ -474,18 +473,18 @@ private:
         const bool skinned = object && object->skin != ARHOST_NONE;
         if (joints.size() != (skinned ? vertices : 0) || weights.size() != joints.size())
             fail("it has " + std::to_string(joints.size()) + " joints and " + std::to_string(weights.size()) +
-                  " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +
-                  " a skin");
+                 " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +
+                 " a skin");
         const std::uint64_t targets =
             object && object->node != ARHOST_NONE ? nodes_[object->node].morph_weights.count : 0;
         if (object && !skinned && targets == 0)
             fail("it deforms, but has neither a skin nor morph targets");
         if (morph_positions.size() != targets * vertices || (targets > 0 && !object->deforms))
             fail("it has " + std::to_string(morph_positions.size()) + " morph_positions for " +
-                  std::to_string(targets) + " targets and " + std::to_string(vertices) + " vertices");
+                 std::to_string(targets) + " targets and " + std::to_string(vertices) + " vertices");
         if (!morph_normals.empty() && (morph_normals.size() != morph_positions.size() || geometry.normals.count == 0))
             fail("it has " + std::to_string(morph_normals.size()) + " morph_normals for " +
-                  std::to_string(morph_positions.size()) + " morph_positions, or no normals");
+                 std::to_string(morph_positions.size()) + " morph_positions, or no normals");
         check_coordinates(floats_of(morph_positions), 3, "morph position");
         check_coordinates(floats_of(morph_normals), 3, "morph normal");
         if (!skinned)
@@ -494,8 +493,7 @@ private:
         for (std::size_t v = 0; v < joints.size(); ++v) {
             const glm::u16vec4 &j = joints[v];
             if (std::max({j.x, j.y, j.z, j.w}) >= joint_count)
-                fail("vertex " + std::to_string(v) + " has a joint beyond the skin's " +
-                      std::to_string(joint_count));
+                fail("vertex " + std::to_string(v) + " has a joint beyond the skin's " + std::to_string(joint_count));
             const glm::vec4 &w = weights[v];
             if (!(std::min({w.x, w.y, w.z, w.w}) >= 0 && within(w.x + w.y + w.z + w.w, 1 - tolerance, 1 + tolerance)))
                 fail("vertex " + std::to_string(v) + " has negative weights, or weights whose sum is not 1");
@@ -508,7 +506,7 @@ private:
         for (std::size_t i = 0; i < values.size(); ++i)
             if (!within(values[i], -coordinate_limit_mm, coordinate_limit_mm))
                 fail(std::string(what) + " " + std::to_string(i / components) + " has the coordinate " +
-                      number(values[i]));
+                     number(values[i]));
     }
 
     Box check_triangles(const arhost_geometry &geometry) {
@@ -520,10 +518,10 @@ private:
             fail("it has no triangles");
         if (!normals.empty() && normals.size() != positions.size())
             fail("it has " + std::to_string(normals.size()) + " normals for " + std::to_string(positions.size()) +
-                  " vertices");
+                 " vertices");
         if (!texcoords.empty() && texcoords.size() != positions.size())
-            fail("it has " + std::to_string(texcoords.size()) + " texcoords for " +
-                  std::to_string(positions.size()) + " vertices");
+            fail("it has " + std::to_string(texcoords.size()) + " texcoords for " + std::to_string(positions.size()) +
+                 " vertices");
         check_coordinates(floats_of(positions), 3, "vertex");
         check_coordinates(floats_of(texcoords), 2, "texcoord");
         check_normals(normals);
@@ -540,8 +538,8 @@ private:
             all &= is_unit(normal);
         if (!all)
             fail("normal " +
-                  std::to_string(std::find_if_not(normals.begin(), normals.end(), is_unit) - normals.begin()) +
-                  " is not of unit length");
+                 std::to_string(std::find_if_not(normals.begin(), normals.end(), is_unit) - normals.begin()) +
+                 " is not of unit length");
     }
 
     static void check_indices(std::span<const glm::uvec3> triangles, std::size_t vertex_count) {
@@ -554,7 +552,7 @@ private:
             if (const std::uint32_t index = std::max({triangles[i].x, triangles[i].y, triangles[i].z});
                 index >= vertex_count)
                 fail("triangle " + std::to_string(i) + " has the vertex " + std::to_string(index) +
-                      ", but there are " + std::to_string(vertex_count));
+                     ", but there are " + std::to_string(vertex_count));
     }
 
     Box check_spheres(const arhost_geometry &geometry) {

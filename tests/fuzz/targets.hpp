@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fuzz targets: all code that reads untrusted bytes. Each accepts any bytes and returns; throwing or crashing is a bug.
-// `tools/fuzz` runs them under libFuzzer, corpus_test.cpp on the corpus.
+// Fuzz targets: all code that reads untrusted bytes. Each accepts any bytes and returns; throwing or crashing is a
+// bug. `tools/fuzz` runs them under libFuzzer, corpus_test.cpp on the corpus.
 #pragma once
 
 #include <cstdint>
