@@ -36,7 +36,7 @@ def traced(scene, size, rounds, paths, view=None):
 
 
 def note(scene, said):
-    return "   a stand-in for the scan" if "stands in for it" in said else coarser(scene, said)
+    return "   a stand-in for the scan" if "stand-in" in said else coarser(scene, said)
 
 
 def beside_bare(is_gpu):

@@ -7,7 +7,7 @@
 //
 //   scene-loading-bench dragon_vrip.ply.gz [runs]
 #include "scene/arena.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh_loader.hpp"
 
 #include <sys/resource.h>
 #include <zlib.h>

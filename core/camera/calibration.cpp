@@ -41,23 +41,23 @@ void set_focal_length(double &to, double value, const Node &node) {
     to = value;
 }
 
-// Square pixels that reach so far between the image's upper and lower edge.
+// Square pixels; the field of view spans the image from its upper to its lower edge.
 void set_vertical_fov(arhost_intrinsics &to, double degrees) {
     to.fx = to.fy = to.height / 2.0 / std::tan(degrees / 2 * std::numbers::pi / 180);
 }
 
-void set_axis_to_centre(arhost_intrinsics &to) {
+void centre_principal_point(arhost_intrinsics &to) {
     to.cx = (to.width - 1) / 2.0;
     to.cy = (to.height - 1) / 2.0;
 }
 
-// Checks the count for the model and drops what has no effect.
+// Checks the number of coefficients and drops those without effect.
 void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<const double> k, const Node &node) {
     const auto zero = [](double x) { return x == 0; };
     const std::string count = std::to_string(k.size());
     if (model == ARHOST_DISTORTION_FISHEYE) {
         if (k.size() != 4)
-            node.fail("the fisheye model has 4 coefficients (k1 k2 k3 k4), here are " + count);
+            node.fail("the fisheye model has 4 coefficients (k1 k2 k3 k4), not " + count);
     } else {
         if (k.size() == 14) {
             if (!std::all_of(k.begin() + 12, k.end(), zero))
@@ -66,7 +66,7 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
         }
         if (!k.empty() && k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12)
             node.fail("the Brown model has 4, 5, 8 or 12 coefficients "
-                      "(k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]), here are " +
+                      "(k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]), not " +
                       count);
         if (model == ARHOST_DISTORTION_NONE && !std::all_of(k.begin(), k.end(), zero))
             node.fail("the model is none, but a coefficient is not 0; set the model to brown or fisheye");
@@ -79,8 +79,8 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
     std::copy(k.begin(), k.end(), to.coefficients);
 }
 
-// A calibration file's keys without case and underscores, since programs and their releases differ in
-// them: camera_matrix, Camera_Matrix, cameraMatrix.
+// Finds a key regardless of case and underscores, which differ between programs and releases: camera_matrix,
+// Camera_Matrix, cameraMatrix.
 std::optional<Node> find(const Node &root, std::initializer_list<std::string_view> names) {
     for (const auto &[key, value] : root.entries()) {
         std::string plain;
@@ -93,7 +93,7 @@ std::optional<Node> find(const Node &root, std::initializer_list<std::string_vie
     return std::nullopt;
 }
 
-// A list of numbers, or a matrix as OpenCV ({rows, cols, dt, data}) or ROS ({rows, cols, data}) has it.
+// A list of numbers, or a matrix of OpenCV ({rows, cols, dt, data}) or ROS ({rows, cols, data}).
 std::vector<double> numbers(const Node &node) {
     if (node.is_sequence())
         return node.reals();
@@ -140,18 +140,18 @@ Size size_of(const Node &root, std::optional<Size> expected) {
     if (!width || !height)
         root.fail(std::string("the key '") + (width ? "image_height" : "image_width") +
                   "' is missing; give the size of the calibration's images in px, "
-                  "here or as width and height beside 'file' in the configuration");
+                  "here or as width and height next to 'file' in the configuration");
     const Size size{side(*width), side(*height)};
     if (expected && size != *expected)
         width->fail("the calibration is for images of " + text(size) + ", but " + text(*expected) +
-                    " are asked for; calibrate at that size");
+                    " are requested; calibrate at that size");
     return size;
 }
 
-std::optional<Size> size_beside_file(const Node &node) {
+std::optional<Size> size_next_to_file(const Node &node) {
     const auto width = node.find("width"), height = node.find("height");
     if (width.has_value() != height.has_value())
-        node.fail("width and height go together; give both or none");
+        node.fail("width and height go together; set both or neither");
     if (!width)
         return std::nullopt;
     return Size{side(*width), side(*height)};
@@ -162,7 +162,7 @@ std::optional<Size> size_beside_file(const Node &node) {
 arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected) {
     const Node root = Node::load(file);
     if (!root.is_map())
-        root.fail("is no calibration in YAML; let OpenCV's FileStorage write it to a name that ends in .yaml");
+        root.fail("is not a YAML calibration; let OpenCV's FileStorage write it to a file named *.yaml");
     arhost_intrinsics intrinsics = intrinsics_for(size_of(root, expected));
     const auto matrix = find(root, {"cameramatrix", "k"});
     if (!matrix)
@@ -171,7 +171,7 @@ arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optio
     if (const auto distortion = find(root, {"distortioncoefficients", "distcoeffs", "d"}))
         set_distortion(intrinsics, model_of(root), numbers(*distortion), *distortion);
     else
-        root.fail("the key 'distortion_coefficients' is missing; of a lens without distortion it is [0, 0, 0, 0]");
+        root.fail("the key 'distortion_coefficients' is missing; for a lens without distortion, write [0, 0, 0, 0]");
     return intrinsics;
 }
 
@@ -181,20 +181,20 @@ arhost_intrinsics parse_camera(const Node &node) {
         const std::filesystem::path path = file->input_path();
         if (!std::filesystem::exists(path))
             file->fail("the calibration file " + path.string() + " does not exist");
-        return read_calibration(path, size_beside_file(node));
+        return read_calibration(path, size_next_to_file(node));
     }
     node.allow_keys({"file", "width", "height", "fx", "fy", "vertical_fov_degrees", "cx", "cy", "distortion"});
     arhost_intrinsics intrinsics = intrinsics_for({side(node.require("width")), side(node.require("height"))});
     if (const auto fov = node.find("vertical_fov_degrees")) {
         if (node.find("fx") || node.find("fy"))
-            fov->fail("stands for fx and fy; keep it or them");
+            fov->fail("replaces fx and fy; keep either it or them");
         set_vertical_fov(intrinsics, fov->real(0.01, 179));
     } else {
         const Node fx = node.require("fx"), fy = node.find("fy").value_or(fx);
         set_focal_length(intrinsics.fx, fx.real(), fx);
         set_focal_length(intrinsics.fy, fy.real(), fy);
     }
-    set_axis_to_centre(intrinsics);
+    centre_principal_point(intrinsics);
     if (const auto cx = node.find("cx"))
         intrinsics.cx = cx->real();
     if (const auto cy = node.find("cy"))
@@ -204,7 +204,7 @@ arhost_intrinsics parse_camera(const Node &node) {
         const std::string model = distortion->require("model").choice({"none", "brown", "fisheye"});
         const auto coefficients = distortion->find("coefficients");
         if (!coefficients && model != "none")
-            distortion->fail("the key 'coefficients' is missing, the list of the model's numbers");
+            distortion->fail("the key 'coefficients' is missing; it lists the model's coefficients");
         set_distortion(intrinsics,
                        model == "none"    ? ARHOST_DISTORTION_NONE
                        : model == "brown" ? ARHOST_DISTORTION_BROWN
@@ -218,7 +218,7 @@ arhost_intrinsics parse_camera(const Node &node) {
 arhost_intrinsics dissertation_camera(const Size &size) {
     arhost_intrinsics intrinsics = intrinsics_for(size);
     set_vertical_fov(intrinsics, 45);
-    set_axis_to_centre(intrinsics);
+    centre_principal_point(intrinsics);
     return intrinsics;
 }
 
@@ -226,7 +226,7 @@ void check_size(const arhost_intrinsics &intrinsics, std::uint32_t width, std::u
     const Size calibrated{intrinsics.width, intrinsics.height}, actual{width, height};
     if (calibrated != actual)
         throw yaml::Error("the camera is calibrated for images of " + text(calibrated) + ", but the frames are " +
-                          text(actual) + "; calibrate at the frames' size, or set the source to the calibration's");
+                          text(actual) + "; calibrate at the frame size, or set the source to the calibration size");
 }
 
 } // namespace arhost::camera

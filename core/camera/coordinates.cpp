@@ -21,7 +21,7 @@ std::string problem_with(const Rotation &rotation) {
     if (!std::isfinite(axis.x) || !std::isfinite(axis.y) || !std::isfinite(axis.z))
         return "the axis must be three finite numbers";
     if (axis == glm::dvec3(0))
-        return "the axis is (0, 0, 0), which is no direction; about x it is [1, 0, 0]";
+        return "the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]";
     return "";
 }
 
@@ -32,10 +32,10 @@ std::string problem_with_profiles(const Coordinates &coordinates) {
                "they are " +
                std::to_string(ar) + " and " + std::to_string(rt);
     if (rotations.size() > 2)
-        return "at most two rotations are possible, here are " + std::to_string(rotations.size());
+        return "at most two rotations are allowed, not " + std::to_string(rotations.size());
     if (ar == rt && !rotations.empty())
         return "the profiles ar and rt are both " + std::to_string(ar) +
-               ", so the rotations would not be used; leave them out, or set rt to the ray tracer's profile";
+               ", so the rotations would have no effect; remove them, or set rt to the ray tracer's profile";
     if (ar != rt && rotations.empty())
         return "the profiles ar " + std::to_string(ar) + " and rt " + std::to_string(rt) +
                " differ, so a rotation is needed; from 1 to 2 it is 90 degrees about [1, 0, 0]";
@@ -58,7 +58,7 @@ std::pair<double, double> cos_sin(double degrees) {
 // Rodrigues' rotation formula.
 glm::dmat4 matrix_of(const Rotation &rotation) {
     const glm::dvec3 size = glm::abs(rotation.axis);
-    // By the greatest component first, so that no square over- or underflows.
+    // Divide by the largest component first, so that no square overflows or underflows.
     const glm::dvec3 n = glm::normalize(rotation.axis / std::max({size.x, size.y, size.z}));
     const auto [c, s] = cos_sin(rotation.degrees);
     const glm::dvec3 t = (1 - c) * n;

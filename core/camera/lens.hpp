@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where a camera sees a point: the formulas of arhost/camera.h in double precision.
+// Projects points to pixels: the formulas of arhost/camera.h in double precision.
 #pragma once
 
 #include <arhost/camera.h>
@@ -12,11 +12,11 @@
 
 namespace arhost::camera {
 
-// The pixel at which a point in the camera's OpenCV axes (x right, y down, z forward; mm) is seen. None
-// where z ≤ 0. As in OpenCV, a Brown polynomial is not watched for folding back far outside the image.
+// The pixel of a point in OpenCV camera axes (x right, y down, z forward; mm). None if z ≤ 0. As in OpenCV, a Brown
+// polynomial that folds back far outside the image is not detected.
 std::optional<glm::dvec2> project(const arhost_intrinsics &intrinsics, const glm::dvec3 &point_in_camera);
 
-// A point of the ray tracer's world (mm) in the camera's OpenCV axes.
+// Transforms a point of the ray tracer's world (mm) to OpenCV camera axes.
 glm::dvec3 in_camera(const arhost_camera &camera, const glm::dvec3 &point_in_world);
 
 } // namespace arhost::camera

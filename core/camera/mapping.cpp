@@ -13,9 +13,9 @@
 namespace arhost::camera {
 
 const char *problem_with(const double (&mt)[16]) {
-    constexpr double tolerance = 1e-6, farthest_mm = 1e9;
+    constexpr double tolerance = 1e-6, distance_limit_mm = 1e9;
     if (!std::all_of(std::begin(mt), std::end(mt), [](double x) { return std::isfinite(x); }))
-        return "the pose has a number that is not finite";
+        return "the pose is not finite";
     if (mt[3] != 0 || mt[7] != 0 || mt[11] != 0 || mt[15] != 1)
         return "the pose's last row is not 0 0 0 1";
     const glm::dmat3 rotation(glm::make_mat4(mt));
@@ -24,8 +24,8 @@ const char *problem_with(const double (&mt)[16]) {
             if (!(std::abs(glm::dot(rotation[i], rotation[j]) - (i == j)) <= tolerance))
                 return "the pose's rotation is not orthonormal";
     if (glm::determinant(rotation) < 0)
-        return "the pose mirrors: its rotation is left-handed";
-    if (std::max({std::abs(mt[12]), std::abs(mt[13]), std::abs(mt[14])}) > farthest_mm)
+        return "the pose's rotation is left-handed";
+    if (std::max({std::abs(mt[12]), std::abs(mt[13]), std::abs(mt[14])}) > distance_limit_mm)
         return "the pose is more than 1000 km away";
     return nullptr;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From the marker's pose to the ray tracer's camera: equations 3.1 to 3.5 of the dissertation.
+// Maps the marker's pose to the ray tracer's camera: equations 3.1 to 3.5 of the dissertation.
 #pragma once
 
 #include "camera/coordinates.hpp"
@@ -11,13 +11,13 @@
 
 namespace arhost::camera {
 
-// NULL where `mt` is a pose as arhost_marker.mt must be: finite, last row 0 0 0 1, a right-handed
-// rotation orthonormal to 1e-6, at most 1e9 mm away. Else what is wrong with it. A tracker's output is
-// untrusted, so camera_from_marker asks this each time.
+// nullptr if `mt` meets the requirements of arhost_marker.mt: finite, last row 0 0 0 1, a right-handed rotation
+// that is orthonormal to 1e-6, at most 1e9 mm away. Else a description of the problem. camera_from_marker always
+// checks this, since tracker output is untrusted.
 const char *problem_with(const double (&mt)[16]);
 
 // CP = (MT·R1·R2)⁻¹; eye = (c12, c13, c14), look_at = eye − (c8, c9, c10), up = (c4, c5, c6).
-// Nothing where problem_with(mt). `coordinates` must be free of problems.
+// Nothing if problem_with(mt). `coordinates` must be valid.
 std::optional<arhost_camera> camera_from_marker(const double (&mt)[16], const Coordinates &coordinates,
                                                 const arhost_intrinsics &intrinsics);
 

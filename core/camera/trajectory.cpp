@@ -19,21 +19,21 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double dissertation_fps = 30; // its camera's
+constexpr double dissertation_fps = 30; // frame rate of its camera
 
-// A line, and where it stands.
+// A line and its position.
 struct Line {
     const std::filesystem::path &file;
     std::size_t number; // from 1
     std::string_view text;
-    bool ended; // by a line end; else the file may have been cut here
+    bool ended; // has a line end; else the file may be truncated here
 
     [[noreturn]] void fail(std::size_t column, const std::string &message) const {
         throw yaml::Error(file.string() + ":" + std::to_string(number) + ":" + std::to_string(column) + ": " +
                           message);
     }
-    std::string left_out() const {
-        return file.string() + ":" + std::to_string(number) + ": the last line is cut short and is left out";
+    std::string truncation_warning() const {
+        return file.string() + ":" + std::to_string(number) + ": ignores the truncated last line";
     }
 };
 
@@ -50,24 +50,24 @@ std::vector<Line> lines_of(const std::filesystem::path &file, std::string_view t
     return lines;
 }
 
-// "" or what a ray tracer could not work with.
+// "" if ray tracers can use the view, else the problem.
 std::string problem_with(const View &view) {
     const glm::dvec3 eye = glm::make_vec3(view.eye_mm), up = glm::make_vec3(view.up);
     const glm::dvec3 backwards = eye - glm::make_vec3(view.look_at_mm);
     if (!(glm::length(backwards) > 0))
-        return "look_at must be another point than eye";
-    constexpr double limit_mm = 1e9; // as of scenes
+        return "look_at must differ from eye";
+    constexpr double limit_mm = 1e9; // as in scenes
     for (const double number : {eye.x, eye.y, eye.z, view.look_at_mm[0], view.look_at_mm[1], view.look_at_mm[2]})
         if (!(std::abs(number) <= limit_mm))
-            return "eye and look_at must lie within 1e9 mm";
+            return "eye and look_at must be within 1e9 mm";
     if (!(glm::length(glm::cross(up, backwards)) > 1e-9 * glm::length(up) * glm::length(backwards)))
-        return "up must have a length, and not point along the line of sight";
+        return "up must not be 0 or parallel to the line of sight";
     return "";
 }
 
 // ---- arhost's format -------------------------------------------------------------------------------
 
-// A member of a line's object, and its place for errors.
+// A member of a line's JSON object; errors name its position.
 class Member {
 public:
     Member(const Line &line, const Json &object, const char *key) : line_(line), key_(key) {
@@ -82,7 +82,7 @@ public:
     }
     bool is_null() const { return value_->is_null(); }
     std::int64_t integer() const {
-        if (value_->is_structured()) // its text could nest without end
+        if (value_->is_structured()) // never print it: its nesting depth is unlimited
             fail("must be a whole number");
         if (!value_->is_number_integer() ||
             (value_->is_number_unsigned() && value_->get<std::uint64_t>() > std::uint64_t(INT64_MAX)))
@@ -124,7 +124,7 @@ TrajectoryFrame frame_of(const Line &line, const Json &object) {
     return frame;
 }
 
-// JSON is YAML, so that the camera is read, and faults in it are told, as in a configuration.
+// JSON is valid YAML, so the camera is read and errors are reported as in a configuration.
 void read_header(Trajectory &to, const Line &line) {
     const yaml::Node header = yaml::Node::parse(std::string(line.text), line.file.string());
     header.require("format").choice({"arhost-trajectory"});
@@ -140,7 +140,7 @@ void read_header(Trajectory &to, const Line &line) {
 Trajectory read_arhost(const std::vector<Line> &lines) {
     Trajectory trajectory;
     if (!lines.front().ended)
-        lines.front().fail(lines.front().text.size() + 1, "the first line is cut short: no frame is in this file");
+        lines.front().fail(lines.front().text.size() + 1, "the first line is truncated: the file contains no frame");
     read_header(trajectory, lines.front());
     for (const Line &line : std::span(lines).subspan(1)) {
         Json object;
@@ -148,30 +148,30 @@ Trajectory read_arhost(const std::vector<Line> &lines) {
             object = Json::parse(line.text);
         } catch (const Json::exception &error) {
             if (!line.ended) {
-                trajectory.warning = line.left_out();
+                trajectory.warning = line.truncation_warning();
                 break;
             }
             const auto *syntax = dynamic_cast<const Json::parse_error *>(&error);
             line.fail(syntax ? std::max<std::size_t>(syntax->byte, 1) : 1,
-                      "is no JSON; delete the line, or record the run anew");
+                      "is not valid JSON; delete the line or record the run again");
         }
         const TrajectoryFrame frame = frame_of(line, object);
         if (!trajectory.frames.empty()) {
             const TrajectoryFrame &before = trajectory.frames.back();
             if (frame.frame <= before.frame)
                 Member(line, object, "frame")
-                    .fail("must be greater than the line before's, " + std::to_string(before.frame));
+                    .fail("must be greater than in the previous line, " + std::to_string(before.frame));
             if (frame.capture_ns < before.capture_ns)
-                Member(line, object, "capture_ns").fail("must not be less than the line before's");
+                Member(line, object, "capture_ns").fail("must not be less than in the previous line");
         }
         trajectory.frames.push_back(frame);
     }
     return trajectory;
 }
 
-// ---- the dissertation's ----------------------------------------------------------------------------
+// ---- the dissertation's format ----------------------------------------------------------------------------
 
-// The numbers of a line; nothing where it has none.
+// The numbers of a line; empty if it has none.
 std::vector<double> numbers_of(const Line &line) {
     std::vector<double> numbers;
     const char *const begin = line.text.data(), *const end = begin + line.text.size();
@@ -183,14 +183,14 @@ std::vector<double> numbers_of(const Line &line) {
         double number = 0;
         const auto [stopped, error] = std::from_chars(at, word_end, number);
         if (error != std::errc() || stopped != word_end || !std::isfinite(number)) {
-            if (!line.ended && word_end == end) // "-" or "1e" of a number that was cut
+            if (!line.ended && word_end == end) // a truncated number such as "-" or "1e"
                 return {};
             line.fail(column, "'" + std::string(at, std::min<std::ptrdiff_t>(word_end - at, 30) + at) +
-                                  "' is no number; a line has nine, of eye, look_at and up, or none in a frame "
+                                  "' is not a number; a line has nine (eye, look_at, up), or none for a frame "
                                   "without a camera");
         }
         if (numbers.size() == 9)
-            line.fail(column, "has more than nine numbers: eye, look_at and up have three each");
+            line.fail(column, "has more than nine numbers (three each for eye, look_at and up)");
         numbers.push_back(number);
         at = word_end;
     }
@@ -202,9 +202,9 @@ Trajectory read_dissertation(const std::vector<Line> &lines) {
     trajectory.fps = dissertation_fps;
     for (const Line &line : lines) {
         const std::vector<double> numbers = numbers_of(line);
-        // A ninth number that nothing follows may lack digits.
+        // A ninth number without a following blank may lack digits.
         if (!line.ended && (numbers.size() < 9 || !(line.text.ends_with(' ') || line.text.ends_with('\t')))) {
-            trajectory.warning = line.left_out();
+            trajectory.warning = line.truncation_warning();
             break;
         }
         const std::uint64_t number = line.number - 1;
@@ -219,7 +219,7 @@ Trajectory read_dissertation(const std::vector<Line> &lines) {
             frame.view = view;
         } else if (!numbers.empty()) {
             line.fail(line.text.size() + 1,
-                      "has " + std::to_string(numbers.size()) + " numbers; eye, look_at and up are nine");
+                      "has " + std::to_string(numbers.size()) + " numbers; eye, look_at and up need nine");
         }
         trajectory.frames.push_back(frame);
     }
@@ -236,7 +236,7 @@ const TrajectoryFrame *Trajectory::at_or_after(std::uint64_t frame) const {
 Trajectory read_trajectory(const std::filesystem::path &file) {
     std::error_code ignored;
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
-        throw yaml::Error(file.string() + ": is no regular file");
+        throw yaml::Error(file.string() + ": is not a regular file");
     errno = 0;
     std::ifstream stream(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
@@ -245,7 +245,8 @@ Trajectory read_trajectory(const std::filesystem::path &file) {
     const std::vector<Line> lines = lines_of(file, text);
     Trajectory trajectory = text.starts_with('{') ? read_arhost(lines) : read_dissertation(lines);
     if (trajectory.frames.empty())
-        throw yaml::Error(file.string() + ": has no frame; record one with sink_trajectory (docs/trajectories.md)");
+        throw yaml::Error(file.string() +
+                          ": contains no frames; record one with sink_trajectory (docs/trajectories.md)");
     return trajectory;
 }
 

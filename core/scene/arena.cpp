@@ -16,7 +16,7 @@ constexpr std::uint64_t align_up(std::uint64_t size) {
     return (size + arena_alignment - 1) / arena_alignment * arena_alignment;
 }
 
-// Puts buffers one behind the other; where there is no memory, it only counts.
+// Appends buffers to an arena; only counts bytes if the arena is null.
 class Writer {
 public:
     explicit Writer(std::byte *arena) : arena_(arena) {}
@@ -116,11 +116,12 @@ arhost_skin put_skin(Writer &writer, const Skin &skin) {
     return {writer.put(skin.joints), writer.put(skin.node_from_mesh)};
 }
 
-// Makes each row of a table out of what was collected, once its buffers are written.
-template <class Row, class From, class Put> arhost_buffer put_table(Writer &writer, From &from, const Put &put) {
+// Writes the buffers of all elements, then the table of rows that refer to them.
+template <class Row, class Elements, class Put>
+arhost_buffer put_table(Writer &writer, Elements &elements, const Put &put) {
     std::vector<Row> rows;
-    rows.reserve(from.size());
-    for (auto &element : from)
+    rows.reserve(elements.size());
+    for (auto &element : elements)
         rows.push_back(put(element));
     return writer.put(rows);
 }
@@ -136,7 +137,7 @@ arhost_material make_material(arhost_material_model model) {
     copy(glm::vec3(1), material.reflectivity);
     material.metallic = material.roughness = 1;
     material.index = 1.5f;
-    material.fresnel_exponent = 5; // Schlick's, and with the minimum that of an index of 1.5
+    material.fresnel_exponent = 5; // Schlick's; the minimum is that of an index of 1.5
     material.fresnel_minimum = 0.04f;
     material.fresnel_maximum = 1;
     copy(glm::vec3(1), material.refraction);
@@ -175,9 +176,9 @@ std::uint32_t ArenaBuilder::add_spheres(Spheres spheres) {
 }
 
 std::uint32_t ArenaBuilder::add_name(const std::string &name) {
-    const auto place = static_cast<std::uint32_t>(names_.size());
+    const auto offset = static_cast<std::uint32_t>(names_.size());
     names_ += name + '\0';
-    return place;
+    return offset;
 }
 
 std::uint32_t ArenaBuilder::add_texture(const std::string &name, Texture texture) {
@@ -234,7 +235,7 @@ std::size_t ArenaBuilder::triangle_count() const {
     return count;
 }
 
-// In the order of `write`.
+// Same order as `write`.
 std::size_t ArenaBuilder::byte_size() const {
     Writer counter(nullptr);
     counter.put(materials_);
@@ -273,7 +274,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.coloured_shadows = settings.coloured_shadows;
     scene.duration_s = settings.duration_s;
 
-    Writer writer(arena.data()); // in byte_size's order
+    Writer writer(arena.data()); // same order as byte_size
     scene.materials = writer.put(materials_);
     scene.objects = writer.put(objects_);
     scene.lights = writer.put(lights_);
@@ -307,12 +308,12 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     });
     std::memset(arena.data(), 0, align_up(sizeof scene));
     std::memcpy(arena.data(), &scene, sizeof scene);
-    settle(arena);
+    apply_initial_motion(arena);
     *this = {};
 }
 
-// What depends on where things are at time 0: the objects that move, and the bounds.
-void ArenaBuilder::settle(std::span<std::byte> arena) const {
+// Sets what depends on the pose at time 0: the transforms of moving objects, and the bounds.
+void ArenaBuilder::apply_initial_motion(std::span<std::byte> arena) const {
     auto &scene = *reinterpret_cast<arhost_scene *>(arena.data());
     const auto elements = [&]<class T>(const arhost_buffer &buffer, T) {
         return std::span(reinterpret_cast<T *>(arena.data() + buffer.offset), buffer.count);

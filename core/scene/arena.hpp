@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writes and checks the arena of arhost/scene.h. Needs no library that parses anything: the host uses it.
+// Writes and validates the arena of arhost/scene.h. Depends on no parser, since the host links it.
 #pragma once
+
+#include "scene/limits.hpp"
+#include "scene/mesh.hpp"
 
 #include <arhost/scene.h>
 
-#include <glm/gtc/type_precision.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x3.hpp>
-#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -23,33 +24,14 @@
 
 namespace arhost::scene {
 
-// No coordinate may be larger, so that no ray tracer's arithmetic overflows.
-inline constexpr float coordinate_limit_mm = 1e9f;
-inline constexpr std::size_t arena_alignment = 64, arena_spare_bytes = 16; // of and behind each buffer, by scene.h
-inline constexpr std::uint32_t max_depth_limit = 100;
-inline constexpr std::uint32_t texture_side_limit = 16384;
-inline constexpr float radiance_limit = 1e6f;   // of texels and of what is given off
-inline constexpr float duration_limit_s = 1e6f; // floats tell 1/16 s apart there
-
-struct TriangleMesh {
-    std::vector<glm::vec3> positions;
-    std::vector<glm::vec3> normals;   // one a vertex, unit length, or none: flat
-    std::vector<glm::vec2> texcoords; // one a vertex, or none
-    std::vector<glm::uvec3> triangles;
-    // Of one that deforms, as arhost_geometry has them; else none.
-    std::vector<glm::u16vec4> joints{};
-    std::vector<glm::vec4> weights{};
-    std::vector<glm::vec3> morph_positions{}, morph_normals{};
-};
-
 using Spheres = std::vector<glm::vec4>; // centre and radius
 
-// A material with a field's customary value in each, black but for glass and mirrors; without textures.
+// A material with the usual default in each field and no textures: black, except glass and mirrors.
 arhost_material make_material(arhost_material_model model);
-// A white light at the origin, its direction down −z; one with an extent measures 1 mm.
+// A white light at the origin that points along −z; area lights are 1 mm wide.
 arhost_light make_light(arhost_light_type type);
 
-// Memory that is neither zeroed nor copied: a texture may have a gigabyte.
+// Uninitialized, move-only memory: a texture may have a gigabyte.
 struct Texels {
     std::unique_ptr<std::byte[]> bytes;
     std::size_t size = 0;
@@ -72,7 +54,7 @@ struct Environment {
     std::vector<float> rows, columns; // cumulative sums
 };
 
-// A place without animation: parent_from_node. With one, the other three stand for it.
+// Not animated: parent_from_node applies. Animated: translation, rotation and scale apply instead.
 struct MotionNode {
     std::uint32_t parent = ARHOST_NONE;
     bool animated = false;
@@ -95,7 +77,7 @@ struct Skin {
     std::vector<glm::mat4x3> node_from_mesh;
 };
 
-// How an object moves: with a node, by a skin's joints, or not at all.
+// How an object moves: rigidly with a node, by a skin's joints, or not at all.
 struct Motion {
     bool moves = false, deforms = false;
     std::uint32_t node = ARHOST_NONE, skin = ARHOST_NONE;
@@ -132,7 +114,7 @@ private:
 //   builder.add_object("ball", builder.add_spheres({{0, 0, 20, 20}}), builder.add_material(red));
 //   Arena arena = std::move(builder).build();
 //
-// It does not judge what it is given; `validate` does.
+// It does not check its input; `validate` does.
 class ArenaBuilder {
 public:
     Settings settings;
@@ -153,9 +135,9 @@ public:
 
     std::size_t byte_size() const;
 
-    // Writes into memory of the caller: byte_size() bytes at a multiple of 64. Frees each mesh and texture
-    // once it is written, so that no two are held twice. Where things move, they are put where they are at
-    // time 0: then what was added must be valid.
+    // Writes into the caller's memory: byte_size() bytes, 64-byte aligned. Frees each mesh and texture once it
+    // is written, to limit peak memory. Moving objects are written at their pose at time 0, which requires
+    // valid input.
     void write(std::span<std::byte> arena) &&;
     Arena build() &&;
 
@@ -168,10 +150,10 @@ private:
     using Geometry = std::variant<TriangleMesh, Spheres>;
 
     std::uint32_t add_name(const std::string &name);
-    void settle(std::span<std::byte> arena) const;
+    void apply_initial_motion(std::span<std::byte> arena) const;
 
     std::vector<Geometry> geometries_;
-    std::vector<std::pair<std::uint32_t, Texture>> textures_; // and the name's place
+    std::vector<std::pair<std::uint32_t, Texture>> textures_; // with the name's offset
     std::vector<arhost_material> materials_;
     std::vector<arhost_object> objects_;
     std::vector<arhost_light> lights_;
@@ -181,11 +163,10 @@ private:
     std::string names_;
 };
 
-// What is wrong with an arena that another process wrote, as the end of a sentence about the scene
-// ("object 2 'ball' has material 7, but there are 3"); empty where nothing is. Every offset, count, index,
-// enumeration and number is checked before it is used, so a ray tracer may use all of them unchecked
-// afterwards, provided that nobody can write the arena any more. Takes time in proportion to the arena's
-// size, whatever stands in it.
+// Validates an arena that another process wrote. Returns the first problem as the end of a sentence about the
+// scene ("object 2 'ball' has material 7, but there are 3"), or "" if it is valid. Checks every offset, count,
+// index, enumerator and number before using it, so a ray tracer may use all of them unchecked, provided that
+// nobody can write to the arena any more. Time is linear in the arena's size, whatever its content.
 std::string validate(std::span<const std::byte> arena);
 
 } // namespace arhost::scene

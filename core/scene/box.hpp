@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Boxes round geometries.
+// Bounding boxes.
 #pragma once
 
-#include "scene/arena.hpp"
-
 #include <glm/common.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include <array>
 #include <limits>
@@ -28,8 +28,8 @@ struct Box {
     }
 };
 
-// Lane by lane over blocks of four points, which compilers turn into SIMD; one minimum after the other
-// would wait for itself.
+// Independent lanes over blocks of four points, so that the compiler vectorizes the loop; a single running
+// minimum would be a serial dependency.
 inline Box box_of(std::span<const glm::vec3> points) {
     constexpr std::size_t lanes = 12;
     std::array<float, lanes> low, high;
@@ -62,7 +62,7 @@ inline Box box_of(std::span<const glm::vec4> spheres) {
     return box;
 }
 
-// The box round a transformed box: exact for the identity, a little wide for rotations.
+// Bounding box of a transformed box: exact for the identity, larger than necessary for rotations.
 inline Box transformed(const float *world_from_object, const Box &box) {
     const float *m = world_from_object;
     Box world;

@@ -2,7 +2,7 @@
 #include "scene/gltf.hpp"
 
 #include "scene/box.hpp"
-#include "scene/mesh_text.hpp"
+#include "scene/mesh_file.hpp"
 #include "scene/motion.hpp"
 
 #include <glm/gtc/quaternion.hpp>
@@ -19,31 +19,31 @@
 namespace arhost::scene {
 namespace {
 
-constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // of a .gltf, a .glb, and each buffer beside it
-constexpr std::size_t empty_accessor_limit = 10'000'000;     // elements that stand in no buffer: zeros
-constexpr double least_scale = 1e-6;                         // scales of 0 hide things, but have no inverse
-// Extensions that a file may require though we pass over them, or that need nothing of us.
+constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // of a .gltf, a .glb, and each external buffer
+constexpr std::size_t empty_accessor_limit = 10'000'000;     // zero elements without a buffer view
+constexpr double min_scale = 1e-6;                           // a scale of 0 hides objects, but has no inverse
+// Required extensions that are accepted: they can be ignored, or need no support.
 constexpr std::string_view harmless_extensions[] = {"KHR_mesh_quantization", "KHR_texture_transform",
                                                     "KHR_lights_punctual"};
 
-// Images are decoded when a material asks for them.
+// Images are decoded later, when a material refers to them.
 bool keep_image_bytes(tinygltf::Image *image, int, std::string *, std::string *, int, int, const unsigned char *bytes,
                       int size, void *) {
     image->image.assign(bytes, bytes + size);
     return true;
 }
 
-bool is_file(const std::string &file, void *) { // a FIFO would be waited for
+bool is_file(const std::string &file, void *) { // opening a FIFO would block
     std::error_code ignored;
     return std::filesystem::is_regular_file(file, ignored);
 }
 
-bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *watch) {
-    static_cast<const Watch *>(watch)->reads(file);
+bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *reporter) {
+    static_cast<const Reporter *>(reporter)->reads(file);
     std::error_code ignored;
     if (is_file(file, nullptr) && std::filesystem::file_size(file, ignored) <= file_limit)
         return tinygltf::ReadWholeFile(content, error, file, nullptr);
-    *error += file + ": is not a regular file, or has more than 4 GiB";
+    *error += file + ": is not a regular file, or is larger than 4 GiB";
     return false;
 }
 
@@ -54,8 +54,8 @@ std::uint32_t number_at(std::string_view bytes, std::size_t offset) { // little-
     return number;
 }
 
-// The JSON of a .gltf, or of a .glb whose chunks fit.
-std::string_view json_of(const MeshText &text) {
+// The JSON of a .gltf or .glb. Fails if a chunk of a .glb exceeds the file.
+std::string_view json_of(const MeshFile &text) {
     const std::string_view all = text.view();
     if (!all.starts_with("glTF"))
         return all;
@@ -65,7 +65,7 @@ std::string_view json_of(const MeshText &text) {
         const std::size_t left = all.size() - at;
         const std::size_t size = left < chunk_header ? left : number_at(all, at);
         if (left < chunk_header || size > left - chunk_header)
-            text.fail("is cut short: a chunk reaches past the file's end");
+            text.fail("is truncated: a chunk extends past the end of the file");
         if (at == header)
             json = all.substr(at + chunk_header, size);
         at += chunk_header + size;
@@ -73,17 +73,17 @@ std::string_view json_of(const MeshText &text) {
     return json;
 }
 
-// What tinygltf does not look at before it reads memory, or calls itself for.
-void check_structure(const MeshText &text) {
+// Checks that tinygltf lacks: out-of-bounds reads and unbounded recursion.
+void check_structure(const MeshFile &text) {
     using Json = nlohmann::json;
-    const auto refuse_depth = [&](int depth, Json::parse_event_t, Json &) {
-        constexpr int deepest = 64;
-        if (depth > deepest)
+    const auto check_depth = [&](int depth, Json::parse_event_t, Json &) {
+        constexpr int max_depth = 64;
+        if (depth > max_depth)
             text.fail("is nested more than 64 deep");
         return true;
     };
     const std::string_view json = json_of(text);
-    const Json root = Json::parse(json.begin(), json.end(), refuse_depth, false); // what is no JSON, tinygltf tells
+    const Json root = Json::parse(json.begin(), json.end(), check_depth, false); // tinygltf reports invalid JSON
     if (!root.is_object())
         return;
     const auto list = [&](const char *key) {
@@ -94,7 +94,7 @@ void check_structure(const MeshText &text) {
         if (!object.is_object() || !object.contains(key))
             return 0;
         if (!object[key].is_number_unsigned())
-            text.fail("has a " + std::string(key) + " that is not a number from 0 on");
+            text.fail("has a " + std::string(key) + " that is not an unsigned integer");
         return object[key].get<std::uint64_t>();
     };
     const Json asset = root.value("asset", Json());
@@ -109,17 +109,17 @@ void check_structure(const MeshText &text) {
                             size = number(views[i], "byteLength");
         const std::uint64_t all = buffer < buffers.size() ? number(buffers[buffer], "byteLength") : 0;
         if (offset > all || size > all - offset)
-            text.fail("buffer view " + std::to_string(i) + " reaches past the end of its buffer");
+            text.fail("buffer view " + std::to_string(i) + " extends past the end of its buffer");
     }
 }
 
-tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
-    const MeshText text = MeshText::read(file, file_limit - 1, watch);
+tinygltf::Model parse(const std::filesystem::path &file, const Reporter &reporter) {
+    const MeshFile text = MeshFile::read(file, file_limit - 1, reporter);
     check_structure(text);
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
     parser.SetFsCallbacks(
-        {is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, const_cast<Watch *>(&watch)});
+        {is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, const_cast<Reporter *>(&reporter)});
     tinygltf::Model model;
     std::string error, warning;
     const std::string folder = file.parent_path().string();
@@ -129,7 +129,7 @@ tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
             ? parser.LoadBinaryFromMemory(&model, &error, &warning,
                                           reinterpret_cast<const unsigned char *>(text.begin()), size, folder)
             : parser.LoadASCIIFromString(&model, &error, &warning, text.begin(), size, folder);
-    const auto in_a_line = [](std::string lines) {
+    const auto on_one_line = [](std::string lines) {
         while (!lines.empty() && lines.back() == '\n')
             lines.pop_back();
         for (char &c : lines)
@@ -138,9 +138,9 @@ tinygltf::Model parse(const std::filesystem::path &file, const Watch &watch) {
         return lines.substr(0, 500);
     };
     if (!good)
-        text.fail("is not a glTF 2.0 file that can be loaded: " + in_a_line(error));
+        text.fail("is not a glTF 2.0 file that can be loaded: " + on_one_line(error));
     if (!warning.empty())
-        watch.info(text.name() + ": " + in_a_line(warning));
+        reporter.info(text.name() + ": " + on_one_line(warning));
     return model;
 }
 
@@ -150,7 +150,7 @@ template <class T> T component(const unsigned char *from) {
     return value;
 }
 
-// What accessors of the file point to, each byte of it looked for before it is read.
+// Reads accessors with bounds checks.
 class Accessors {
 public:
     Accessors(const tinygltf::Model &model, const std::string &name) : model_(model), name_(name) {}
@@ -159,54 +159,54 @@ public:
 
     template <class T> const T &at(const std::vector<T> &table, int index, const char *what) const {
         if (index < 0 || static_cast<std::size_t>(index) >= table.size())
-            fail("names " + std::string(what) + " " + std::to_string(index) + ", but there are " +
+            fail("refers to " + std::string(what) + " " + std::to_string(index) + ", but there are " +
                  std::to_string(table.size()));
         return table[static_cast<std::size_t>(index)];
     }
 
     std::size_t count(int index) const { return at(model_.accessors, index, "accessor").count; }
 
-    // All components in a row, as numbers; integers that are marked so are made 0 to 1 or −1 to 1.
+    // All components of all elements. Normalized integers become 0 to 1 or −1 to 1.
     template <class T> std::vector<T> read(int index, int type, const char *what) const {
         const tinygltf::Accessor &accessor = at(model_.accessors, index, "accessor");
         const std::string name = std::string(what) + " (accessor " + std::to_string(index) + ")";
         if (accessor.type != type)
-            fail(name + " has elements of a wrong type");
+            fail(name + " has the wrong element type");
         const auto width =
             static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
         const std::size_t size = size_of(accessor.componentType, name);
         if (std::is_integral_v<T> && accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE &&
             accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
             accessor.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
-            fail(name + " must have whole numbers without a sign");
+            fail(name + " must have unsigned integer components");
         if (accessor.count > ARHOST_NONE || (accessor.bufferView < 0 && accessor.count > empty_accessor_limit))
             fail(name + " has too many elements");
         std::vector<T> values;
         if (accessor.bufferView >= 0) {
-            const std::size_t own_stride = at(model_.bufferViews, accessor.bufferView, "buffer view").byteStride;
-            const std::size_t stride = own_stride ? own_stride : size * width;
+            const std::size_t view_stride = at(model_.bufferViews, accessor.bufferView, "buffer view").byteStride;
+            const std::size_t stride = view_stride ? view_stride : size * width;
             if (stride < size * width || stride > 4096)
                 fail(name + " has the byte stride " + std::to_string(stride));
             const std::size_t length = accessor.count == 0 ? 0 : (accessor.count - 1) * stride + size * width;
             const unsigned char *from = bytes(accessor.bufferView, accessor.byteOffset, length, name);
-            values.resize(accessor.count * width); // not before it is known that as many bytes are there
+            values.resize(accessor.count * width); // only after the bounds check
             for (std::size_t i = 0; i < accessor.count; ++i)
                 convert<T>(from + i * stride, accessor, width, &values[i * width]);
         } else {
             values.resize(accessor.count * width);
         }
         if (accessor.sparse.isSparse)
-            overlay(accessor, width, size, name, values);
+            apply_sparse(accessor, width, size, name, values);
         return values;
     }
 
 private:
     std::size_t size_of(int component_type, const std::string &name) const {
         if (component_type == TINYGLTF_COMPONENT_TYPE_DOUBLE)
-            fail(name + " has numbers of double precision, which glTF does not know");
+            fail(name + " has double-precision components, which glTF does not support");
         const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(component_type));
         if (size <= 0)
-            fail(name + " has numbers of an unknown type");
+            fail(name + " has an unknown component type");
         return static_cast<std::size_t>(size);
     }
 
@@ -216,7 +216,7 @@ private:
         const auto &data = at(model_.buffers, view.buffer, "buffer").data;
         if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset ||
             offset > view.byteLength || length > view.byteLength - offset)
-            fail(name + " reaches past the end of its buffer");
+            fail(name + " extends past the end of its buffer");
         return data.data() + view.byteOffset + offset;
     }
 
@@ -254,14 +254,14 @@ private:
     }
 
     template <class T>
-    void overlay(const tinygltf::Accessor &accessor, std::size_t width, std::size_t size, const std::string &name,
-                 std::vector<T> &values) const {
+    void apply_sparse(const tinygltf::Accessor &accessor, std::size_t width, std::size_t size,
+                      const std::string &name, std::vector<T> &values) const {
         const auto &sparse = accessor.sparse;
         const int type = sparse.indices.componentType;
         if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 ||
             (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
              type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT))
-            fail(name + " is sparse in a wrong way");
+            fail(name + " has invalid sparse data");
         const auto count = static_cast<std::size_t>(sparse.count);
         const std::size_t index_size = size_of(type, name);
         const unsigned char *indices = bytes(
@@ -273,7 +273,7 @@ private:
                                       : index_size == 2 ? component<std::uint16_t>(indices + 2 * i)
                                                         : component<std::uint32_t>(indices + 4 * i);
             if (index >= accessor.count)
-                fail(name + " is sparse, and an index lies outside");
+                fail(name + " has a sparse index out of range");
             convert<T>(from + i * size * width, accessor, width, &values[index * width]);
         }
     }
@@ -301,65 +301,65 @@ public:
     GltfLoader(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
                const GltfPlacement &placement, const LoadCallbacks &callbacks)
         : builder_(builder), textures_(textures), file_(file), name_(file.string()), placement_(placement),
-          watch_(callbacks, file.filename().string()), model_(parse(file, watch_)), accessors_(model_, name_) {}
+          reporter_(callbacks, file.filename().string()), model_(parse(file, reporter_)), accessors_(model_, name_) {}
 
     float load() {
         check_extensions();
-        order_nodes();
+        collect_nodes();
         choose_animation();
-        for (std::size_t i = 0; i < order_.size(); ++i) {
+        for (std::size_t i = 0; i < nodes_.size(); ++i) {
             add_parts(i);
-            watch_.report(static_cast<double>(i) / static_cast<double>(order_.size()));
+            reporter_.report(static_cast<double>(i) / static_cast<double>(nodes_.size()));
         }
         if (parts_.empty())
-            accessors_.fail("there are no triangles in its default scene");
-        settle_deformations();
+            accessors_.fail("its default scene contains no triangles");
+        bake_static_deformations();
         if (animation_)
             add_motion();
         for (Part &part : parts_)
             add_object(part);
-        tell();
+        log_size();
         return animation_ ? duration_s_ : 0;
     }
 
 private:
-    struct Place {
-        int node;                           // in the file
-        std::uint32_t parent = ARHOST_NONE; // a place
-        glm::dmat4 from_place{1};           // at rest, into the space of placement_.node
-        bool has_channel = false;           // its translation, rotation or scale
-        bool moves = false;                 // it, or one above it
+    struct SceneNode {
+        int file_node;                      // index in the file
+        std::uint32_t parent = ARHOST_NONE; // index in nodes_
+        glm::dmat4 placement_from_node{1};  // in the rest pose, to the space of placement_.node
+        bool has_channel = false;           // its translation, rotation or scale is animated
+        bool moves = false;                 // it or an ancestor is animated
         bool has_weights_channel = false;
         std::vector<float> morph_weights;
     };
 
     struct Part {
         TriangleMesh mesh;
-        std::uint32_t material, place;
+        std::uint32_t material, node; // node: index in nodes_
         int skin;
         std::string name;
         bool deforms = false;
     };
 
     void check_extensions() const {
-        std::string passed_over;
+        std::string ignored;
         for (const std::string &extension : model_.extensionsUsed)
             if (extension != "KHR_mesh_quantization")
-                passed_over += (passed_over.empty() ? "" : ", ") + extension;
+                ignored += (ignored.empty() ? "" : ", ") + extension;
         for (const std::string &extension : model_.extensionsRequired)
             if (std::ranges::find(harmless_extensions, extension) == std::end(harmless_extensions) &&
                 !extension.starts_with("KHR_materials_"))
-                accessors_.fail("needs the extension '" + printable(extension) +
-                                "', which is not known here; export it without");
-        if (!passed_over.empty())
-            watch_.info(name_ + ": passes over the extensions " + printable(passed_over));
+                accessors_.fail("requires the unsupported extension '" + printable(extension) +
+                                "'; export it without");
+        if (!ignored.empty())
+            reporter_.info(name_ + ": ignores the extensions " + printable(ignored));
     }
 
     // ---- nodes ----
 
-    // Parents before their children.
-    void order_nodes() {
-        std::vector<std::pair<int, std::uint32_t>> open;
+    // Lists the nodes of the default scene, parents before children.
+    void collect_nodes() {
+        std::vector<std::pair<int, std::uint32_t>> pending; // node, parent
         if (model_.scenes.empty()) {
             std::vector<bool> is_child(model_.nodes.size());
             for (const tinygltf::Node &node : model_.nodes)
@@ -368,41 +368,42 @@ private:
                         is_child[static_cast<std::size_t>(child)] = true;
             for (std::size_t i = model_.nodes.size(); i-- > 0;)
                 if (!is_child[i])
-                    open.emplace_back(static_cast<int>(i), ARHOST_NONE);
+                    pending.emplace_back(static_cast<int>(i), ARHOST_NONE);
         } else {
             const tinygltf::Scene &scene = accessors_.at(model_.scenes, std::max(model_.defaultScene, 0), "scene");
             for (auto node = scene.nodes.rbegin(); node != scene.nodes.rend(); ++node)
-                open.emplace_back(*node, ARHOST_NONE);
+                pending.emplace_back(*node, ARHOST_NONE);
         }
-        place_of_.assign(model_.nodes.size(), ARHOST_NONE);
+        scene_index_.assign(model_.nodes.size(), ARHOST_NONE);
         const glm::dmat4 root = placement_.from_gltf.matrix();
-        while (!open.empty()) {
-            const auto [index, parent] = open.back();
-            open.pop_back();
+        while (!pending.empty()) {
+            const auto [index, parent] = pending.back();
+            pending.pop_back();
             const tinygltf::Node &node = accessors_.at(model_.nodes, index, "node");
-            std::uint32_t &place = place_of_[static_cast<std::size_t>(index)];
-            if (place != ARHOST_NONE)
-                accessors_.fail("node " + std::to_string(index) + " stands in the tree of nodes twice");
-            place = static_cast<std::uint32_t>(order_.size());
-            order_.push_back({index,
-                              parent,
-                              (parent == ARHOST_NONE ? root : order_[parent].from_place) * local(index),
-                              false,
-                              false,
-                              false,
-                              {}});
+            std::uint32_t &scene_index = scene_index_[static_cast<std::size_t>(index)];
+            if (scene_index != ARHOST_NONE)
+                accessors_.fail("node " + std::to_string(index) + " has more than one parent");
+            scene_index = static_cast<std::uint32_t>(nodes_.size());
+            nodes_.push_back(
+                {index,
+                 parent,
+                 (parent == ARHOST_NONE ? root : nodes_[parent].placement_from_node) * parent_from_node(index),
+                 false,
+                 false,
+                 false,
+                 {}});
             for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
-                open.emplace_back(*child, place);
+                pending.emplace_back(*child, scene_index);
         }
     }
 
-    std::vector<double> numbers(const std::vector<double> &given, std::vector<double> otherwise, int index) const {
-        if (given.empty())
-            return otherwise;
-        if (given.size() != otherwise.size() ||
-            !std::ranges::all_of(given, [](double v) { return std::abs(v) <= coordinate_limit_mm; }))
-            accessors_.fail("node " + std::to_string(index) + " has a place of wrong numbers");
-        return given;
+    std::vector<double> numbers(const std::vector<double> &values, std::vector<double> defaults, int index) const {
+        if (values.empty())
+            return defaults;
+        if (values.size() != defaults.size() ||
+            !std::ranges::all_of(values, [](double v) { return std::abs(v) <= coordinate_limit_mm; }))
+            accessors_.fail("node " + std::to_string(index) + " has an invalid transform");
+        return values;
     }
     glm::dvec3 translation(int index) const {
         return glm::make_vec3(
@@ -410,20 +411,20 @@ private:
     }
     glm::dquat rotation(int index) const {
         const auto r = numbers(model_.nodes[static_cast<std::size_t>(index)].rotation, {0, 0, 0, 1}, index);
-        const glm::dquat turn(r[3], r[0], r[1], r[2]);
-        if (!(glm::length(turn) > 1e-6))
+        const glm::dquat quaternion(r[3], r[0], r[1], r[2]);
+        if (!(glm::length(quaternion) > 1e-6))
             accessors_.fail("node " + std::to_string(index) + " has a rotation of length 0");
-        return glm::normalize(turn);
+        return glm::normalize(quaternion);
     }
     glm::dvec3 scale(int index) const {
         auto s = numbers(model_.nodes[static_cast<std::size_t>(index)].scale, {1, 1, 1}, index);
         for (double &factor : s)
-            if (std::abs(factor) < least_scale)
-                factor = std::copysign(least_scale, factor);
+            if (std::abs(factor) < min_scale)
+                factor = std::copysign(min_scale, factor);
         return glm::make_vec3(s.data());
     }
 
-    glm::dmat4 local(int index) const {
+    glm::dmat4 parent_from_node(int index) const {
         const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(index)];
         if (!node.matrix.empty()) {
             glm::dmat4 matrix = glm::make_mat4(numbers(node.matrix, std::vector<double>(16), index).data());
@@ -448,7 +449,7 @@ private:
             names += (i ? ", " : "") + std::to_string(i) + " '" + printable(model_.animations[i].name) + "'";
         if (!placement_.animation) {
             if (!names.empty())
-                watch_.info(name_ + ": stands still; 'animation' may be one of: " + names);
+                reporter_.info(name_ + ": no animation selected; available for 'animation': " + names);
             return;
         }
         const std::string &wanted = *placement_.animation;
@@ -462,20 +463,20 @@ private:
             animation_ = &model_.animations[number];
         if (!animation_)
             throw AnimationError(name_ + ": has no animation '" + printable(wanted) + "'" +
-                                 (names.empty() ? ", nor any other" : "; there are: " + names));
+                                 (names.empty() ? ", nor any other" : "; available: " + names));
         for (const tinygltf::AnimationChannel &channel : animation_->channels) {
-            if (const auto place = place_of(channel.target_node)) {
+            if (const auto node = find_node(channel.target_node)) {
                 if (channel.target_path == "weights")
-                    order_[*place].has_weights_channel = true;
+                    nodes_[*node].has_weights_channel = true;
                 else if (channel.target_path == "translation" || channel.target_path == "rotation" ||
                          channel.target_path == "scale")
-                    order_[*place].has_channel = true;
+                    nodes_[*node].has_channel = true;
             }
         }
-        for (Place &place : order_) {
-            place.moves = place.has_channel || (place.parent != ARHOST_NONE && order_[place.parent].moves);
-            if (place.has_channel && !model_.nodes[static_cast<std::size_t>(place.node)].matrix.empty())
-                accessors_.fail("node " + std::to_string(place.node) + " has a matrix, so it can't be animated");
+        for (SceneNode &node : nodes_) {
+            node.moves = node.has_channel || (node.parent != ARHOST_NONE && nodes_[node.parent].moves);
+            if (node.has_channel && !model_.nodes[static_cast<std::size_t>(node.file_node)].matrix.empty())
+                accessors_.fail("node " + std::to_string(node.file_node) + " has a matrix, so it can't be animated");
         }
     }
 
@@ -484,36 +485,37 @@ private:
             return ARHOST_INTERPOLATION_STEP;
         if (name == "CUBICSPLINE")
             return ARHOST_INTERPOLATION_CUBIC;
-        if (name != "LINEAR") // which is also tinygltf's where none is named
+        if (name != "LINEAR") // tinygltf's default
             accessors_.fail("an animation has the interpolation '" + printable(name) +
-                            "'; glTF knows LINEAR, STEP and CUBICSPLINE");
+                            "'; glTF defines LINEAR, STEP and CUBICSPLINE");
         return ARHOST_INTERPOLATION_LINEAR;
     }
 
-    std::optional<std::uint32_t> place_of(int node) const {
-        if (node < 0 || static_cast<std::size_t>(node) >= place_of_.size() ||
-            place_of_[static_cast<std::size_t>(node)] == ARHOST_NONE)
+    // Index in nodes_ of a node of the file; nothing if it is not in the scene.
+    std::optional<std::uint32_t> find_node(int node) const {
+        if (node < 0 || static_cast<std::size_t>(node) >= scene_index_.size() ||
+            scene_index_[static_cast<std::size_t>(node)] == ARHOST_NONE)
             return std::nullopt;
-        return place_of_[static_cast<std::size_t>(node)];
+        return scene_index_[static_cast<std::size_t>(node)];
     }
 
-    Channel channel_of(const tinygltf::AnimationChannel &from, std::uint32_t place) {
+    Channel channel_of(const tinygltf::AnimationChannel &from, std::uint32_t node) {
         const tinygltf::AnimationSampler &sampler = accessors_.at(animation_->samplers, from.sampler, "sampler");
         Channel channel;
-        channel.node = first_node_ + place;
+        channel.node = first_node_ + node;
         channel.interpolation = interpolation_of(sampler.interpolation);
         channel.times = accessors_.read<float>(sampler.input, TINYGLTF_TYPE_SCALAR, "an animation's times");
         const auto &times = channel.times;
         if (times.empty() || !(times.front() >= 0 && times.back() <= duration_limit_s))
-            accessors_.fail("an animation has no keys, or times outside 0 to 1e6 s");
+            accessors_.fail("an animation has no keyframes, or times outside 0 to 1e6 s");
         for (std::size_t i = 1; i < times.size(); ++i)
             if (!(times[i] > times[i - 1]))
-                accessors_.fail("an animation's times don't ascend");
+                accessors_.fail("an animation's times are not strictly increasing");
         std::size_t width = 3;
         int type = TINYGLTF_TYPE_VEC3;
         if (from.target_path == "weights") {
             channel.target = ARHOST_CHANNEL_MORPH_WEIGHTS;
-            width = order_[place].morph_weights.size();
+            width = nodes_[node].morph_weights.size();
             type = TINYGLTF_TYPE_SCALAR;
         } else if (from.target_path == "rotation") {
             channel.target = ARHOST_CHANNEL_ROTATION;
@@ -526,70 +528,71 @@ private:
         auto &values = channel.values;
         const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
         if (values.size() != times.size() * width * (cubic ? 3 : 1))
-            accessors_.fail("an animation has " + std::to_string(values.size()) + " numbers for " +
-                            std::to_string(times.size()) + " keys");
+            accessors_.fail("an animation has " + std::to_string(values.size()) + " values for " +
+                            std::to_string(times.size()) + " keyframes");
         if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
-            accessors_.fail("an animation has a number beyond 1e9");
+            accessors_.fail("an animation has a value beyond 1e9");
         if (channel.target == ARHOST_CHANNEL_ROTATION)
             for (std::size_t key = 0; key < times.size(); ++key) {
                 float *v = &values[cubic ? key * 12 + 4 : key * 4];
-                const glm::vec4 turn(v[0], v[1], v[2], v[3]);
-                if (!(glm::length(turn) > 1e-6f && glm::length(turn) < 1e6f))
+                const glm::vec4 rotation(v[0], v[1], v[2], v[3]);
+                if (!(glm::length(rotation) > 1e-6f && glm::length(rotation) < 1e6f))
                     accessors_.fail("an animation has a rotation of length 0");
                 for (int i = 0; i < 4; ++i)
-                    v[i] = turn[i] / glm::length(turn);
+                    v[i] = rotation[i] / glm::length(rotation);
             }
         duration_s_ = std::max(duration_s_, times.back());
         return channel;
     }
 
-    MotionNode node_of(const Place &place) const {
-        MotionNode node;
-        node.morph_weights = place.morph_weights;
-        node.animated = place.has_channel;
-        if (place.has_channel) {
-            const glm::dquat turn = rotation(place.node);
-            node.translation = translation(place.node);
-            node.rotation = glm::vec4(turn.x, turn.y, turn.z, turn.w);
-            node.scale = scale(place.node);
+    MotionNode motion_node(const SceneNode &node) const {
+        MotionNode result;
+        result.morph_weights = node.morph_weights;
+        result.animated = node.has_channel;
+        if (node.has_channel) {
+            const glm::dquat q = rotation(node.file_node);
+            result.translation = translation(node.file_node);
+            result.rotation = glm::vec4(q.x, q.y, q.z, q.w);
+            result.scale = scale(node.file_node);
         } else {
-            node.parent_from_node = glm::dmat4x3(local(place.node));
+            result.parent_from_node = glm::dmat4x3(parent_from_node(node.file_node));
         }
-        return node;
+        return result;
     }
 
-    // A node for the file's space, one for each place below it, and what the animation does with them.
+    // Adds a root node for the file's space, all scene nodes below it, and the channels of the animation.
     void add_motion() {
         MotionNode root;
         root.parent = placement_.node;
         root.parent_from_node = glm::dmat4x3(placement_.from_gltf.matrix());
         const std::uint32_t root_index = builder_.add_node(root);
         first_node_ = root_index + 1;
-        for (const Place &place : order_) {
-            MotionNode node = node_of(place);
-            node.parent = place.parent == ARHOST_NONE ? root_index : first_node_ + place.parent;
-            builder_.add_node(std::move(node));
+        for (const SceneNode &node : nodes_) {
+            MotionNode added = motion_node(node);
+            added.parent = node.parent == ARHOST_NONE ? root_index : first_node_ + node.parent;
+            builder_.add_node(std::move(added));
         }
         for (const tinygltf::AnimationChannel &channel : animation_->channels)
-            if (const auto place = place_of(channel.target_node)) {
+            if (const auto node = find_node(channel.target_node)) {
                 const bool weights = channel.target_path == "weights";
-                if (weights ? !order_[*place].morph_weights.empty() : order_[*place].has_channel)
-                    builder_.add_channel(channel_of(channel, *place));
+                if (weights ? !nodes_[*node].morph_weights.empty() : nodes_[*node].has_channel)
+                    builder_.add_channel(channel_of(channel, *node));
             }
         if (!(duration_s_ > 0))
-            throw AnimationError(name_ + ": the animation '" + printable(*placement_.animation) + "' has no length");
+            throw AnimationError(name_ + ": the animation '" + printable(*placement_.animation) +
+                                 "' has a duration of 0");
     }
 
-    // The skin, its joints counted from `first_node`.
+    // The skin; its joints are indices in nodes_ plus `first_node`.
     Skin skin_of(int index, std::uint32_t first_node) const {
         const tinygltf::Skin &from = accessors_.at(model_.skins, index, "skin");
         Skin skin;
         for (const int joint : from.joints) {
-            const auto place = place_of(joint);
-            if (!place)
+            const auto node = find_node(joint);
+            if (!node)
                 accessors_.fail("skin " + std::to_string(index) + " has the joint " + std::to_string(joint) +
                                 ", which is not in the default scene");
-            skin.joints.push_back(first_node + *place);
+            skin.joints.push_back(first_node + *node);
         }
         if (skin.joints.empty() || skin.joints.size() > 65536)
             accessors_.fail("skin " + std::to_string(index) + " has no joints, or more than 65536");
@@ -599,7 +602,7 @@ private:
                 accessors_.read<float>(from.inverseBindMatrices, TINYGLTF_TYPE_MAT4, "inverse bind matrices");
             if (matrices.size() < 16 * skin.joints.size() ||
                 !std::ranges::all_of(matrices, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
-                accessors_.fail("skin " + std::to_string(index) + " has too few matrices, or a number beyond 1e9");
+                accessors_.fail("skin " + std::to_string(index) + " has too few matrices, or a value beyond 1e9");
             for (std::size_t i = 0; i < skin.joints.size(); ++i)
                 skin.node_from_mesh[i] = glm::mat4x3(glm::make_mat4(&matrices[16 * i]));
         }
@@ -608,43 +611,44 @@ private:
 
     // ---- meshes ----
 
-    void add_parts(std::size_t place_index) {
-        Place &place = order_[place_index];
-        const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(place.node)];
+    void add_parts(std::size_t node_index) {
+        SceneNode &scene_node = nodes_[node_index];
+        const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(scene_node.file_node)];
         if (node.mesh < 0)
             return;
         const tinygltf::Mesh &mesh = accessors_.at(model_.meshes, node.mesh, "mesh");
         const std::size_t targets = mesh.primitives.empty() ? 0 : mesh.primitives.front().targets.size();
         const std::vector<double> &weights = node.weights.empty() ? mesh.weights : node.weights;
-        place.morph_weights.assign(targets, 0);
+        scene_node.morph_weights.assign(targets, 0);
         for (std::size_t i = 0; i < std::min(targets, weights.size()); ++i)
             if (std::abs(weights[i]) <= coordinate_limit_mm)
-                place.morph_weights[i] = static_cast<float>(weights[i]);
+                scene_node.morph_weights[i] = static_cast<float>(weights[i]);
         for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive &primitive = mesh.primitives[i];
             if (primitive.targets.size() != targets)
-                accessors_.fail("the parts of mesh " + std::to_string(node.mesh) +
+                accessors_.fail("the primitives of mesh " + std::to_string(node.mesh) +
                                 " have different numbers of morph targets");
             const std::string &own_name = node.name.empty() ? mesh.name : node.name;
-            Part part{mesh_of(primitive, node.skin >= 0), 0, static_cast<std::uint32_t>(place_index), node.skin,
+            Part part{mesh_of(primitive, node.skin >= 0), 0, static_cast<std::uint32_t>(node_index), node.skin,
                       placement_.name + "/" +
-                          (own_name.empty() ? "node " + std::to_string(place.node) : printable(own_name))};
+                          (own_name.empty() ? "node " + std::to_string(scene_node.file_node) : printable(own_name))};
             if (part.mesh.triangles.empty())
                 continue;
             part.material = placement_.material ? *placement_.material : material_of(primitive.material);
-            settle_texcoords(part);
+            add_missing_texcoords(part);
             parts_.push_back(std::move(part));
         }
     }
 
-    // The file's own materials may name textures where there are no places on them.
-    void settle_texcoords(Part &part) const {
+    // Materials of the file may have textures although the mesh has no texture coordinates.
+    void add_missing_texcoords(Part &part) const {
         const arhost_material &m = builder_.material(part.material);
         if (!part.mesh.texcoords.empty() ||
             (m.colour_texture == ARHOST_NONE && m.metallic_roughness_texture == ARHOST_NONE &&
              m.normal_texture == ARHOST_NONE && m.emission_texture == ARHOST_NONE))
             return;
-        watch_.info(part.name + ": has a texture but no texture coordinates; it is coloured by one corner");
+        reporter_.info(part.name +
+                       ": has a texture but no texture coordinates; uses one corner texel for the whole mesh");
         part.mesh.texcoords.assign(part.mesh.positions.size(), glm::vec2(0));
     }
 
@@ -657,7 +661,7 @@ private:
         const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
         if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
             mode != TINYGLTF_MODE_TRIANGLE_FAN) {
-            watch_.info(name_ + ": points and lines are passed over");
+            reporter_.info(name_ + ": ignores points and lines");
             return mesh;
         }
         const auto vec3s = [&](int accessor, const char *what) {
@@ -667,7 +671,7 @@ private:
             for (const auto &value : values)
                 for (int i = 0; i < value.length(); ++i)
                     if (!(std::abs(value[i]) <= coordinate_limit_mm))
-                        accessors_.fail(std::string(what) + " holds a number beyond 1e9, or none");
+                        accessors_.fail(std::string(what) + " has a value that is NaN or beyond 1e9");
         };
         const int position = attribute(primitive.attributes, "POSITION");
         if (position < 0)
@@ -694,8 +698,8 @@ private:
             read_joints(attribute(primitive.attributes, "JOINTS_0"), attribute(primitive.attributes, "WEIGHTS_0"),
                         count, mesh);
         if (attribute(primitive.attributes, "JOINTS_1") >= 0)
-            watch_.info(name_ + ": of more than four joints a vertex, the first four are used");
-        constexpr std::size_t max_offsets = 100'000'000; // of all targets together
+            reporter_.info(name_ + ": uses only the first four joints of each vertex");
+        constexpr std::size_t max_offsets = 100'000'000; // total of all targets
         if (primitive.targets.size() > max_offsets / std::max<std::size_t>(count, 1))
             accessors_.fail(std::to_string(primitive.targets.size()) + " morph targets of " + std::to_string(count) +
                             " vertices are too many");
@@ -712,7 +716,7 @@ private:
             if (has_normals)
                 append("NORMAL", mesh.morph_normals);
         }
-        settle_normals(mesh, std::nullopt);
+        complete_normals(mesh, std::nullopt);
         return mesh;
     }
 
@@ -728,7 +732,7 @@ private:
         }
         for (const std::uint32_t corner : corners)
             if (corner >= vertex_count)
-                accessors_.fail("a triangle names vertex " + std::to_string(corner) + ", but there are " +
+                accessors_.fail("a triangle refers to vertex " + std::to_string(corner) + ", but there are " +
                                 std::to_string(vertex_count));
         std::vector<glm::uvec3> triangles;
         const std::size_t step = mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1;
@@ -750,7 +754,7 @@ private:
         const auto indices = accessors_.read<std::uint32_t>(joints, TINYGLTF_TYPE_VEC4, "JOINTS_0");
         mesh.weights = vectors<glm::vec4>(accessors_.read<float>(weights, TINYGLTF_TYPE_VEC4, "WEIGHTS_0"));
         if (indices.size() != 4 * count || mesh.weights.size() != count)
-            accessors_.fail("JOINTS_0 or WEIGHTS_0 has not as many elements as there are vertices");
+            accessors_.fail("JOINTS_0 or WEIGHTS_0 does not have one element per vertex");
         mesh.joints.resize(count);
         for (std::size_t v = 0; v < count; ++v) {
             glm::vec4 &w = mesh.weights[v];
@@ -763,19 +767,19 @@ private:
         }
     }
 
-    // What the animation doesn't deform gets its shape at rest for good.
-    void settle_deformations() {
-        ArenaBuilder at_rest; // evaluates it as it does an animation
+    // Applies skins and morph targets that are not animated, in the rest pose.
+    void bake_static_deformations() {
+        ArenaBuilder at_rest; // evaluated like an animation
         at_rest.settings.duration_s = 1;
-        for (const Place &place : order_) {
-            MotionNode node;
-            node.parent_from_node = glm::dmat4x3(place.from_place);
-            node.morph_weights = place.morph_weights;
-            at_rest.add_node(std::move(node));
+        for (const SceneNode &node : nodes_) {
+            MotionNode world_node;
+            world_node.parent_from_node = glm::dmat4x3(node.placement_from_node);
+            world_node.morph_weights = node.morph_weights;
+            at_rest.add_node(std::move(world_node));
         }
         std::vector<Part *> resting;
         for (Part &part : parts_) {
-            const Place &place = order_[part.place];
+            const SceneNode &node = nodes_[part.node];
             const bool morphs = !part.mesh.morph_positions.empty();
             if (part.skin < 0 && !morphs)
                 continue;
@@ -785,16 +789,16 @@ private:
                 for (std::size_t v = 0; v < part.mesh.joints.size(); ++v)
                     for (int i = 0; i < 4; ++i)
                         if (part.mesh.joints[v][i] >= skin.joints.size())
-                            accessors_.fail("a vertex names joint " + std::to_string(part.mesh.joints[v][i]) +
+                            accessors_.fail("a vertex refers to joint " + std::to_string(part.mesh.joints[v][i]) +
                                             ", but the skin has " + std::to_string(skin.joints.size()));
             }
-            part.deforms = (morphs && place.has_weights_channel) ||
-                           std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return order_[j].moves; });
+            part.deforms = (morphs && node.has_weights_channel) ||
+                           std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return nodes_[j].moves; });
             if (part.deforms)
                 continue;
             const std::uint32_t skin_index = part.skin < 0 ? ARHOST_NONE : at_rest.add_skin(std::move(skin));
             at_rest.add_object("", at_rest.add_triangles(std::move(part.mesh)), 0, ARHOST_ROLE_VIRTUAL,
-                               glm::mat4x3(1), {false, true, part.place, skin_index});
+                               glm::mat4x3(1), {false, true, part.node, skin_index});
             resting.push_back(&part);
         }
         if (resting.empty())
@@ -821,24 +825,24 @@ private:
     }
 
     void add_object(Part &part) {
-        const Place &place = order_[part.place];
+        const SceneNode &node = nodes_[part.node];
         triangles_ += part.mesh.triangles.size();
         vertices_ += part.mesh.positions.size();
-        const Transform from_mesh = Transform::of(place.from_place);
+        const Transform from_mesh = Transform::of(node.placement_from_node);
         const bool mirrored = glm::determinant(placement_.from_gltf.matrix()) < 0;
         if (part.deforms && part.skin >= 0) {
-            if (mirrored) // its vertices are put into the world, so its outsides must be too
+            if (mirrored) // skinned vertices are in world space, where the winding is flipped
                 for (glm::uvec3 &t : part.mesh.triangles)
                     std::swap(t.y, t.z);
             const std::uint32_t skin = skin_index(part.skin);
-            const std::uint32_t node = part.mesh.morph_positions.empty() ? ARHOST_NONE : first_node_ + part.place;
-            finish(part, {false, true, node, skin});
-        } else if (part.skin < 0 && (part.deforms || place.moves)) {
+            const bool morphs = !part.mesh.morph_positions.empty();
+            finish(part, {false, true, morphs ? first_node_ + part.node : ARHOST_NONE, skin});
+        } else if (part.skin < 0 && (part.deforms || node.moves)) {
             Box box;
             for (const glm::vec3 &p : part.mesh.positions)
                 box.include(glm::vec3(from_mesh(p)));
             box_.include(box);
-            finish(part, {true, part.deforms, first_node_ + part.place, ARHOST_NONE});
+            finish(part, {true, part.deforms, first_node_ + part.node, ARHOST_NONE});
         } else {
             if (part.skin < 0)
                 from_mesh.apply(part.mesh);
@@ -848,10 +852,10 @@ private:
             for (const glm::vec3 &p : part.mesh.positions) {
                 box_.include(p);
                 if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= coordinate_limit_mm))
-                    accessors_.fail("reaches further than 1e9 mm after its transform");
+                    accessors_.fail("extends beyond 1e9 mm after its transform");
             }
-            const bool carried = placement_.node != ARHOST_NONE;
-            finish(part, {carried, false, placement_.node, ARHOST_NONE});
+            const bool moves = placement_.node != ARHOST_NONE;
+            finish(part, {moves, false, placement_.node, ARHOST_NONE});
         }
     }
 
@@ -867,7 +871,7 @@ private:
         return known->second;
     }
 
-    void tell() const {
+    void log_size() const {
         char text[200];
         if (box_.min.x <= box_.max.x)
             std::snprintf(text, sizeof text, ": %zu triangles, %zu vertices, %.4g x %.4g x %.4g mm", triangles_,
@@ -875,7 +879,7 @@ private:
         else
             std::snprintf(text, sizeof text, ": %zu triangles, %zu vertices, deformed by an animation", triangles_,
                           vertices_);
-        watch_.info(name_ + text);
+        reporter_.info(name_ + text);
     }
 
     // ---- materials ----
@@ -906,11 +910,11 @@ private:
         material.metallic_roughness_texture = texture_of(pbr.metallicRoughnessTexture, false);
         material.normal_texture = texture_of(from.normalTexture, false);
         material.emission_texture = texture_of(from.emissiveTexture, true);
-        settle_alpha(from, material);
+        set_alpha_cutoff(from, material);
         return material;
     }
 
-    void settle_alpha(const tinygltf::Material &from, arhost_material &material) const {
+    void set_alpha_cutoff(const tinygltf::Material &from, arhost_material &material) const {
         const bool is_blended = from.alphaMode == "BLEND";
         if (from.alphaMode == "OPAQUE" || from.alphaMode.empty())
             return;
@@ -922,15 +926,15 @@ private:
         if (!(cutoff >= 0))
             accessors_.fail("the material '" + printable(from.name) + "' has an alphaCutoff below 0");
         const bool is_textured = material.colour_texture != ARHOST_NONE;
-        const auto tell = [&](const char *what) {
-            watch_.info(name_ + ": the material '" + printable(from.name) + "' is " + what);
+        const auto info = [&](const char *what) {
+            reporter_.info(name_ + ": the material '" + printable(from.name) + "' is " + what);
         };
         if (is_blended)
-            tell(is_textured ? "blended, and drawn with holes where its alpha is below 0.5"
-                             : "translucent, and drawn opaque; 'material' may give it glass");
+            info(is_textured ? "blended; drawn with holes where its alpha is below 0.5"
+                             : "translucent; drawn opaque unless 'material' replaces it, for example with glass");
         else if (alpha < cutoff)
-            tell("a hole everywhere by its alphaCutoff, and drawn where its texture is opaque");
-        if (is_textured && cutoff > 0) // of the texture's alpha times the factor
+            info("invisible by its alphaCutoff; drawn where its texture is opaque");
+        if (is_textured && cutoff > 0) // the file's cutoff applies to texture alpha times the factor
             material.alpha_cutoff = alpha > cutoff ? static_cast<float>(cutoff / alpha) : 1;
     }
 
@@ -938,8 +942,8 @@ private:
         if (info.index < 0)
             return ARHOST_NONE;
         if (info.texCoord != 0)
-            watch_.info(name_ + ": a texture uses the texture coordinates " + std::to_string(info.texCoord) +
-                        "; the first ones are taken in their place");
+            reporter_.info(name_ + ": a texture uses texture coordinates " + std::to_string(info.texCoord) +
+                           "; uses the first ones instead");
         const tinygltf::Texture &texture = accessors_.at(model_.textures, info.index, "texture");
         const tinygltf::Image &image = accessors_.at(model_.images, texture.source, "image");
         if (image.image.empty())
@@ -963,16 +967,16 @@ private:
     const std::filesystem::path &file_;
     const std::string name_;
     const GltfPlacement &placement_;
-    const Watch watch_;
+    const Reporter reporter_;
     const tinygltf::Model model_;
     const Accessors accessors_;
-    std::vector<Place> order_;
-    std::vector<std::uint32_t> place_of_; // of the file's nodes: in order_, or ARHOST_NONE
+    std::vector<SceneNode> nodes_;
+    std::vector<std::uint32_t> scene_index_; // file node → index in nodes_ or ARHOST_NONE
     const tinygltf::Animation *animation_ = nullptr;
     float duration_s_ = 0;
-    std::uint32_t first_node_ = 0; // in the arena, that of order_[0]
+    std::uint32_t first_node_ = 0; // arena index of nodes_[0]
     std::vector<Part> parts_;
-    std::map<int, std::uint32_t> materials_, skins_; // of the file → in the arena
+    std::map<int, std::uint32_t> materials_, skins_; // index in the file → index in the arena
     std::size_t triangles_ = 0, vertices_ = 0;
     Box box_;
 };

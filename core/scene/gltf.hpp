@@ -3,6 +3,8 @@
 // glTF 2.0 files, .gltf and .glb: meshes, materials, textures, animations. Private to core/scene.
 #pragma once
 
+#include "scene/arena.hpp"
+#include "scene/callbacks.hpp"
 #include "scene/mesh.hpp"
 #include "scene/shapes.hpp"
 #include "scene/textures.hpp"
@@ -17,16 +19,16 @@ public:
 };
 
 struct GltfPlacement {
-    std::string name;                 // objects are called "name/node"
-    Transform from_gltf;              // into the space of `node`
-    std::uint32_t node = ARHOST_NONE; // that carries it, or the world
+    std::string name;                 // objects are named "name/node"
+    Transform from_gltf;              // to the space of `node`
+    std::uint32_t node = ARHOST_NONE; // the parent node, or ARHOST_NONE for the world
     arhost_role role = ARHOST_ROLE_VIRTUAL;
-    std::optional<std::uint32_t> material; // in place of the file's
-    std::optional<std::string> animation;  // name or number; none: all stands still
+    std::optional<std::uint32_t> material; // replaces the file's materials
+    std::optional<std::string> animation;  // name or index; absent: static
 };
 
-// Adds all meshes of the file's default scene. Returns how many seconds its animation takes, or 0. Throws
-// MeshError, ImageError, or AnimationError where there is no such animation.
+// Adds all meshes of the file's default scene. Returns the duration of the animation in seconds, or 0. Throws
+// MeshError, ImageError, or AnimationError if the animation does not exist.
 float add_gltf(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
                const GltfPlacement &placement, const LoadCallbacks &callbacks);
 

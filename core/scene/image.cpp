@@ -19,10 +19,10 @@
 namespace arhost::scene {
 namespace {
 
-// Once opened, it stays: libraries below OpenImageIO have threads.
+// Never closed: libraries that OpenImageIO loads have threads.
 ReadImage *reader() {
     static ReadImage *const found = [] {
-        // By its path: under sanitizers dlopen is theirs, and knows no RUNPATH of ours.
+        // Absolute path: the sanitizers' dlopen interceptor ignores our RUNPATH.
         const std::filesystem::path file =
             std::filesystem::read_symlink("/proc/self/exe").parent_path() / "../lib/arhost/arhost-images.so";
         void *module = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -34,7 +34,8 @@ ReadImage *reader() {
     return found;
 }
 
-// By content, as names lie. Each name is a decoder's of OpenImageIO; all its other ones stay shut.
+// OpenImageIO's format name by the file's magic number, since file extensions are unreliable. Other decoders are
+// never used.
 const char *format_of(std::string_view start) {
     using namespace std::string_view_literals;
     if (start.starts_with("\x89PNG\r\n"sv))
@@ -68,20 +69,20 @@ std::span<float> floats_of(const Texels &texels) {
     return {reinterpret_cast<float *>(texels.bytes.get()), texels.size / sizeof(float)};
 }
 
-// Light is neither negative nor endless; where a file says so, a word tells.
-void make_finite(const Image &image, const std::string &name, const Watch &watch) {
-    std::size_t mended = 0;
+// Clamps to 0 .. radiance_limit and reports it.
+void clamp_radiance(const Image &image, const std::string &name, const Reporter &reporter) {
+    std::size_t clamped = 0;
     for (float &value : floats_of(image.texels)) {
         if (value >= 0 && value <= radiance_limit) {
             value += 0.f; // −0 becomes 0
             continue;
         }
         value = value > radiance_limit ? radiance_limit : 0; // NaN: 0
-        ++mended;
+        ++clamped;
     }
-    if (mended > 0)
-        watch.info(name + ": " + std::to_string(mended) +
-                   " numbers below 0, above 1e6 or not a number are set to 0 or 1e6");
+    if (clamped > 0)
+        reporter.info(name + ": " + std::to_string(clamped) +
+                      " values below 0, above 1e6 or NaN are clamped to 0 or 1e6");
 }
 
 const std::array<float, 256> &linear_from_byte() {
@@ -94,7 +95,7 @@ const std::array<float, 256> &linear_from_byte() {
     return table;
 }
 
-// Sums over `values`, so that the last is 1; even ones where all are 0.
+// Normalized cumulative sums: the last is 1. Uniform if all values are 0.
 void accumulate(std::span<const double> values, std::span<float> sums) {
     double total = 0;
     for (const double value : values)
@@ -109,17 +110,18 @@ void accumulate(std::span<const double> values, std::span<float> sums) {
 
 } // namespace
 
-Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Watch &watch) {
+Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content,
+                 const Reporter &reporter) {
     const std::string name = file.string();
     if (content.empty())
-        watch.reads(file);
+        reporter.reads(file);
     const char *format = format_of(
         content.empty() ? start_of(file)
                         : std::string(content.begin(), content.begin() + std::min<std::size_t>(8, content.size())));
     if (!format)
-        throw ImageError(name + ": is none of PNG, JPEG, PPM, HDR and EXR by its content; convert it to one of them");
+        throw ImageError(name + ": its content is not PNG, JPEG, PPM, HDR or EXR; convert it to one of them");
     Image image;
-    std::exception_ptr stopped; // which must not fly through a library written without regard to it
+    std::exception_ptr stopped; // exceptions must not propagate through OpenImageIO
     ImageRequest request{format, name, content, {}, {}};
     request.allocate = [&](std::uint32_t width, std::uint32_t height, bool is_float) {
         image.width = width;
@@ -130,7 +132,7 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
     };
     request.report = [&](float fraction) {
         try {
-            watch.report(fraction);
+            reporter.report(fraction);
             return true;
         } catch (...) {
             stopped = std::current_exception();
@@ -147,40 +149,40 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
         throw ImageError(name + ": " + error);
     }
     if (image.is_float)
-        make_finite(image, name, watch);
+        clamp_radiance(image, name, reporter);
     return image;
 }
 
-Image linearised(Image image, const Watch &watch) {
+Image linearized(Image image, const Reporter &reporter) {
     if (image.is_float)
         return image;
     Image linear{image.width, image.height, true, Texels::of_size(image.texels.size * sizeof(float))};
     const std::span<float> to = floats_of(linear.texels);
     for (std::size_t i = 0; i < to.size(); ++i) {
         if (i % (std::size_t(4) * image.width) == 0)
-            watch.report(static_cast<double>(i) / static_cast<double>(to.size()));
+            reporter.report(static_cast<double>(i) / static_cast<double>(to.size()));
         const auto value = std::to_integer<unsigned char>(image.texels.bytes[i]);
         to[i] = i % 4 == 3 ? static_cast<float>(value) / 255 : linear_from_byte()[value];
     }
     return linear;
 }
 
-void add_cumulative_sums(Environment &environment, const Texture &texture, const Watch &watch) {
+void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter) {
     const std::span<const float> texels = floats_of(texture.texels);
     environment.rows.resize(texture.height);
     environment.columns.resize(std::size_t(texture.width) * texture.height);
-    std::vector<double> luminance(texture.width), of_rows(texture.height);
+    std::vector<double> luminance(texture.width), row_sums(texture.height);
     for (std::size_t row = 0; row < texture.height; ++row) {
-        watch.report(static_cast<double>(row) / texture.height);
+        reporter.report(static_cast<double>(row) / texture.height);
         double sum = 0;
         for (std::size_t column = 0; column < texture.width; ++column) {
             const float *t = &texels[4 * (row * texture.width + column)];
             sum += luminance[column] = 0.2126 * t[0] + 0.7152 * t[1] + 0.0722 * t[2]; // Rec. 709
         }
         accumulate(luminance, std::span(environment.columns).subspan(row * texture.width, texture.width));
-        of_rows[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / texture.height);
+        row_sums[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / texture.height);
     }
-    accumulate(of_rows, environment.rows);
+    accumulate(row_sums, environment.rows);
 }
 
 } // namespace arhost::scene

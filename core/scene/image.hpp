@@ -4,7 +4,7 @@
 #pragma once
 
 #include "scene/arena.hpp"
-#include "scene/mesh_text.hpp"
+#include "scene/callbacks.hpp"
 
 #include <filesystem>
 #include <span>
@@ -13,7 +13,7 @@
 
 namespace arhost::scene {
 
-// what() is one sentence for the user that begins with the file.
+// what() is one sentence for the user that starts with the file.
 class ImageError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -21,18 +21,18 @@ public:
 
 struct Image {
     std::uint32_t width = 0, height = 0;
-    bool is_float = false; // four floats a texel, linear light, 0 to 1e6; else R, G, B, A bytes
+    bool is_float = false; // RGBA floats, linear light, 0 to 1e6; else RGBA bytes
     Texels texels;         // first row at the top
 };
 
-// Of files with more than 8 bits a channel, integers become bytes and floats stay floats. Grey and missing
-// alpha are filled in. `content` may be empty: then the file is read.
-Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Watch &watch);
+// Converts integers to 8 bits and keeps floats. Expands grey to RGB and missing alpha to opaque. Reads the file
+// if `content` is empty. Throws ImageError.
+Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Reporter &reporter);
 
-// Four floats a texel, linear light: sRGB-encoded bytes are decoded.
-Image linearised(Image image, const Watch &watch);
+// Converts to RGBA floats in linear light; decodes sRGB-encoded bytes.
+Image linearized(Image image, const Reporter &reporter);
 
-// Cumulative sums of luminance · sin(πv) for choosing directions. `texture` is RGBA32F.
-void add_cumulative_sums(Environment &environment, const Texture &texture, const Watch &watch);
+// Cumulative sums of luminance · sin(πv) for importance sampling. `texture` is RGBA32F.
+void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter);
 
 } // namespace arhost::scene

@@ -12,7 +12,7 @@ using arhost::scene::ImageRequest;
 
 constexpr int side_limit = 16384; // of arhost/scene.h
 
-// One to four channels in place, spread to red, green, blue and alpha.
+// Expands one to four channels to RGBA in place.
 template <class T> void expand(T *texels, std::size_t count, bool grey, int alpha, T opaque) {
     for (T *texel = texels; texel != texels + 4 * count; texel += 4) {
         const T a = alpha < 0 ? opaque : texel[alpha];
@@ -30,17 +30,16 @@ std::string read(const ImageRequest &request) {
     OIIO::ImageSpec wanted, spec;
     wanted["oiio:UnassociatedAlpha"] = 1;
     if (!request.content.empty() && !input->set_ioproxy(&memory))
-        return "can't be loaded: images of the format '" + std::string(request.format) +
-               "' must be files of their own";
+        return "can't be loaded: images of the format '" + std::string(request.format) + "' must be separate files";
     if (!input->open(request.file, spec, wanted))
         return "can't be loaded: " + input->geterror();
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
         return "is a deep or volume image, which can't be a texture";
     if (spec.width < 1 || spec.height < 1 || spec.width > side_limit || spec.height > side_limit)
-        return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; up to " +
-               std::to_string(side_limit) + " a side are loaded, so scale it down";
+        return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; the limit is " +
+               std::to_string(side_limit) + " per side, so scale it down";
     const bool is_float = spec.format.is_floating_point();
-    // Grey, grey with alpha, colour, or colour with alpha; what else an EXR file has is passed over.
+    // Grey, grey with alpha, RGB, or RGBA; ignores further channels of EXR files.
     const bool grey = spec.nchannels < 3;
     const int alpha = spec.nchannels == 2 ? 1 : spec.nchannels > 3 && spec.alpha_channel == 3 ? 3 : -1;
     const int channels = grey ? spec.nchannels : alpha == 3 ? 4 : 3;
@@ -53,9 +52,9 @@ std::string read(const ImageRequest &request) {
                            texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
                            const_cast<ImageRequest *>(&request)))
         return "can't be loaded: " + input->geterror();
-    // What is missing of a cut JPEG the decoder has filled in. What else it notes is harmless.
+    // The decoder fills in the missing part of a truncated JPEG and only notes it. Its other notes are harmless.
     if (const std::string noted = input->geterror(); noted.find("Premature end") != noted.npos)
-        return "is cut short: " + noted;
+        return "is truncated: " + noted;
     const std::size_t count = std::size_t(spec.width) * spec.height;
     if (is_float)
         expand(reinterpret_cast<float *>(texels), count, grey, alpha, 1.f);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/loader.hpp"
 
+#include "scene/box.hpp"
 #include "scene/gltf.hpp"
-#include "scene/mesh_text.hpp"
+#include "scene/mesh_loader.hpp"
 #include "scene/shapes.hpp"
 #include "scene/stand_in.hpp"
 #include "scene/textures.hpp"
@@ -35,14 +36,14 @@ glm::dvec3 number_or_vector(const Node &node) {
 glm::dvec3 position_of(const Node &node) {
     const glm::dvec3 position = vector_of(node);
     if (glm::any(glm::greaterThan(glm::abs(position), glm::dvec3(coordinate_limit_mm))))
-        node.fail("must lie within 1e9 mm");
+        node.fail("must be within 1e9 mm");
     return position;
 }
 
 double length_of(const Node &node) {
     const double length = node.real(0, coordinate_limit_mm);
     if (static_cast<float>(length) <= 0)
-        node.fail("must be more than 0");
+        node.fail("must be greater than 0");
     return length;
 }
 
@@ -53,17 +54,17 @@ double linear_from_srgb(double encoded) {
 
 // "#rrggbb" in sRGB; a number, or a list of three, in linear light.
 glm::vec3 colour_of(const Node &node, double maximum = 1) {
-    const std::string wrong = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
-                              std::string(maximum == 1 ? "1)" : "1e6)");
+    const std::string requirement = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
+                                    std::string(maximum == 1 ? "1)" : "1e6)");
     if (!node.is_scalar() && !node.is_sequence())
-        node.fail(wrong);
+        node.fail(requirement);
     glm::dvec3 colour;
     if (node.is_scalar() && node.text().starts_with('#')) {
         const std::string text = node.text();
         unsigned value = 0;
         const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
         if (text.size() != 7 || error != std::errc() || end != text.data() + 7)
-            node.fail(wrong + ", is '" + text + "'");
+            node.fail(requirement + ", is '" + text + "'");
         for (int i = 0; i < 3; ++i)
             colour[i] = linear_from_srgb((value >> (16 - 8 * i) & 0xff) / 255.0);
     } else {
@@ -71,13 +72,13 @@ glm::vec3 colour_of(const Node &node, double maximum = 1) {
     }
     for (int i = 0; i < 3; ++i)
         if (colour[i] < 0 || colour[i] > maximum)
-            node.fail(wrong);
+            node.fail(requirement);
     return colour;
 }
 
-glm::vec3 colour_or(const Node &parent, std::string_view key, const glm::vec3 &otherwise) {
+glm::vec3 colour_or(const Node &parent, std::string_view key, const glm::vec3 &fallback) {
     const auto node = parent.find(key);
-    return node ? colour_of(*node) : otherwise;
+    return node ? colour_of(*node) : fallback;
 }
 
 void set(float (&to)[3], const glm::vec3 &from) {
@@ -96,7 +97,7 @@ Settings settings_of(const Node &root) {
         settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
     if (const auto node = root.find("ambient"))
         settings.ambient = colour_of(*node, light_limit);
-    else if (root.find("environment")) // which lights from everywhere already
+    else if (root.find("environment")) // replaces ambient light
         settings.ambient = glm::vec3(0);
     if (const auto node = root.find("background"))
         settings.background = colour_of(*node, light_limit);
@@ -112,35 +113,35 @@ Settings settings_of(const Node &root) {
     return settings;
 }
 
-std::uint32_t depth_or(const Node &parent, std::string_view key, std::uint32_t otherwise) {
+std::uint32_t depth_or(const Node &parent, std::string_view key, std::uint32_t fallback) {
     const auto node = parent.find(key);
-    return node ? static_cast<std::uint32_t>(node->integer(0, max_depth_limit)) : otherwise;
+    return node ? static_cast<std::uint32_t>(node->integer(0, max_depth_limit)) : fallback;
 }
 
-float real_or(const Node &parent, std::string_view key, double low, double high, float otherwise) {
+float real_or(const Node &parent, std::string_view key, double low, double high, float fallback) {
     const auto node = parent.find(key);
-    return node ? static_cast<float>(node->real(low, high)) : otherwise;
+    return node ? static_cast<float>(node->real(low, high)) : fallback;
 }
 
-// What is absorbed per mm: as such, or as the colour that is left of white after some way.
+// Absorption per mm, given directly or as the remaining colour of white light after a distance.
 glm::vec3 extinction_of(const Node &glass) {
     const auto extinction = glass.find("extinction");
     const auto attenuation = glass.find("attenuation");
     if (extinction && attenuation)
-        attenuation->fail("says the same as 'extinction'; give one of them");
+        attenuation->fail("duplicates 'extinction'; keep one of them");
     if (extinction)
         return colour_of(*extinction, light_limit);
     if (!attenuation)
         return glm::vec3(0);
     attenuation->allow_keys({"colour", "distance_mm"});
     const Node colour_node = attenuation->require("colour");
-    const glm::vec3 left = colour_of(colour_node);
+    const glm::vec3 remaining = colour_of(colour_node);
     const double distance_mm = attenuation->require("distance_mm").real(1e-3, coordinate_limit_mm);
     glm::vec3 per_mm;
     for (int i = 0; i < 3; ++i) {
-        if (left[i] < 1e-6f)
-            colour_node.fail("must be above 0: no way of glass is quite black");
-        per_mm[i] = static_cast<float>(-std::log(static_cast<double>(left[i])) / distance_mm);
+        if (remaining[i] < 1e-6f)
+            colour_node.fail("must be greater than 0: glass of finite thickness is never fully black");
+        per_mm[i] = static_cast<float>(-std::log(static_cast<double>(remaining[i])) / distance_mm);
     }
     return per_mm;
 }
@@ -151,8 +152,8 @@ arhost_material glass_of(const Node &node) {
                      "refraction_depth"});
     arhost_material glass = make_material(ARHOST_MATERIAL_GLASS);
     glass.index = real_or(node, "index", 1, 4, glass.index);
-    const float at_right_angle = (glass.index - 1) / (glass.index + 1);
-    glass.fresnel_minimum = at_right_angle * at_right_angle;
+    const float normal_incidence = (glass.index - 1) / (glass.index + 1);
+    glass.fresnel_minimum = normal_incidence * normal_incidence;
     if (const auto fresnel = node.find("fresnel")) {
         fresnel->allow_keys({"exponent", "minimum", "maximum"});
         glass.fresnel_exponent = real_or(*fresnel, "exponent", 0.01, 100, glass.fresnel_exponent);
@@ -174,7 +175,7 @@ glm::dvec3 up_of(arhost_axes axes) {
     return axes == ARHOST_AXES_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
 }
 
-// A file, or a map that says how it is to be taken.
+// A file, or a map with the file and its wrap mode and encoding.
 std::uint32_t texture_or_none(const Node &material, std::string_view key, bool is_colour, Textures &textures) {
     const auto node = material.find(key);
     if (!node)
@@ -205,7 +206,7 @@ Environment environment_of(const Node &node, arhost_axes axes, Textures &texture
         node.fail("must be a map with the key 'image'");
     node.allow_keys({"image", "intensity", "rotate_degrees"});
     const float intensity = real_or(node, "intensity", 0, light_limit, 1);
-    const auto turn = node.find("rotate_degrees");
+    const auto rotation = node.find("rotate_degrees");
     const Node image = node.require("image");
     Environment environment;
     try {
@@ -214,10 +215,10 @@ Environment environment_of(const Node &node, arhost_axes axes, Textures &texture
         image.fail(error.what());
     }
     environment.intensity = intensity;
-    // The environment turns with its image: a direction is turned back before it is looked up.
+    // Rotating the environment means rotating directions backwards before the lookup.
     const Transform y_up = axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
     environment.environment_from_world =
-        glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), turn ? -turn->real() : 0)).matrix()));
+        glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), rotation ? -rotation->real() : 0)).matrix()));
     return environment;
 }
 
@@ -243,7 +244,7 @@ arhost_material material_of(const Node &node, Textures &textures) {
         material.metallic_roughness_texture = texture_or_none(node, "metallic_roughness_texture", false, textures);
         material.normal_texture = texture_or_none(node, "normal_texture", false, textures);
         material.emission_texture = texture_or_none(node, "emission_texture", true, textures);
-        if (material.emission_texture != ARHOST_NONE) // multiplied with the number
+        if (material.emission_texture != ARHOST_NONE) // the texture is multiplied by it
             set(material.emission, glm::vec3(1));
         const glm::vec3 colour = colour_or(node, "colour", glm::vec3(1));
         set(material.diffuse, colour);
@@ -254,7 +255,7 @@ arhost_material material_of(const Node &node, Textures &textures) {
             set(material.emission, colour_of(*emission, light_limit));
         return material;
     }
-    // Keys are looked at before any texture is loaded.
+    // Check keys before loading textures.
     if (model == "diffuse")
         node.allow_keys({"model", "ambient", "diffuse", "texture", "alpha_cutoff"});
     else if (model == "specular")
@@ -285,11 +286,11 @@ glm::dvec3 direction_of(const Node &node) {
     const glm::dvec3 direction = vector_of(node);
     const double length = glm::length(direction);
     if (!(length > 1e-9 && length < 1e9))
-        node.fail("has no direction");
+        node.fail("must have a length between 1e-9 and 1e9");
     return direction / length;
 }
 
-// The half sides of a rectangle that shines along `direction`, the first one level.
+// The half sides of a rectangle light that faces `direction`; the first one is horizontal.
 void set_sides(arhost_light &light, const glm::dvec3 &direction, const glm::dvec3 &up, const Node &size_node) {
     const std::vector<double> size = size_node.is_sequence() ? size_node.reals(2) : std::vector(2, size_node.real());
     for (const double side : size)
@@ -352,14 +353,14 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
 Transform step_of(const Node &node) {
     node.allow_keys({"translate", "scale", "rotate"});
     if (node.entries().size() != 1)
-        node.fail("each step of a transform is one of translate, scale and rotate");
+        node.fail("each step of a transform must be one of translate, scale and rotate");
     if (const auto by = node.find("translate"))
         return Transform::translation(position_of(*by));
     if (const auto by = node.find("scale")) {
         const glm::dvec3 factors = number_or_vector(*by);
         for (int i = 0; i < 3; ++i)
             if (!(std::abs(factors[i]) >= 1e-9 && std::abs(factors[i]) <= 1e9))
-                by->fail("each factor must be 1e-9 to 1e9, or that below 0 for a mirrored object");
+                by->fail("the absolute value of each factor must be 1e-9 to 1e9; negative factors mirror");
         return Transform::scaling(factors);
     }
     const Node rotate = node.require("rotate");
@@ -375,39 +376,39 @@ Transform transform_of(const Node &object) {
     return world_from_object;
 }
 
-// An object's way through the keys of its `motion`: a node, and a channel for each part that a key names.
-struct Way {
+// Keyframe motion of an object: a node, and a channel for each property that any key sets.
+struct KeyframeMotion {
     MotionNode node;
     std::vector<Channel> channels;
 };
 
-Way way_of(const Node &motion, bool is_sphere) {
-    motion.allow_keys({"keys"});
-    const Node keys_node = motion.require("keys");
+KeyframeMotion keyframe_motion_of(const Node &node, bool is_sphere) {
+    node.allow_keys({"keys"});
+    const Node keys_node = node.require("keys");
     const std::vector<Node> keys = keys_node.items();
     if (keys.size() < 2)
-        keys_node.fail("needs two keys at least");
-    Way way;
-    way.node.animated = true;
-    const auto channel = [&](const char *part, arhost_channel_target target, const auto &read) {
-        if (std::ranges::none_of(keys, [&](const Node &key) { return key.find(part).has_value(); }))
+        keys_node.fail("needs at least two keys");
+    KeyframeMotion motion;
+    motion.node.animated = true;
+    const auto channel = [&](const char *property, arhost_channel_target target, const auto &read) {
+        if (std::ranges::none_of(keys, [&](const Node &key) { return key.find(property).has_value(); }))
             return;
         Channel channel;
         channel.target = target;
         for (const Node &key : keys) {
             channel.times.push_back(static_cast<float>(key.require("at_s").real()));
-            read(key.find(part), channel.values);
+            read(key.find(property), channel.values);
         }
-        way.channels.push_back(std::move(channel));
+        motion.channels.push_back(std::move(channel));
     };
-    float before = -1;
+    float previous_s = -1;
     for (const Node &key : keys) {
         key.allow_keys({"at_s", "translate", "rotate", "scale"});
         const Node at = key.require("at_s");
         const auto time = static_cast<float>(at.real(0, duration_limit_s));
-        if (!(time > before))
-            at.fail("must be later than the key before");
-        before = time;
+        if (!(time > previous_s))
+            at.fail("must be later than the previous key");
+        previous_s = time;
     }
     channel("translate", ARHOST_CHANNEL_TRANSLATION, [](const auto &node, std::vector<float> &values) {
         const glm::dvec3 by = node ? position_of(*node) : glm::dvec3(0);
@@ -415,24 +416,24 @@ Way way_of(const Node &motion, bool is_sphere) {
     });
     bool is_first = true;
     glm::dvec3 axis(0, 0, 1);
-    double degrees_before = 0;
+    double previous_degrees = 0;
     channel("rotate", ARHOST_CHANNEL_ROTATION, [&](const auto &node, std::vector<float> &values) {
-        const glm::dvec3 axis_before = axis;
+        const glm::dvec3 previous_axis = axis;
         double degrees = 0;
         if (node) {
             node->allow_keys({"axis", "degrees"});
             axis = direction_of(node->require("axis"));
             degrees = node->require("degrees").real(-1e6, 1e6);
         }
-        // From one axis to another the way is the shorter one in any case.
-        const bool about_one = degrees_before == 0 || degrees == 0 || glm::length(axis - axis_before) < 1e-9;
-        const double turn = std::abs(degrees - degrees_before);
-        if (!is_first && about_one && turn >= 180)
+        // Between different axes, the interpolation always takes the shortest path.
+        const bool same_axis = previous_degrees == 0 || degrees == 0 || glm::length(axis - previous_axis) < 1e-9;
+        const double angle = std::abs(degrees - previous_degrees);
+        if (!is_first && same_axis && angle >= 180)
             (node ? *node : keys_node)
-                .fail("turns by " + std::to_string(std::lround(turn)) +
-                      " degrees since the key before, and must turn by less than 180; add a key between the two");
+                .fail("rotates by " + std::to_string(std::lround(angle)) +
+                      " degrees since the previous key; the limit is below 180, so add a key in between");
         is_first = false;
-        degrees_before = degrees;
+        previous_degrees = degrees;
         const double half = std::fmod(degrees, 720) * std::numbers::pi / 360;
         const glm::dvec3 part = axis * std::sin(half);
         values.insert(values.end(), {float(part.x), float(part.y), float(part.z), float(std::cos(half))});
@@ -443,12 +444,12 @@ Way way_of(const Node &motion, bool is_sphere) {
             if (!(by[i] >= 1e-6 && by[i] <= 1e6))
                 node->fail("each factor must be 1e-6 to 1e6");
         if (is_sphere && (by.x != by.y || by.x != by.z))
-            node->fail("scales a sphere unevenly, which would make it an ellipsoid; scale it by one number");
+            node->fail("scales a sphere non-uniformly, which is not supported; use the same factor for all axes");
         values.insert(values.end(), {float(by.x), float(by.y), float(by.z)});
     });
-    if (way.channels.empty())
-        keys_node.fail("name neither translate, rotate nor scale");
-    return way;
+    if (motion.channels.empty())
+        keys_node.fail("set none of translate, rotate and scale");
+    return motion;
 }
 
 glm::dvec3 centre_of(const Node &shape) {
@@ -456,14 +457,18 @@ glm::dvec3 centre_of(const Node &shape) {
     return centre ? position_of(*centre) : glm::dvec3(0);
 }
 
-TriangleMesh cuboid_of(const Node &shape, arhost_axes axes) {
-    shape.allow_keys({"size", "centre"});
-    const Node size_node = shape.require("size");
-    const glm::dvec3 size = number_or_vector(size_node);
+// The sides of a box.
+glm::dvec3 size_of(const Node &node) {
+    const glm::dvec3 size = number_or_vector(node);
     for (int i = 0; i < 3; ++i)
         if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
-            size_node.fail("each side must be 1e-6 to 1e9 mm");
-    return cuboid(centre_of(shape), up_of(axes), size);
+            node.fail("each side must be 1e-6 to 1e9 mm");
+    return size;
+}
+
+TriangleMesh cuboid_of(const Node &shape, arhost_axes axes) {
+    shape.allow_keys({"size", "centre"});
+    return cuboid(centre_of(shape), up_of(axes), size_of(shape.require("size")));
 }
 
 TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
@@ -475,13 +480,8 @@ TriangleMesh plane_of(const Node &shape, arhost_axes axes) {
             size_node.fail("each side must be 1e-6 to 1e9 mm");
     const glm::dvec3 up = up_of(axes);
     glm::dvec3 normal = up;
-    if (const auto node = shape.find("normal")) {
-        normal = vector_of(*node);
-        const double length = glm::length(normal);
-        if (!(length > 1e-9 && length < 1e9))
-            node->fail("has no direction");
-        normal /= length;
-    }
+    if (const auto node = shape.find("normal"))
+        normal = direction_of(*node);
     return rectangle(centre_of(shape), normal, up, {size[0], size[1]});
 }
 
@@ -490,40 +490,31 @@ glm::vec4 sphere_of(const Node &object, const Node &shape, const Transform &worl
     const auto scale = world_from_object.uniform_scale();
     if (!scale)
         object.require("transform")
-            .fail("scales a sphere unevenly, which would make it an ellipsoid; scale it by one number");
+            .fail("scales a sphere non-uniformly, which is not supported; use the same factor for all axes");
     const double radius = length_of(shape.require("radius")) * *scale;
     return {glm::vec3(world_from_object(centre_of(shape))), static_cast<float>(radius)};
 }
 
-// A sphere so small that its radius vanishes in a float, a mesh that ends beyond the limit.
 template <class Points> void check_extent(const Node &shape, const Points &points) {
     for (const auto &point : points)
         for (int i = 0; i < Points::value_type::length(); ++i)
             if (!(std::abs(point[i]) <= coordinate_limit_mm))
-                shape.fail("reaches further than 1e9 mm after its transform");
+                shape.fail("extends beyond 1e9 mm after its transform");
 }
 
 std::string extent_of(const TriangleMesh &mesh) {
-    glm::vec3 low = mesh.positions.front(), high = low;
-    for (const glm::vec3 &p : mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
+    const Box box = box_of(std::span<const glm::vec3>(mesh.positions));
+    const glm::vec3 size = box.max - box.min;
     char text[96];
-    std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", high.x - low.x, high.y - low.y, high.z - low.z);
+    std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", size.x, size.y, size.z);
     return text;
 }
 
-// The knot that stands for a mesh whose file isn't there.
+// The replacement for a missing mesh file.
 TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
     node.allow_keys({"faces", "size"});
     const std::int64_t faces = node.require("faces").integer(stand_in_faces_minimum, stand_in_faces_maximum);
-    const Node size_node = node.require("size");
-    const glm::dvec3 size = number_or_vector(size_node);
-    for (int i = 0; i < 3; ++i)
-        if (!(size[i] >= 1e-6 && size[i] <= coordinate_limit_mm))
-            size_node.fail("each side must be 1e-6 to 1e9 mm");
-    TriangleMesh mesh = stand_in(static_cast<std::uint32_t>(faces), size);
+    TriangleMesh mesh = stand_in(static_cast<std::uint32_t>(faces), size_of(node.require("size")));
     if (options.smooth.value_or(true))
         mesh.normals = smooth_normals(mesh);
     return mesh;
@@ -539,8 +530,8 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
     const bool missing = stand_in && !std::filesystem::exists(path.input_path(), unknown) && !unknown;
     if (missing && callbacks.warning)
         callbacks.warning(path.input_path().string() +
-                          " isn't there: a knot of as many triangles as the scene asks for stands in for it; "
-                          "tools/get-models tells which meshes can be had");
+                          " is missing; drawing a stand-in with the triangle count given in the scene; "
+                          "tools/get-models downloads the available meshes");
     try {
         TriangleMesh mesh =
             missing ? stand_in_of(*stand_in, options) : load_mesh(path.input_path(), options, callbacks);
@@ -574,7 +565,7 @@ public:
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
             if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_))).second)
-                node.fail("the material stands here twice; keep one of them");
+                node.fail("duplicate material; keep one of them");
         }
         if (const auto lights = root_.find("lights"))
             for (const Node &node : lights->items())
@@ -593,9 +584,9 @@ private:
         const Node shape = node.require(shape_key);
         for (const char *key : {"smooth", "stand_in"})
             if (const auto of_mesh = node.find(key); of_mesh && shape_key != "mesh")
-                of_mesh->fail("belongs to a mesh only");
+                of_mesh->fail("is only allowed with 'mesh'");
         if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
-            animation->fail("belongs to a gltf only; other objects may have a 'motion'");
+            animation->fail("is only allowed with 'gltf'; use 'motion' for other objects");
         const std::string name = name_of(node, shape_key + " " + std::to_string(index));
         const auto material_node = shape_key == "gltf" ? node.find("material") : node.require("material");
         std::optional<std::uint32_t> material;
@@ -603,36 +594,37 @@ private:
             material = material_index(*material_node);
         const arhost_role role = role_of(node);
         const Transform world_from_object = transform_of(node);
-        const std::uint32_t carrier = carrier_of(node, shape_key == "sphere");
+        const std::uint32_t motion_node = add_motion(node, shape_key == "sphere");
 
-        LoadCallbacks part = callbacks_; // its progress is a part of the whole scene's
+        LoadCallbacks part = callbacks_; // maps its progress to the whole scene's
         if (callbacks_.progress)
             part.progress = [&](double fraction, const std::string &what) {
                 callbacks_.progress(
                     (static_cast<double>(index) + std::max(fraction, 0.0)) / static_cast<double>(count), what);
             };
         if (shape_key == "gltf") {
-            // A glTF file is y-up by its definition, so it is put upright first.
-            const Transform upright =
+            // glTF is y-up by definition.
+            const Transform to_scene_axes =
                 builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
-            add_gltf_file(node, shape, {name, world_from_object * upright, carrier, role, material, {}}, part);
+            add_gltf_file(node, shape, {name, world_from_object * to_scene_axes, motion_node, role, material, {}},
+                          part);
         } else {
             const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
-            const bool moves = carrier != ARHOST_NONE;
+            const bool moves = motion_node != ARHOST_NONE;
             builder_.add_object(name, geometry, *material, role, glm::mat4x3(1),
-                                {moves, false, carrier, ARHOST_NONE});
+                                {moves, false, motion_node, ARHOST_NONE});
         }
-        Watch(part, name).report(1);
+        Reporter(part, name).report(1);
     }
 
-    // The node of an object's motion.
-    std::uint32_t carrier_of(const Node &object, bool is_sphere) {
+    // Adds the node and channels of the object's `motion`; ARHOST_NONE if it has none.
+    std::uint32_t add_motion(const Node &object, bool is_sphere) {
         const auto motion = object.find("motion");
         if (!motion)
             return ARHOST_NONE;
-        Way way = way_of(*motion, is_sphere);
-        const std::uint32_t node = builder_.add_node(std::move(way.node));
-        for (Channel &channel : way.channels) {
+        KeyframeMotion keyframes = keyframe_motion_of(*motion, is_sphere);
+        const std::uint32_t node = builder_.add_node(std::move(keyframes.node));
+        for (Channel &channel : keyframes.channels) {
             channel.node = node;
             builder_.settings.duration_s = std::max(builder_.settings.duration_s, channel.times.back());
             builder_.add_channel(std::move(channel));
@@ -657,7 +649,6 @@ private:
         }
     }
 
-    // Textures lie on texture coordinates.
     void check_texcoords(const Node &shape, std::uint32_t material_index, bool has_texcoords) const {
         const arhost_material &material = builder_.material(material_index);
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
@@ -672,7 +663,7 @@ private:
         for (const char *key : {"mesh", "gltf", "sphere", "cuboid", "plane"})
             if (const auto shape = node.find(key)) {
                 if (!found.empty())
-                    shape->fail("the object has a " + found + " already; make two objects of them");
+                    shape->fail("the object has a " + found + " already; split it into two objects");
                 found = key;
             }
         if (found.empty())
@@ -680,13 +671,13 @@ private:
         return found;
     }
 
-    static std::string name_of(const Node &node, const std::string &otherwise) {
+    static std::string name_of(const Node &node, const std::string &fallback) {
         const auto name = node.find("name");
         if (!name)
-            return otherwise;
+            return fallback;
         std::string text = name->text();
         if (std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
-            name->fail("must not hold control characters");
+            name->fail("must not contain control characters");
         return text;
     }
 
@@ -718,7 +709,7 @@ private:
             const Spheres spheres = {sphere_of(node, shape, world_from_object)};
             check_extent(shape, spheres);
             if (!(spheres[0].w > 0))
-                shape.fail("its radius vanishes after its transform");
+                shape.fail("its radius is 0 after its transform");
             return builder_.add_spheres(spheres);
         }
         TriangleMesh mesh =

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Scene files: docs/scenes.md describes them.
+// Loads scene files; docs/scenes.md describes the format.
 #pragma once
 
 #include "scene/arena.hpp"
 #include "scene/callbacks.hpp"
-#include "scene/mesh.hpp"
 #include "yaml/yaml.hpp"
 
 #include <filesystem>
 
 namespace arhost::scene {
 
-// Reads a scene file and its meshes. What is wrong in either is thrown as a yaml::Error that names the
-// scene's file, line, column and key; Cancelled is thrown once the callback asks for it.
+// Reads a scene file and its meshes. Throws yaml::Error, which names the scene file, line, column and key, for
+// errors in either; throws Cancelled on request of the callback.
 ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks = {});
 ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks = {});
 

@@ -1,40 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Triangle meshes out of OBJ and PLY files, plain or compressed with gzip.
+// Triangle meshes: the data type that all readers produce, and its normals.
 #pragma once
 
-#include "scene/arena.hpp"
-#include "scene/callbacks.hpp"
+#include <glm/gtc/type_precision.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
-#include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 namespace arhost::scene {
 
-// what() is one sentence for the user that begins with the file and the line, or the byte where there
-// are no lines: "bunny.ply:12: a vertex needs three numbers".
+struct TriangleMesh {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::vec3> normals;   // one per vertex, unit length; empty: flat shading
+    std::vector<glm::vec2> texcoords; // one per vertex, or empty
+    std::vector<glm::uvec3> triangles;
+    // Only for meshes that deform; layout as in arhost_geometry.
+    std::vector<glm::u16vec4> joints{};
+    std::vector<glm::vec4> weights{};
+    std::vector<glm::vec3> morph_positions{}, morph_normals{};
+};
+
+// what() is one sentence for the user that starts with the file and the line, or the byte offset in binary
+// files: "bunny.ply:12: a vertex needs three numbers".
 class MeshError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-struct MeshOptions {
-    // true: normals from the file, or computed where it has none; false: none, flat triangles; absent:
-    // normals where the file has them.
-    std::optional<bool> smooth;
-    // Of the file, and of what it unpacks to: 40 million triangles take about 2 GiB as text.
-    std::uint64_t byte_limit = std::uint64_t(4) << 30;
-};
-
-// Vertices are as in the file, texcoords those of arhost/scene.h, normals of unit length, polygons cut into
-// triangles. At least one triangle.
-TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &options = {},
-                       const LoadCallbacks &callbacks = {});
-
-// Area-weighted means of the triangles' normals. Vertices at the same place share one, so that seams of
-// the texture don't show.
+// Area-weighted means of the triangles' normals. Vertices at the same position share one, which hides
+// texture seams.
 std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh);
+
+// Applies MeshOptions::smooth, normalizes the normals, and computes missing and zero-length ones.
+void complete_normals(TriangleMesh &mesh, std::optional<bool> smooth);
 
 } // namespace arhost::scene

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/motion.hpp"
 
-#include "scene/arena.hpp"
+#include "scene/limits.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -15,7 +15,7 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t spare_floats = 4;
-constexpr float least_scale = 1e-6f; // animations hide things by a scale of 0, which has no inverse
+constexpr float min_scale = 1e-6f; // animations hide objects by a scale of 0, which has no inverse
 
 glm::vec3 vector_of(const float *v) {
     return {v[0], v[1], v[2]};
@@ -33,18 +33,18 @@ glm::dmat4 matrix_of(const float *m) {
 }
 
 glm::dmat4 matrix_of(const glm::vec3 &translation, const glm::quat &rotation, const glm::vec3 &scale) {
-    const glm::dmat3 turned = glm::mat3_cast(glm::dquat(rotation));
+    const glm::dmat3 linear = glm::mat3_cast(glm::dquat(rotation));
     glm::dmat4 matrix(1);
     for (int i = 0; i < 3; ++i) {
-        const double factor = std::abs(scale[i]) < least_scale ? std::copysign(least_scale, scale[i]) : scale[i];
-        matrix[i] = glm::dvec4(turned[i] * factor, 0);
+        const double factor = std::abs(scale[i]) < min_scale ? std::copysign(min_scale, scale[i]) : scale[i];
+        matrix[i] = glm::dvec4(linear[i] * factor, 0);
     }
     matrix[3] = glm::dvec4(translation, 1);
     return matrix;
 }
 
-// Where a ray tracer couldn't use it, since an animation scales to nothing, or extreme numbers have multiplied along
-// the tree of nodes, what is there has shrunk to a point.
+// Shrinks the object to a point if ray tracers could not use the matrix: it is nearly singular, or extreme values
+// have multiplied along the node hierarchy.
 void write(const glm::dmat4 &matrix, float (&to)[12]) {
     std::array<float, 12> values;
     for (int column = 0; column < 4; ++column)
@@ -54,9 +54,9 @@ void write(const glm::dmat4 &matrix, float (&to)[12]) {
     const double size = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
     if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }) ||
         !(std::abs(glm::determinant(linear)) > 1e-9 * size)) {
-        constexpr float nothing = 1e-9f;
+        constexpr float tiny = 1e-9f;
         for (std::size_t i = 0; i < 9; ++i)
-            values[i] = i % 4 == 0 ? nothing : 0;
+            values[i] = i % 4 == 0 ? tiny : 0;
         for (std::size_t i = 9; i < 12; ++i)
             if (!(std::abs(values[i]) <= coordinate_limit_mm))
                 values[i] = 0;
@@ -64,18 +64,18 @@ void write(const glm::dmat4 &matrix, float (&to)[12]) {
     std::ranges::copy(values, to);
 }
 
-// NaN becomes the limit too.
-void keep_within_limit(std::vector<float> &values) {
+// NaN becomes the limit.
+void clamp_coordinates(std::vector<float> &values) {
     constexpr float limit = coordinate_limit_mm;
     for (float &v : values)
         v = v < limit ? (v > -limit ? v : -limit) : limit;
 }
 
-// The interval of a channel's keys that a time lies in.
+// The keyframe interval that contains a time.
 struct Interval {
     std::size_t before, after;
-    float share;    // of the way
-    float length_s; // between the two keys
+    float fraction; // position in the interval, 0 to 1
+    float length_s;
 };
 
 Interval interval_of(std::span<const float> times, float time_s) {
@@ -91,10 +91,10 @@ Interval interval_of(std::span<const float> times, float time_s) {
 } // namespace
 
 MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
-    : scene_(scene), places_(scene.nodes.count), world_from_node_(scene.nodes.count) {
+    : scene_(scene), poses_(scene.nodes.count), world_from_node_(scene.nodes.count) {
     const auto nodes = view<arhost_node>(scene_.nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i)
-        places_[i].morph_weights.resize(nodes[i].morph_weights.count);
+        poses_[i].morph_weights.resize(nodes[i].morph_weights.count);
     const auto objects = view<arhost_object>(scene_.objects);
     for (std::uint32_t i = 0; i < objects.size(); ++i) {
         if (objects[i].moves) {
@@ -115,7 +115,7 @@ MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
 
 arhost_motion MotionEvaluator::at(double time_s) {
     const double within = std::isfinite(time_s) && scene_.duration_s > 0 ? std::fmod(time_s, scene_.duration_s) : 0;
-    place_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within));
+    evaluate_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within));
     const auto objects = view<arhost_object>(scene_.objects);
     for (arhost_moved_object &moved : moved_)
         write(world_from_node_[objects[moved.object].node], moved.world_from_object);
@@ -125,68 +125,67 @@ arhost_motion MotionEvaluator::at(double time_s) {
             deformed_.data(),      static_cast<std::uint32_t>(deformed_.size()), 0};
 }
 
-void MotionEvaluator::place_nodes(float time_s) {
+void MotionEvaluator::evaluate_nodes(float time_s) {
     const auto nodes = view<arhost_node>(scene_.nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-        Place &place = places_[i];
-        place.translation = vector_of(nodes[i].translation);
-        place.rotation = rotation_of(nodes[i].rotation);
-        place.scale = vector_of(nodes[i].scale);
-        std::ranges::copy(view<float>(nodes[i].morph_weights), place.morph_weights.begin());
+        Pose &pose = poses_[i];
+        pose.translation = vector_of(nodes[i].translation);
+        pose.rotation = rotation_of(nodes[i].rotation);
+        pose.scale = vector_of(nodes[i].scale);
+        std::ranges::copy(view<float>(nodes[i].morph_weights), pose.morph_weights.begin());
     }
     for (const arhost_channel &channel : view<arhost_channel>(scene_.channels))
         apply(channel, time_s);
     for (std::size_t i = 0; i < nodes.size(); ++i) { // parents come first
-        const Place &place = places_[i];
-        const glm::dmat4 parent_from_node = nodes[i].animated
-                                                ? matrix_of(place.translation, place.rotation, place.scale)
-                                                : matrix_of(nodes[i].parent_from_node);
+        const Pose &pose = poses_[i];
+        const glm::dmat4 parent_from_node = nodes[i].animated ? matrix_of(pose.translation, pose.rotation, pose.scale)
+                                                              : matrix_of(nodes[i].parent_from_node);
         world_from_node_[i] =
             nodes[i].parent == ARHOST_NONE ? parent_from_node : world_from_node_[nodes[i].parent] * parent_from_node;
     }
 }
 
 void MotionEvaluator::apply(const arhost_channel &channel, float time_s) {
-    Place &place = places_[channel.node];
+    Pose &pose = poses_[channel.node];
     const Interval interval = interval_of(view<float>(channel.times), time_s);
     const std::size_t width = channel.target == ARHOST_CHANNEL_ROTATION        ? 4
-                              : channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS ? place.morph_weights.size()
+                              : channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS ? pose.morph_weights.size()
                                                                                : 3;
     const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
-    const float t = channel.interpolation == ARHOST_INTERPOLATION_STEP ? 0 : interval.share;
+    const float t = channel.interpolation == ARHOST_INTERPOLATION_STEP ? 0 : interval.fraction;
     const float *values = view<float>(channel.values).data();
-    // A key's in-tangent, value and out-tangent, or its value only.
+    // Keyframes hold in-tangent, value and out-tangent, or only a value.
     const auto part = [&](std::size_t key, std::size_t which) {
         return values + (cubic ? key * 3 + which : key) * width;
     };
     const float *a = part(interval.before, 1), *b = part(interval.after, 1);
-    const float *leaving = part(interval.before, 2), *arriving = part(interval.after, 0);
-    const auto mixed = [&](std::size_t i) {
+    const float *out_tangent = part(interval.before, 2), *in_tangent = part(interval.after, 0);
+    const auto interpolated = [&](std::size_t i) {
         if (!cubic || t == 0)
             return a[i] + (b[i] - a[i]) * t;
         const float t2 = t * t, t3 = t2 * t; // glTF 2.0, appendix C.5
-        return (2 * t3 - 3 * t2 + 1) * a[i] + interval.length_s * (t3 - 2 * t2 + t) * leaving[i] +
-               (3 * t2 - 2 * t3) * b[i] + interval.length_s * (t3 - t2) * arriving[i];
+        return (2 * t3 - 3 * t2 + 1) * a[i] + interval.length_s * (t3 - 2 * t2 + t) * out_tangent[i] +
+               (3 * t2 - 2 * t3) * b[i] + interval.length_s * (t3 - t2) * in_tangent[i];
     };
     switch (channel.target) {
     case ARHOST_CHANNEL_TRANSLATION:
-        place.translation = {mixed(0), mixed(1), mixed(2)};
+        pose.translation = {interpolated(0), interpolated(1), interpolated(2)};
         break;
     case ARHOST_CHANNEL_SCALE:
-        place.scale = {mixed(0), mixed(1), mixed(2)};
+        pose.scale = {interpolated(0), interpolated(1), interpolated(2)};
         break;
     case ARHOST_CHANNEL_ROTATION:
         if (cubic) {
-            const glm::quat sum(mixed(3), mixed(0), mixed(1), mixed(2));
+            const glm::quat sum(interpolated(3), interpolated(0), interpolated(1), interpolated(2));
             const float length = glm::length(sum);
-            place.rotation = length > 1e-6f && std::isfinite(length) ? sum / length : rotation_of(a);
+            pose.rotation = length > 1e-6f && std::isfinite(length) ? sum / length : rotation_of(a);
         } else {
-            place.rotation = glm::normalize(glm::slerp(rotation_of(a), rotation_of(b), t)); // the short way
+            pose.rotation = glm::normalize(glm::slerp(rotation_of(a), rotation_of(b), t)); // shortest path
         }
         break;
     default:
         for (std::size_t i = 0; i < width; ++i)
-            place.morph_weights[i] = mixed(i);
+            pose.morph_weights[i] = interpolated(i);
     }
 }
 
@@ -200,7 +199,7 @@ void MotionEvaluator::deform(const arhost_object &object, Deformed &into) const 
         if (targets.count == 0)
             return;
         const float *displacements = view<float>(targets).data();
-        for (const float weight : places_[object.node].morph_weights) {
+        for (const float weight : poses_[object.node].morph_weights) {
             if (weight != 0)
                 for (std::size_t i = 0; i < count; ++i)
                     sums[i] += weight * displacements[i];
@@ -218,11 +217,11 @@ void MotionEvaluator::deform(const arhost_object &object, Deformed &into) const 
             for (int k = 0; k < 3; ++k)
                 into.normals[i + k] = length > 0 && std::isfinite(length) ? normal[k] / length : k == 2;
         }
-    keep_within_limit(into.positions);
+    clamp_coordinates(into.positions);
 }
 
-// Each vertex goes with the weighted mean of its joints (glTF 2.0, 3.7.3.3), and so does its normal, by the
-// mean's inverse transpose: the matrix of its minors, which need not be divided by the determinant.
+// Linear blend skinning (glTF 2.0, 3.7.3.3). Normals use the inverse transpose of the blended matrix: its cofactor
+// matrix, whose missing division by the determinant does not matter after normalization.
 void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const {
     using Matrix = std::array<float, 12>;
     const auto joints = view<std::uint32_t>(skin.joints);
@@ -247,18 +246,18 @@ void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &s
         }
         float *p = &into.positions[3 * v];
         const glm::vec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
-        const glm::vec3 placed = x * p[0] + y * p[1] + z * p[2] + glm::vec3(m[9], m[10], m[11]);
+        const glm::vec3 world = x * p[0] + y * p[1] + z * p[2] + glm::vec3(m[9], m[10], m[11]);
         for (int k = 0; k < 3; ++k)
-            p[k] = placed[k];
+            p[k] = world[k];
         if (into.normals.empty())
             continue;
         float *n = &into.normals[3 * v];
         const glm::vec3 yz = glm::cross(y, z);
-        const glm::vec3 turned = yz * n[0] + glm::cross(z, x) * n[1] + glm::cross(x, y) * n[2];
-        const float length = std::copysign(glm::length(turned), glm::dot(x, yz)); // mirrored: outside stays outside
+        const glm::vec3 normal = yz * n[0] + glm::cross(z, x) * n[1] + glm::cross(x, y) * n[2];
+        const float length = std::copysign(glm::length(normal), glm::dot(x, yz)); // keeps the side if mirrored
         const bool usable = length != 0 && std::isfinite(length);
         for (int k = 0; k < 3; ++k)
-            n[k] = usable ? turned[k] / length : k == 2;
+            n[k] = usable ? normal[k] / length : k == 2;
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where the moving things of a scene are at a time: what arhost/motion.h hands to ray tracers.
+// Evaluates the motion of a scene at a time, as arhost/motion.h passes it to ray tracers.
 #pragma once
 
 #include <arhost/motion.h>
@@ -16,36 +16,36 @@
 
 namespace arhost::scene {
 
-// The scene must be valid (`validate`) and outlive the evaluator. Each needs a thread of its own.
+// The scene must be valid (`validate`) and outlive the evaluator. Not thread-safe.
 class MotionEvaluator {
 public:
     explicit MotionEvaluator(const arhost_scene &scene);
 
-    // The motion begins again every duration_s. What is returned is valid until the next call.
+    // The motion repeats every duration_s. The result is valid until the next call.
     arhost_motion at(double time_s);
 
 private:
-    struct Place {
+    struct Pose {
         glm::vec3 translation{0};
         glm::quat rotation{1, 0, 0, 0};
         glm::vec3 scale{1};
         std::vector<float> morph_weights;
     };
     struct Deformed {
-        std::vector<float> positions, normals; // FLOAT3, with spare floats behind
+        std::vector<float> positions, normals; // FLOAT3, followed by spare floats
     };
 
     template <class T> std::span<const T> view(const arhost_buffer &buffer) const {
         return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene_) + buffer.offset),
                 buffer.count};
     }
-    void place_nodes(float time_s);
+    void evaluate_nodes(float time_s);
     void apply(const arhost_channel &channel, float time_s);
     void deform(const arhost_object &object, Deformed &into) const;
     void skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const;
 
     const arhost_scene &scene_;
-    std::vector<Place> places_; // a node's own
+    std::vector<Pose> poses_; // local pose of each node
     std::vector<glm::dmat4> world_from_node_;
     std::vector<arhost_moved_object> moved_;
     std::vector<Deformed> buffers_;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Wavefront OBJ: v, vn, vt and f. Colours of vertices, groups, smoothing groups, materials, points, lines
-// and curves are passed over.
-#include "scene/mesh_text.hpp"
+#include "scene/obj.hpp"
+
 #include "scene/polygon.hpp"
+
+#include <arhost/scene.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,27 +13,26 @@ namespace {
 
 class ObjParser {
 public:
-    ObjParser(const MeshText &text, const Watch &watch)
-        : text_(text), watch_(watch), p_(text.begin()), end_(text.end()) {}
+    ObjParser(const MeshFile &file, const Reporter &reporter)
+        : file_(file), reporter_(reporter), p_(file.begin()), end_(file.end()) {}
 
     TriangleMesh parse() {
-        if (text_.view().starts_with("\xef\xbb\xbf")) // UTF-8's byte order mark
+        if (file_.view().starts_with("\xef\xbb\xbf")) // UTF-8's byte order mark
             p_ += 3;
         const char *next_report = p_;
         while (p_ < end_) {
             statement();
             skip_line(p_, end_);
             if (p_ >= next_report) {
-                watch_.report(static_cast<double>(p_ - text_.begin()) / static_cast<double>(text_.view().size()));
+                reporter_.report(static_cast<double>(p_ - file_.begin()) / static_cast<double>(file_.view().size()));
                 next_report = p_ + (1 << 20);
             }
         }
         if (corners_[0].empty())
-            text_.fail("there are no triangles in it" +
-                       std::string(other_shapes_ ? ", only points, lines or curves" : "") +
+            file_.fail("contains no triangles" + std::string(other_shapes_ ? ", only points, lines or curves" : "") +
                        (positions_.empty() ? ", nor vertices" : ""));
-        if (names_materials_)
-            watch_.info(text_.name() + ": its MTL materials are passed over; the scene file gives materials");
+        if (uses_materials_)
+            reporter_.info(file_.name() + ": ignores its MTL materials; the scene file defines the materials");
         return mesh();
     }
 
@@ -52,7 +51,7 @@ private:
         else if (word("vt"))
             texcoords_.push_back(numbers<glm::vec2>(line, 1, "a texcoord"));
         else if (word("usemtl") || word("mtllib"))
-            names_materials_ = true;
+            uses_materials_ = true;
         else if (word("l") || word("p") || word("curv") || word("surf"))
             other_shapes_ = true;
     }
@@ -65,7 +64,7 @@ private:
         return true;
     }
 
-    // Over blanks, and over line ends that a backslash hides.
+    // Skips blanks and line continuations (backslash at the line end).
     void skip_gap() {
         while (true) {
             skip_blanks(p_, end_);
@@ -90,19 +89,19 @@ private:
             if (at_line_end()) {
                 if (i >= needed)
                     break;
-                text_.fail_line(line, std::string(what) + " needs " + std::to_string(needed) + " numbers, has " +
+                file_.fail_line(line, std::string(what) + " needs " + std::to_string(needed) + " numbers, has " +
                                           std::to_string(i));
             }
             const char *token = p_;
             if (!read_number(p_, end_, values[i]) || !at_token_end())
-                text_.fail_line(token, "'" + token_at(token, end_) + "' is not a number");
+                file_.fail_line(token, "'" + token_at(token, end_) + "' is not a number");
             if (!std::isfinite(values[i]))
-                text_.fail_line(token, std::string(what) + " has the number '" + token_at(token, end_) + "'");
+                file_.fail_line(token, std::string(what) + " has the number '" + token_at(token, end_) + "'");
         }
         return values;
     }
 
-    // One of v, v/vt, v//vn and v/vt/vn, counted from 1, or from the last one with -1.
+    // Corners are v, v/vt, v//vn or v/vt/vn; indices count from 1, or backwards from -1.
     void face(const char *line) {
         for (auto &corners : polygon_)
             corners.clear();
@@ -121,26 +120,26 @@ private:
                 }
             }
             if (!at_token_end())
-                text_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
+                file_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
             polygon_[Texcoord].push_back(texcoord);
             polygon_[Normal].push_back(normal);
         }
         const auto &polygon = polygon_[Position];
         if (polygon.size() < 3)
-            text_.fail_line(line, "a face needs three corners, has " + std::to_string(polygon.size()));
+            file_.fail_line(line, "a face needs three corners, has " + std::to_string(polygon.size()));
         const auto triangles = triangulate(polygon, positions_, triangles_);
         if (triangles.empty())
-            text_.fail_line(line, "a concave face has " + std::to_string(polygon.size()) + " corners, more than " +
-                                      std::to_string(concave_corner_limit) + "; cut it into triangles");
+            file_.fail_line(line, "a concave face has " + std::to_string(polygon.size()) + " corners, more than " +
+                                      std::to_string(concave_corner_limit) + "; triangulate it");
         if (corners_[Position].size() + triangles.size() >= ARHOST_NONE / 3)
-            text_.fail_line(line, "there are too many triangles");
+            file_.fail_line(line, "too many triangles");
         for (const glm::uvec3 &t : triangles) {
             for (const int kind : {Position, Texcoord, Normal}) {
                 const auto &from = polygon_[kind];
                 if (kind != Position && !used_[kind]) {
                     if (from[t.x] == ARHOST_NONE && from[t.y] == ARHOST_NONE && from[t.z] == ARHOST_NONE)
                         continue;
-                    used_[kind] = true; // the first: those before have none
+                    used_[kind] = true; // earlier triangles have none
                     corners_[kind].resize(corners_[Position].size() - 1, glm::uvec3(ARHOST_NONE));
                 }
                 corners_[kind].emplace_back(from[t.x], from[t.y], from[t.z]);
@@ -151,22 +150,22 @@ private:
     std::uint32_t index(const char *token, std::size_t count, const char *what) {
         std::int64_t value = 0;
         if (!read_integer(p_, end_, value))
-            text_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
-        const std::int64_t from_zero = value < 0 ? static_cast<std::int64_t>(count) + value : value - 1;
-        if (value == 0 || from_zero < 0 || from_zero >= static_cast<std::int64_t>(count))
-            text_.fail_line(token, "a face names " + std::string(what) + " " + std::to_string(value) + ", but " +
-                                       std::to_string(count) + " stand above it");
-        return static_cast<std::uint32_t>(from_zero);
+            file_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
+        const std::int64_t zero_based = value < 0 ? static_cast<std::int64_t>(count) + value : value - 1;
+        if (value == 0 || zero_based < 0 || zero_based >= static_cast<std::int64_t>(count))
+            file_.fail_line(token, "a face refers to " + std::string(what) + " " + std::to_string(value) + ", but " +
+                                       std::to_string(count) + " are defined above");
+        return static_cast<std::uint32_t>(zero_based);
     }
 
     TriangleMesh mesh() {
         if (used_[Normal] && has_gap(corners_[Normal])) {
-            watch_.info(text_.name() + ": some faces have normals and some have none; all are passed over");
+            reporter_.info(file_.name() + ": only some faces have normals; ignores all of them");
             used_[Normal] = false;
         }
         if (!used_[Normal] && !used_[Texcoord])
             return {std::move(positions_), {}, {}, std::move(corners_[Position])};
-        return joined();
+        return with_joined_vertices();
     }
 
     static bool has_gap(const std::vector<glm::uvec3> &corners) {
@@ -176,9 +175,8 @@ private:
         return false;
     }
 
-    // A vertex for each triple of position, texcoord and normal that occurs. A hash table with open
-    // addressing finds the triples again.
-    TriangleMesh joined() {
+    // One vertex per distinct triple of position, texcoord and normal. Hash table with open addressing.
+    TriangleMesh with_joined_vertices() {
         TriangleMesh mesh;
         const std::size_t corner_count = corners_[Position].size() * 3;
         std::vector<std::uint32_t> table(std::bit_ceil(corner_count * 2), ARHOST_NONE);
@@ -213,23 +211,23 @@ private:
         return mesh;
     }
 
-    const MeshText &text_;
-    const Watch &watch_;
+    const MeshFile &file_;
+    const Reporter &reporter_;
     const char *p_, *end_;
     std::vector<glm::vec3> positions_, normals_;
     std::vector<glm::vec2> texcoords_;
-    std::vector<glm::uvec3> corners_[3]; // of the triangles, by kind
+    std::vector<glm::uvec3> corners_[3]; // per triangle, indexed by the enum above
     bool used_[3] = {true, false, false};
     std::vector<std::uint32_t> polygon_[3];
     std::vector<glm::uvec3> triangles_;
-    bool names_materials_ = false, other_shapes_ = false;
+    bool uses_materials_ = false, other_shapes_ = false;
 };
 
 } // namespace
 
-TriangleMesh parse_obj(MeshText &text, const Watch &watch) {
-    text.lone_carriage_returns_to_newlines();
-    return ObjParser(text, watch).parse();
+TriangleMesh parse_obj(MeshFile &file, const Reporter &reporter) {
+    file.normalize_line_ends();
+    return ObjParser(file, reporter).parse();
 }
 
 } // namespace arhost::scene

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// PLY (Turk 1994), ascii and binary of both byte orders: the elements `vertex` and `face`. All other
-// elements and properties are passed over.
-#include "scene/mesh_text.hpp"
+#include "scene/ply.hpp"
+
 #include "scene/polygon.hpp"
+
+#include <arhost/scene.h>
 
 #include <algorithm>
 #include <array>
@@ -51,22 +51,23 @@ enum class Format { None, Ascii, Little, Big };
 struct Header {
     Format format = Format::None;
     std::vector<Element> elements;
-    const char *data = nullptr; // behind it
+    const char *data = nullptr; // first byte after the header
 };
 
 class HeaderParser {
 public:
-    HeaderParser(const MeshText &text, const Watch &watch) : text_(text), watch_(watch), p_(text.begin()) {}
+    HeaderParser(const MeshFile &file, const Reporter &reporter)
+        : file_(file), reporter_(reporter), p_(file.begin()) {}
 
     Header parse() {
-        // How the first line ends tells how the others do; in binary data behind them a \n is a number.
-        const std::string_view all = text_.view();
+        // The first line's ending determines the others'; binary data may contain any of these bytes.
+        const std::string_view all = file_.view();
         if (all.starts_with("ply\r") && !all.starts_with("ply\r\n"))
             line_end_ = '\r';
         next_line(); // "ply"
         while (true) {
-            if (p_ == text_.end())
-                text_.fail_line(line_, "the header has no end_header");
+            if (p_ == file_.end())
+                file_.fail_line(line_, "the header lacks end_header");
             next_line();
             const std::string_view key = word();
             if (key == "end_header")
@@ -78,11 +79,11 @@ public:
             else if (key == "property")
                 property();
             else if (!key.empty() && key != "comment" && key != "obj_info")
-                watch_.info(text_.name() + ": the header's line '" + std::string(line_, line_stop_) +
-                            "' means nothing and is passed over");
+                reporter_.info(file_.name() + ": ignores the unknown header line '" + std::string(line_, line_stop_) +
+                               "'");
         }
         if (header_.format == Format::None)
-            text_.fail_line(text_.begin(), "the header has no format");
+            file_.fail_line(file_.begin(), "the header lacks a format");
         header_.data = p_;
         return std::move(header_);
     }
@@ -90,8 +91,8 @@ public:
 private:
     void next_line() {
         line_ = p_;
-        const char *stop = std::find(p_, text_.end(), line_end_);
-        p_ = stop == text_.end() ? stop : stop + 1;
+        const char *stop = std::find(p_, file_.end(), line_end_);
+        p_ = stop == file_.end() ? stop : stop + 1;
         while (stop > line_ && is_blank(stop[-1]))
             --stop;
         line_stop_ = stop;
@@ -105,7 +106,7 @@ private:
         return {begin, static_cast<std::size_t>(word_ - begin)};
     }
 
-    [[noreturn]] void fail(const std::string &message) const { text_.fail_line(line_, message); }
+    [[noreturn]] void fail(const std::string &message) const { file_.fail_line(line_, message); }
 
     static std::string quoted(std::string_view word) {
         return "'" + token_at(word.data(), word.data() + word.size()) + "'";
@@ -122,7 +123,7 @@ private:
         else
             fail("the format " + quoted(name) + " is not ascii, binary_little_endian or binary_big_endian");
         if (const std::string_view version = word(); version != "1.0")
-            fail("the format's version is " + quoted(version) + ", not 1.0");
+            fail("the format version is " + quoted(version) + ", not 1.0");
     }
 
     void element() {
@@ -139,14 +140,14 @@ private:
 
     void property() {
         if (header_.elements.empty())
-            fail("a property stands before the first element");
+            fail("a property precedes the first element");
         Property property;
         std::string_view type_name = word();
         if (type_name == "list") {
             property.is_list = true;
             property.count_type = type(word());
             if (!is_integer(property.count_type))
-                fail("a list's count must be of an integer type");
+                fail("the count of a list must have an integer type");
             type_name = word();
         }
         property.type = type(type_name);
@@ -161,33 +162,33 @@ private:
         fail("the property type " + quoted(name) + " is unknown");
     }
 
-    const MeshText &text_;
-    const Watch &watch_;
+    const MeshFile &file_;
+    const Reporter &reporter_;
     const char *p_, *line_ = nullptr, *line_stop_ = nullptr, *word_ = nullptr;
     char line_end_ = '\n';
     Header header_;
 };
 
-// The two readers give the values of an element one after the other. They stop at the file's end with an
-// error that names the element.
+// The two readers return the values of an element in order. At the end of the file they fail with an error
+// that names the element.
 class AsciiReader {
 public:
-    static constexpr std::size_t smallest_value(Type) { return 2; } // a digit and what parts it from the next
+    static constexpr std::size_t min_value_size(Type) { return 2; } // a digit and a separator
 
-    AsciiReader(const MeshText &text, const char *data) : text_(text), p_(data) {}
+    AsciiReader(const MeshFile &file, const char *data) : file_(file), p_(data) {}
 
     float real(Type) {
         const char *token = start();
         float value = 0;
-        if (!read_number(p_, text_.end(), value) || !at_token_end())
-            fail("'" + token_at(token, text_.end()) + "' is not a number");
+        if (!read_number(p_, file_.end(), value) || !at_token_end())
+            fail("'" + token_at(token, file_.end()) + "' is not a number");
         return value;
     }
     std::int64_t integer(Type) {
         const char *token = start();
         std::int64_t value = 0;
-        if (!read_integer(p_, text_.end(), value) || !at_token_end())
-            fail("'" + token_at(token, text_.end()) + "' is not a whole number");
+        if (!read_integer(p_, file_.end(), value) || !at_token_end())
+            fail("'" + token_at(token, file_.end()) + "' is not an integer");
         return value;
     }
     void skip(Type) {
@@ -195,40 +196,40 @@ public:
         while (!at_token_end())
             ++p_;
     }
-    // An element stands on a line of its own, so that a missing number can't shift all those behind it.
+    // Each element has its own line, so that a missing number cannot shift the following elements.
     void begin_element(const Element &element, std::uint64_t index) {
         element_ = &element;
         index_ = index;
-        while (p_ < text_.end() && (*p_ == '\n' || is_blank(*p_)))
+        while (p_ < file_.end() && (*p_ == '\n' || is_blank(*p_)))
             ++p_;
         value_ = p_;
-        if (p_ == text_.end())
-            fail("the file is cut short: it ends before " + here() + " of " + std::to_string(element.count));
+        if (p_ == file_.end())
+            fail("the file is truncated before " + here() + " of " + std::to_string(element.count));
     }
     void end_element() {
-        skip_blanks(p_, text_.end());
+        skip_blanks(p_, file_.end());
         value_ = p_;
-        if (p_ < text_.end() && *p_ != '\n')
-            fail(here() + " has more numbers than properties");
+        if (p_ < file_.end() && *p_ != '\n')
+            fail(here() + " has more values than properties");
     }
-    std::uint64_t bytes_left() const { return static_cast<std::uint64_t>(text_.end() - p_) + 1; }
+    std::uint64_t bytes_left() const { return static_cast<std::uint64_t>(file_.end() - p_) + 1; }
     double fraction() const {
-        return static_cast<double>(p_ - text_.begin()) / static_cast<double>(text_.view().size());
+        return static_cast<double>(p_ - file_.begin()) / static_cast<double>(file_.view().size());
     }
-    [[noreturn]] void fail(const std::string &message) const { text_.fail_line(value_, message); }
+    [[noreturn]] void fail(const std::string &message) const { file_.fail_line(value_, message); }
     std::string here() const { return element_->name + " " + std::to_string(index_); }
 
 private:
     const char *start() {
-        skip_blanks(p_, text_.end());
+        skip_blanks(p_, file_.end());
         value_ = p_;
-        if (p_ == text_.end() || *p_ == '\n')
-            fail(here() + " is cut short");
+        if (p_ == file_.end() || *p_ == '\n')
+            fail(here() + " is truncated");
         return p_;
     }
-    bool at_token_end() const { return p_ == text_.end() || is_blank(*p_) || *p_ == '\n'; }
+    bool at_token_end() const { return p_ == file_.end() || is_blank(*p_) || *p_ == '\n'; }
 
-    const MeshText &text_;
+    const MeshFile &file_;
     const char *p_;
     const char *value_ = p_;
     const Element *element_ = nullptr;
@@ -237,10 +238,10 @@ private:
 
 class BinaryReader {
 public:
-    static std::size_t smallest_value(Type type) { return size_of(type); }
+    static std::size_t min_value_size(Type type) { return size_of(type); }
 
-    BinaryReader(const MeshText &text, const char *data, Format format)
-        : text_(text), p_(data), swap_((format == Format::Big) == (std::endian::native == std::endian::little)) {}
+    BinaryReader(const MeshFile &file, const char *data, Format format)
+        : file_(file), p_(data), swap_((format == Format::Big) == (std::endian::native == std::endian::little)) {}
 
     float real(Type type) {
         switch (type) {
@@ -270,7 +271,7 @@ public:
         case Type::Float64:
             break;
         }
-        fail(here() + ": a whole number is needed, the property is real");
+        fail(here() + ": must be an integer, but the property has a float type");
     }
     void skip(Type type) { take(size_of(type)); }
     void begin_element(const Element &element, std::uint64_t index) {
@@ -278,17 +279,17 @@ public:
         index_ = index;
     }
     void end_element() {}
-    std::uint64_t bytes_left() const { return static_cast<std::uint64_t>(text_.end() - p_); }
+    std::uint64_t bytes_left() const { return static_cast<std::uint64_t>(file_.end() - p_); }
     double fraction() const {
-        return static_cast<double>(p_ - text_.begin()) / static_cast<double>(text_.view().size());
+        return static_cast<double>(p_ - file_.begin()) / static_cast<double>(file_.view().size());
     }
-    [[noreturn]] void fail(const std::string &message) const { text_.fail_byte(p_, message); }
+    [[noreturn]] void fail(const std::string &message) const { file_.fail_byte(p_, message); }
     std::string here() const { return element_->name + " " + std::to_string(index_); }
 
 private:
     const char *take(std::size_t size) {
         if (bytes_left() < size)
-            fail("the file is cut short in " + here() + " of " + std::to_string(element_->count));
+            fail("the file is truncated in " + here() + " of " + std::to_string(element_->count));
         const char *at = p_;
         p_ += size;
         return at;
@@ -303,7 +304,7 @@ private:
         return value;
     }
 
-    const MeshText &text_;
+    const MeshFile &file_;
     const char *p_;
     bool swap_;
     const Element *element_ = nullptr;
@@ -320,8 +321,8 @@ bool is_corner_list(const Property &property) {
 
 template <class Reader> class BodyParser {
 public:
-    BodyParser(const MeshText &text, const Watch &watch, const Header &header, Reader reader)
-        : text_(text), watch_(watch), header_(header), reader_(std::move(reader)) {}
+    BodyParser(const MeshFile &file, const Reporter &reporter, const Header &header, Reader reader)
+        : file_(file), reporter_(reporter), header_(header), reader_(std::move(reader)) {}
 
     TriangleMesh parse() {
         const Element *faces = nullptr;
@@ -329,7 +330,7 @@ public:
             if (element.name == "face" && std::ranges::any_of(element.properties, is_corner_list))
                 faces = &element;
         if (!faces || faces->count == 0)
-            text_.fail("there are no triangles in it: the header has no element 'face' with a list 'vertex_indices'");
+            file_.fail("contains no triangles: the header has no element 'face' with a list 'vertex_indices'");
         for (const Element &element : header_.elements) {
             check_count(element);
             if (element.name == "vertex")
@@ -338,23 +339,23 @@ public:
                 read_faces(element);
             else
                 each(element, [&](const Property &property) { skip_value(property); });
-            if (&element == faces) // what stands behind the faces doesn't matter
+            if (&element == faces) // ignore everything after the faces
                 break;
         }
         if (mesh_.triangles.empty())
-            text_.fail("there are no triangles in it: its faces have fewer than three corners");
+            file_.fail("contains no triangles: its faces have fewer than three corners");
         return std::move(mesh_);
     }
 
 private:
-    // A count that the file is too short for would be found at its end only after memory was reserved.
+    // Rejects counts that exceed the file size before memory is reserved for them.
     void check_count(const Element &element) {
-        std::uint64_t smallest = 0;
+        std::uint64_t element_size = 0;
         for (const Property &property : element.properties)
-            smallest += Reader::smallest_value(property.is_list ? property.count_type : property.type);
+            element_size += Reader::min_value_size(property.is_list ? property.count_type : property.type);
         if (element.count > ARHOST_NONE / 4 ||
-            element.count * std::max<std::uint64_t>(smallest, 1) > reader_.bytes_left())
-            text_.fail("its header tells of " + std::to_string(element.count) + " elements '" + element.name +
+            element.count * std::max<std::uint64_t>(element_size, 1) > reader_.bytes_left())
+            file_.fail("the header declares " + std::to_string(element.count) + " elements '" + element.name +
                        "', but only " + std::to_string(reader_.bytes_left()) + " bytes are left for them");
     }
 
@@ -365,15 +366,15 @@ private:
                 read(property);
             reader_.end_element();
             if (i % 65536 == 0)
-                watch_.report(reader_.fraction());
+                reporter_.report(reader_.fraction());
         }
     }
 
     std::uint64_t list_count(const Property &property) {
         const std::int64_t count = reader_.integer(property.count_type);
         if (count < 0 ||
-            static_cast<std::uint64_t>(count) * Reader::smallest_value(property.type) > reader_.bytes_left())
-            reader_.fail(reader_.here() + ": its list '" + property.name + "' has the length " +
+            static_cast<std::uint64_t>(count) * Reader::min_value_size(property.type) > reader_.bytes_left())
+            reader_.fail(reader_.here() + ": the list '" + property.name + "' has the length " +
                          std::to_string(count));
         return static_cast<std::uint64_t>(count);
     }
@@ -399,7 +400,7 @@ private:
                 present[static_cast<std::size_t>(slot)] = true;
         }
         if (!(present[X] && present[X + 1] && present[X + 2]))
-            text_.fail("its vertices lack x, y or z");
+            file_.fail("the vertices lack x, y or z");
         const bool has_normals = present[NX] && present[NX + 1] && present[NX + 2];
         const bool has_texcoords = present[S] && present[S + 1];
         mesh_ = {};
@@ -416,7 +417,7 @@ private:
             } else {
                 const float value = reader_.real(property.type);
                 if (!std::isfinite(value))
-                    reader_.fail(reader_.here() + " has a number '" + property.name + "' that is not finite");
+                    reader_.fail(reader_.here() + ": '" + property.name + "' is not finite");
                 values[static_cast<std::size_t>(slot)] = value;
             }
             if (++at < slots.size())
@@ -440,8 +441,8 @@ private:
             for (std::uint64_t i = 0; i < count; ++i) {
                 const std::int64_t index = reader_.integer(property.type);
                 if (index < 0 || static_cast<std::uint64_t>(index) >= mesh_.positions.size())
-                    reader_.fail(reader_.here() + " names vertex " + std::to_string(index) + ", but there are " +
-                                 std::to_string(mesh_.positions.size()) + " above it");
+                    reader_.fail(reader_.here() + " refers to vertex " + std::to_string(index) + ", but " +
+                                 std::to_string(mesh_.positions.size()) + " are defined above");
                 polygon_.push_back(static_cast<std::uint32_t>(index));
             }
             add_polygon();
@@ -458,13 +459,13 @@ private:
         const auto triangles = triangulate(polygon_, mesh_.positions, triangles_);
         if (triangles.empty())
             reader_.fail(reader_.here() + " is concave and has " + std::to_string(polygon_.size()) +
-                         " corners, more than " + std::to_string(concave_corner_limit) + "; cut it into triangles");
+                         " corners, more than " + std::to_string(concave_corner_limit) + "; triangulate it");
         for (const glm::uvec3 &t : triangles)
             mesh_.triangles.emplace_back(polygon_[t.x], polygon_[t.y], polygon_[t.z]);
     }
 
-    const MeshText &text_;
-    const Watch &watch_;
+    const MeshFile &file_;
+    const Reporter &reporter_;
     const Header &header_;
     Reader reader_;
     TriangleMesh mesh_;
@@ -474,13 +475,13 @@ private:
 
 } // namespace
 
-TriangleMesh parse_ply(MeshText &text, const Watch &watch) {
-    const Header header = HeaderParser(text, watch).parse();
+TriangleMesh parse_ply(MeshFile &file, const Reporter &reporter) {
+    const Header header = HeaderParser(file, reporter).parse();
     if (header.format == Format::Ascii) {
-        text.lone_carriage_returns_to_newlines();
-        return BodyParser(text, watch, header, AsciiReader(text, header.data)).parse();
+        file.normalize_line_ends();
+        return BodyParser(file, reporter, header, AsciiReader(file, header.data)).parse();
     }
-    return BodyParser(text, watch, header, BinaryReader(text, header.data, header.format)).parse();
+    return BodyParser(file, reporter, header, BinaryReader(file, header.data, header.format)).parse();
 }
 
 } // namespace arhost::scene

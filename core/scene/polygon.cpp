@@ -11,7 +11,7 @@
 namespace arhost::scene {
 namespace {
 
-// Newell's method (Sutherland et al. 1974): robust where corners are collinear or not quite coplanar.
+// Newell's method (Sutherland et al. 1974): robust for collinear and slightly non-coplanar corners.
 glm::dvec3 newell_normal(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions) {
     glm::dvec3 normal(0);
     for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -21,13 +21,13 @@ glm::dvec3 newell_normal(std::span<const std::uint32_t> polygon, std::span<const
     return normal;
 }
 
-// Twice the signed area of a triangle, positive where it turns left.
-double turn(const glm::dvec2 &a, const glm::dvec2 &b, const glm::dvec2 &c) {
+// Twice the signed area of a triangle; positive if counter-clockwise.
+double signed_area2(const glm::dvec2 &a, const glm::dvec2 &b, const glm::dvec2 &c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// Seen along its normal, so that the polygon turns left.
-std::vector<glm::dvec2> flattened(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions) {
+// Drops the largest component of the normal; the result is counter-clockwise.
+std::vector<glm::dvec2> projected(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions) {
     const glm::dvec3 normal = newell_normal(polygon, positions), size = glm::abs(normal);
     const int dropped = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
     int u = (dropped + 1) % 3, v = (dropped + 2) % 3;
@@ -42,29 +42,30 @@ std::vector<glm::dvec2> flattened(std::span<const std::uint32_t> polygon, std::s
 bool is_convex(const std::vector<glm::dvec2> &points) {
     const std::size_t n = points.size();
     for (std::size_t i = 0; i < n; ++i)
-        if (turn(points[i], points[(i + 1) % n], points[(i + 2) % n]) < 0)
+        if (signed_area2(points[i], points[(i + 1) % n], points[(i + 2) % n]) < 0)
             return false;
     return true;
 }
 
-void cut_ears(const std::vector<glm::dvec2> &points, std::vector<glm::uvec3> &triangles) {
-    std::vector<std::uint32_t> left(points.size());
-    std::iota(left.begin(), left.end(), 0u);
+void clip_ears(const std::vector<glm::dvec2> &points, std::vector<glm::uvec3> &triangles) {
+    std::vector<std::uint32_t> remaining(points.size());
+    std::iota(remaining.begin(), remaining.end(), 0u);
     std::size_t at = 0, failed = 0;
-    while (left.size() > 3) {
-        const std::size_t n = left.size();
-        const std::uint32_t a = left[(at + n - 1) % n], b = left[at % n], c = left[(at + 1) % n];
-        const double area = turn(points[a], points[b], points[c]);
-        const bool ear = area >= 0 && std::none_of(left.begin(), left.end(), [&](std::uint32_t i) {
+    while (remaining.size() > 3) {
+        const std::size_t n = remaining.size();
+        const std::uint32_t a = remaining[(at + n - 1) % n], b = remaining[at % n], c = remaining[(at + 1) % n];
+        const double area = signed_area2(points[a], points[b], points[c]);
+        const bool ear = area >= 0 && std::none_of(remaining.begin(), remaining.end(), [&](std::uint32_t i) {
                              const glm::dvec2 &p = points[i];
                              return p != points[a] && p != points[b] && p != points[c] &&
-                                    turn(points[a], points[b], p) >= 0 && turn(points[b], points[c], p) >= 0 &&
-                                    turn(points[c], points[a], p) >= 0;
+                                    signed_area2(points[a], points[b], p) >= 0 &&
+                                    signed_area2(points[b], points[c], p) >= 0 &&
+                                    signed_area2(points[c], points[a], p) >= 0;
                          });
-        // A polygon that crosses itself can run out of ears: then any corner goes.
+        // A self-intersecting polygon can run out of ears; then clip any corner.
         if (ear || failed == n) {
             triangles.emplace_back(a, b, c);
-            left.erase(left.begin() + static_cast<std::ptrdiff_t>(at % n));
+            remaining.erase(remaining.begin() + static_cast<std::ptrdiff_t>(at % n));
             at = at % n == n - 1 ? 0 : at % n;
             failed = 0;
         } else {
@@ -72,7 +73,7 @@ void cut_ears(const std::vector<glm::dvec2> &points, std::vector<glm::uvec3> &tr
             ++failed;
         }
     }
-    triangles.emplace_back(left[0], left[1], left[2]);
+    triangles.emplace_back(remaining[0], remaining[1], remaining[2]);
 }
 
 } // namespace
@@ -81,10 +82,10 @@ std::span<const glm::uvec3> triangulate(std::span<const std::uint32_t> polygon, 
                                         std::vector<glm::uvec3> &triangles) {
     triangles.clear();
     if (polygon.size() > 3) {
-        const std::vector<glm::dvec2> points = flattened(polygon, positions);
+        const std::vector<glm::dvec2> points = projected(polygon, positions);
         if (!is_convex(points)) {
             if (polygon.size() <= concave_corner_limit)
-                cut_ears(points, triangles);
+                clip_ears(points, triangles);
             return triangles;
         }
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Polygons into triangles. Private to core/scene.
+// Polygon triangulation. Private to core/scene.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -11,12 +11,12 @@
 
 namespace arhost::scene {
 
-// A concave polygon with more corners than this isn't cut: the time grows with their square at least.
+// Concave polygons with more corners are rejected: ear clipping takes at least quadratic time.
 inline constexpr std::size_t concave_corner_limit = 1000;
 
-// Triangles as places in `polygon` (0 to its size − 1), wound as it is. A convex polygon becomes a fan, a
-// concave one is cut ear by ear (Meisters 1975). Empty where it is concave with too many corners.
-// `polygon` holds at least 3 indices into `positions`.
+// Triangles as indices into `polygon`, with its winding: a fan for a convex polygon, ear clipping (Meisters
+// 1975) for a concave one. Empty if it is concave with more than concave_corner_limit corners. `polygon` holds
+// at least 3 indices into `positions`; the result is stored in `triangles`.
 std::span<const glm::uvec3> triangulate(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions,
                                         std::vector<glm::uvec3> &triangles);
 

@@ -76,10 +76,11 @@ TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::d
             glm::dvec3 normal(0), middle(centre);
             normal[axis] = side * 2;
             middle[axis] += side * size[axis];
-            // The face's own width and height, by the axes that they go along.
-            const bool level = glm::dot(up, normal) != 0;
-            const int along = level ? 3 - axis : up.z != 0 ? 2 : 1, across = 3 - axis - along;
-            const glm::dvec2 extent = level ? glm::dvec2(size.x, size[along]) : glm::dvec2(size[across], size[along]);
+            // The axes along which the face's width and height run.
+            const bool horizontal = glm::dot(up, normal) != 0;
+            const int along = horizontal ? 3 - axis : up.z != 0 ? 2 : 1, across = 3 - axis - along;
+            const glm::dvec2 extent =
+                horizontal ? glm::dvec2(size.x, size[along]) : glm::dvec2(size[across], size[along]);
             const TriangleMesh face = rectangle(middle, normal, up, extent);
             const auto first = static_cast<std::uint32_t>(mesh.positions.size());
             mesh.positions.insert(mesh.positions.end(), face.positions.begin(), face.positions.end());

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Transforms that are put into the vertices, and the shapes that scene files know by name. Private to
-// core/scene.
+// Transforms that are baked into vertices, and the built-in shapes of scene files. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/mesh.hpp"
 
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
@@ -14,7 +13,7 @@
 
 namespace arhost::scene {
 
-// p → linear · p + offset. A product is applied from right to left.
+// p → linear · p + offset. Products apply from right to left.
 class Transform {
 public:
     Transform() = default;
@@ -29,11 +28,11 @@ public:
     glm::dmat4 matrix() const;
     glm::dvec3 operator()(const glm::dvec3 &point) const { return linear_ * point + offset_; }
 
-    // The factor of all lengths, or nothing where it differs by direction.
+    // The scale factor, or nothing if it depends on the direction.
     std::optional<double> uniform_scale() const;
 
-    // Normals by the inverse transpose; a mirroring one turns the triangles round, so that their outsides
-    // stay outside.
+    // Normals by the inverse transpose. A mirroring transform flips the winding, so that front faces stay front
+    // faces.
     void apply(TriangleMesh &mesh) const;
 
 private:
@@ -42,13 +41,12 @@ private:
     glm::dvec3 offset_{0};
 };
 
-// 2 triangles, counter-clockwise seen from where `normal` points to. The first side is level, the second
-// goes as far `up` as the rectangle allows. Where it lies flat, they go along x and along y (z-up) or −z
-// (y-up).
+// 2 triangles, counter-clockwise seen from the side `normal` points to. The first side is horizontal, the second
+// as close to `up` as possible. In a horizontal rectangle, they run along x and along y (z-up) or −z (y-up).
 TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &unit_normal, const glm::dvec3 &up,
                        const glm::dvec2 &size);
 
-// Six such rectangles that look outwards. A texture is seen whole and upright on each.
+// Six rectangles that face outwards, each with the whole texture, upright.
 TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::dvec3 &size);
 
 } // namespace arhost::scene

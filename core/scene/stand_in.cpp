@@ -13,9 +13,8 @@ namespace {
 
 constexpr double two_pi = 2 * std::numbers::pi;
 
-// The knot winds twice about the axis of a torus of radii 2 and 1, and three times through its hole, z being the
-// way through. `along` and `around`, 0 to 1, are where on the tube; seen from outside, the second turns
-// counter-clockwise from the first.
+// (2,3) torus knot on a torus of radii 2 and 1 with axis z. `along` and `around`, 0 to 1, are the position on the
+// tube; seen from outside, `around` runs counter-clockwise from `along`.
 glm::dvec3 on_knot(double along, double around) {
     const double t = two_pi * along, angle = two_pi * around;
     const auto centre = [](double t) {
@@ -25,9 +24,9 @@ glm::dvec3 on_knot(double along, double around) {
     constexpr double h = 1e-4;
     const glm::dvec3 tangent = glm::normalize(centre(t + h) - centre(t - h));
     const glm::dvec3 outward(std::cos(3 * t) * std::cos(2 * t), std::cos(3 * t) * std::sin(2 * t), std::sin(3 * t));
-    const glm::dvec3 aside = glm::cross(outward, tangent);
+    const glm::dvec3 sideways = glm::cross(outward, tangent);
     const double radius = 0.5 + 0.06 * std::sin(12 * t) * std::cos(3 * angle) + 0.05 * std::sin(3 * t);
-    return centre(t) + radius * (std::cos(angle) * outward + std::sin(angle) * aside);
+    return centre(t) + radius * (std::cos(angle) * outward + std::sin(angle) * sideways);
 }
 
 void fit(TriangleMesh &mesh, const glm::dvec3 &size) {
@@ -44,7 +43,8 @@ void fit(TriangleMesh &mesh, const glm::dvec3 &size) {
 } // namespace
 
 TriangleMesh stand_in(std::uint32_t faces, const glm::dvec3 &size) {
-    // Quads of two triangles, about as long as wide; what is over splits quads into four, then one triangle.
+    // Roughly square quads of two triangles. To reach the exact count, some quads are split into four triangles,
+    // and finally one triangle into two.
     const std::uint32_t pairs = faces / 2;
     const auto around = std::clamp(static_cast<std::uint32_t>(std::sqrt(pairs / 9.0)), 3u, pairs / 3);
     const std::uint32_t along = pairs / around;

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What is drawn for a mesh whose file isn't there. Private to core/scene.
+// Replacement mesh for a missing mesh file. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/mesh.hpp"
+
+#include <cstdint>
 
 namespace arhost::scene {
 
 inline constexpr std::uint32_t stand_in_faces_minimum = 100, stand_in_faces_maximum = 20'000'000;
 
-// A trefoil knot of a bumpy tube with exactly so many triangles, without normals, wound counter-clockwise seen
-// from outside. It fills the box `size` that stands on y = 0, its middle above the origin, as the meshes of
-// tools/get-models do. It is closed, but for an odd number of triangles, which no closed mesh has: one vertex
-// then lies on the middle of its neighbour's edge.
+// A bumpy tube along a trefoil knot with exactly `faces` triangles, no normals, counter-clockwise seen from
+// outside. Its bounding box is `size`, stands on y = 0 and is centred above the origin, like the meshes of
+// tools/get-models. It is closed for an even number of triangles; closed meshes with an odd number do not exist,
+// so one vertex is then a T-junction on its neighbour's edge.
 TriangleMesh stand_in(std::uint32_t faces, const glm::dvec3 &size);
 
 } // namespace arhost::scene

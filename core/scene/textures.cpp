@@ -4,8 +4,8 @@
 namespace arhost::scene {
 namespace {
 
-// A texture's name is shown to users, and `validate` refuses control characters.
-std::string shown(std::string text) {
+// Names are shown to users, and `validate` rejects control characters.
+std::string printable(std::string text) {
     for (char &c : text)
         if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
             c = '?';
@@ -14,9 +14,9 @@ std::string shown(std::string text) {
 
 } // namespace
 
-LoadCallbacks Textures::of_an_image() const {
+LoadCallbacks Textures::image_callbacks() const {
     LoadCallbacks callbacks = callbacks_;
-    if (callbacks_.progress) // of the scene's whole work, an image counts as nothing
+    if (callbacks_.progress) // images do not advance the scene's progress
         callbacks.progress = [this](double fraction, const std::string &what) {
             callbacks_.progress(0, what + ": " + std::to_string(static_cast<int>(fraction * 100)) + " %");
         };
@@ -30,8 +30,8 @@ std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse 
         known_.try_emplace(name + '\n' + char('0' + use.is_colour) + char('0' + use.wrap_u) + char('0' + use.wrap_v));
     if (!is_new)
         return known->second;
-    const LoadCallbacks callbacks = of_an_image();
-    Image image = read_image(file, content, Watch(callbacks, file.filename().string()));
+    const LoadCallbacks callbacks = image_callbacks();
+    Image image = read_image(file, content, Reporter(callbacks, file.filename().string()));
     Texture texture{image.is_float  ? ARHOST_TEXEL_RGBA32F
                     : use.is_colour ? ARHOST_TEXEL_SRGB8
                                     : ARHOST_TEXEL_RGBA8,
@@ -40,18 +40,18 @@ std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse 
                     use.wrap_u,
                     use.wrap_v,
                     std::move(image.texels)};
-    return known->second = builder_.add_texture(shown(name), std::move(texture));
+    return known->second = builder_.add_texture(printable(name), std::move(texture));
 }
 
 Environment Textures::add_environment(const std::filesystem::path &file) {
-    const LoadCallbacks callbacks = of_an_image();
-    const Watch watch(callbacks, file.filename().string());
-    Image image = linearised(read_image(file, {}, watch), watch);
+    const LoadCallbacks callbacks = image_callbacks();
+    const Reporter reporter(callbacks, file.filename().string());
+    Image image = linearized(read_image(file, {}, reporter), reporter);
     Texture texture{ARHOST_TEXEL_RGBA32F, image.width,       image.height,
                     ARHOST_WRAP_REPEAT,   ARHOST_WRAP_CLAMP, std::move(image.texels)};
     Environment environment;
-    add_cumulative_sums(environment, texture, watch);
-    environment.texture = builder_.add_texture(shown(file.string()), std::move(texture));
+    add_cumulative_sums(environment, texture, reporter);
+    environment.texture = builder_.add_texture(printable(file.string()), std::move(texture));
     return environment;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The textures of a scene that is being loaded. Private to core/scene.
+// The textures of a scene during loading. Private to core/scene.
 #pragma once
 
 #include "scene/image.hpp"
@@ -10,7 +10,7 @@
 namespace arhost::scene {
 
 struct TextureUse {
-    bool is_colour = true; // else numbers: bytes are not sRGB-encoded
+    bool is_colour = true; // false: linear data, not sRGB-encoded
     arhost_wrap wrap_u = ARHOST_WRAP_REPEAT, wrap_v = ARHOST_WRAP_REPEAT;
 };
 
@@ -18,16 +18,16 @@ class Textures {
 public:
     Textures(ArenaBuilder &builder, const LoadCallbacks &callbacks) : builder_(builder), callbacks_(callbacks) {}
 
-    // The texture's index. An image that was asked for before in the same way is not loaded again. `content`
-    // stands for a file's where one file holds several; `part` tells them apart. Throws ImageError.
+    // The texture's index. The same image with the same use is loaded once. For an image embedded in `file`,
+    // `content` holds its bytes and `part` identifies it. Throws ImageError.
     std::uint32_t add(const std::filesystem::path &file, const TextureUse &use,
                       std::span<const unsigned char> content = {}, const std::string &part = "");
 
-    // With its cumulative sums.
+    // Includes the cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
 
 private:
-    LoadCallbacks of_an_image() const;
+    LoadCallbacks image_callbacks() const;
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;

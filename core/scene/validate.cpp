@@ -17,15 +17,15 @@ namespace arhost::scene {
 namespace {
 
 constexpr float extinction_limit = 1e6f;
-// Of lengths, sums of weights and the bounds' fit: what float arithmetic may lose.
+// Rounding tolerance of lengths, weight sums and bounds.
 constexpr float tolerance = 1e-3f;
 
-struct Fault {
+struct Invalid {
     std::string text;
 };
 
-[[noreturn]] void fault(const std::string &text) {
-    throw Fault{text};
+[[noreturn]] void fail(const std::string &text) {
+    throw Invalid{text};
 }
 
 std::string number(double value) {
@@ -42,11 +42,11 @@ bool within(float value, float low, float high) {
 void check_floats(std::span<const float> values, float low, float high, const std::string &what) {
     for (const float value : values)
         if (!within(value, low, high))
-            fault(what + " is " + number(value) + ", outside " + number(low) + " to " + number(high));
+            fail(what + " is " + number(value) + ", outside " + number(low) + " to " + number(high));
 }
 
-// A float with its sign cleared orders like the integer of its bits; infinities and NaN come last. This
-// loop is all integers, so it runs at the speed of memory.
+// A float with a cleared sign bit compares like the integer of its bits; infinity and NaN are largest. The integer
+// loop is limited by memory bandwidth only.
 bool all_within_limit(std::span<const float> values) {
     const std::int32_t limit = std::bit_cast<std::int32_t>(coordinate_limit_mm);
     std::int32_t outside = 0;
@@ -55,7 +55,7 @@ bool all_within_limit(std::span<const float> values) {
     return !outside;
 }
 
-// Likewise for 0 to 1e6: a float below 0 has the sign bit, which makes it the largest of integers.
+// Likewise for 0 to 1e6: the sign bit of a negative float makes it the largest unsigned integer.
 bool all_radiances(std::span<const float> values) {
     std::uint32_t highest = 0;
     for (const float value : values)
@@ -88,7 +88,7 @@ public:
         nodes_ = view<arhost_node>(scene_->nodes, "the table of nodes");
         channels_ = view<arhost_channel>(scene_->channels, "the table of channels");
         skins_ = view<arhost_skin>(scene_->skins, "the table of skins");
-        names_ = view<char>(scene_->names, "the names");
+        names_ = view<char>(scene_->names, "the table of names");
         check_names();
         for (std::size_t i = 0; i < nodes_.size(); ++i)
             check_node(i);
@@ -115,27 +115,27 @@ public:
 private:
     void check_header() {
         if (reinterpret_cast<std::uintptr_t>(arena_.data()) % arena_alignment != 0)
-            fault("it does not lie at a multiple of 64 bytes in memory");
+            fail("it is not aligned to 64 bytes in memory");
         if (arena_.size() < sizeof(arhost_scene))
-            fault("it is too short for its header");
+            fail("it is too short for its header");
         scene_ = reinterpret_cast<const arhost_scene *>(arena_.data());
         if (scene_->magic != ARHOST_SCENE_MAGIC)
-            fault("it does not begin with the magic number of scenes");
+            fail("it does not begin with the magic number of scenes");
         if (scene_->version != ARHOST_SCENE_VERSION)
-            fault("its version is " + std::to_string(scene_->version) + ", not " +
-                  std::to_string(ARHOST_SCENE_VERSION));
+            fail("its version is " + std::to_string(scene_->version) + ", not " +
+                 std::to_string(ARHOST_SCENE_VERSION));
         if (scene_->struct_size != sizeof(arhost_scene))
-            fault("its header has the wrong size");
+            fail("its header has the wrong size");
         if (scene_->byte_size < sizeof(arhost_scene) || scene_->byte_size > arena_.size())
-            fault("its header says that it has " + std::to_string(scene_->byte_size) + " bytes, but " +
-                  std::to_string(arena_.size()) + " are there");
+            fail("its header states " + std::to_string(scene_->byte_size) + " bytes, but the arena has " +
+                 std::to_string(arena_.size()));
         arena_ = arena_.first(scene_->byte_size);
-        unclaimed_ = scene_->byte_size - sizeof(arhost_scene);
+        unused_bytes_ = scene_->byte_size - sizeof(arhost_scene);
         if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
-            fault("its axes are of no known kind");
+            fail("its axes are unknown");
         if (scene_->max_depth > max_depth_limit)
-            fault("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
-                  std::to_string(max_depth_limit));
+            fail("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
+                 std::to_string(max_depth_limit));
         check_floats(scene_->ambient, 0, coordinate_limit_mm, "the ambient light");
         check_floats(scene_->background, 0, coordinate_limit_mm, "the background");
         check_floats({&scene_->duration_s, 1}, 0, duration_limit_s, "duration_s");
@@ -145,40 +145,40 @@ private:
         check_floats(scene_->bounds_max, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_max");
     }
 
-    // The elements of a buffer, once it is known that they and the spare bytes lie in the arena. No byte
-    // may belong to two buffers: else a small arena could name one large buffer a million times.
+    // The elements of a buffer, after checking that they and the spare bytes lie in the arena. The sizes of all
+    // buffers may not exceed the arena's: else a small arena could refer to one large buffer a million times.
     template <class T> std::span<const T> view(const arhost_buffer &buffer, const std::string &what) {
         if (buffer.count == 0) {
             if (buffer.offset != 0 || buffer.stride != 0)
-                fault(what + " is absent, yet its offset and stride are not 0");
+                fail(what + " is absent, but its offset or stride is not 0");
             return {};
         }
         if (buffer.stride != sizeof(T))
-            fault(what + " has a stride of " + std::to_string(buffer.stride) + " bytes, not " +
-                  std::to_string(sizeof(T)));
+            fail(what + " has a stride of " + std::to_string(buffer.stride) + " bytes, not " +
+                 std::to_string(sizeof(T)));
         if (buffer.offset % arena_alignment != 0)
-            fault(what + " does not begin at a multiple of 64 bytes");
+            fail(what + " is not aligned to 64 bytes");
         if (buffer.offset < sizeof(arhost_scene))
-            fault(what + " lies over the header");
+            fail(what + " overlaps the header");
         const std::uint64_t needed = std::uint64_t(buffer.count) * sizeof(T) + arena_spare_bytes; // < 2^32 · 2^7
         if (buffer.offset > arena_.size() || needed > arena_.size() - buffer.offset)
-            fault(what + " reaches past the end of the scene");
-        if (needed > unclaimed_)
-            fault(what + " shares bytes with other buffers");
-        unclaimed_ -= needed;
+            fail(what + " extends past the end of the scene");
+        if (needed > unused_bytes_)
+            fail(what + " overlaps other buffers");
+        unused_bytes_ -= needed;
         return {reinterpret_cast<const T *>(arena_.data() + buffer.offset), buffer.count};
     }
 
     void check_names() {
         if (!names_.empty() && names_.back() != '\0')
-            fault("the last name has no end");
+            fail("the last name is not terminated");
         for (const char c : names_)
             if (c != '\0' && (static_cast<unsigned char>(c) < 0x20 || c == 0x7f))
-                fault("a name holds a control character");
+                fail("a name contains a control character");
     }
 
     std::string name_of(std::size_t object) const {
-        constexpr std::size_t shown = 64; // a million objects may share one name of a gigabyte
+        constexpr std::size_t shown = 64; // a million objects could share a name of one gigabyte
         const char *name = names_.data() + objects_[object].name;
         return "object " + std::to_string(object) + " '" + std::string(name, strnlen(name, shown)) + "'";
     }
@@ -186,11 +186,11 @@ private:
     void check_object(std::size_t i) {
         const arhost_object &object = objects_[i];
         if (object.name >= names_.size())
-            fault("the name of object " + std::to_string(i) + " lies outside the names");
+            fail("the name of object " + std::to_string(i) + " is outside the table of names");
         const auto in_table = [&](std::uint32_t index, std::size_t count, const char *what) {
             if (index >= count)
-                fault(name_of(i) + " has " + what + " " + std::to_string(index) + ", but there are " +
-                      std::to_string(count));
+                fail(name_of(i) + " has " + what + " " + std::to_string(index) + ", but there are " +
+                     std::to_string(count));
         };
         in_table(object.geometry, geometries_.size(), "geometry");
         in_table(object.material, materials_.size(), "material");
@@ -198,32 +198,31 @@ private:
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && geometries_[object.geometry].texcoords.count == 0)
-                fault(name_of(i) + " has a textured material, but its geometry has no texcoords");
+                fail(name_of(i) + " has a textured material, but its geometry has no texcoords");
         if (object.role < ARHOST_ROLE_VIRTUAL || object.role > ARHOST_ROLE_OCCLUDER)
-            fault(name_of(i) + " has a role of no known kind");
+            fail(name_of(i) + " has an unknown role");
         const float *m = object.world_from_object;
         check_floats(object.world_from_object, -coordinate_limit_mm, coordinate_limit_mm,
                      name_of(i) + ": a number of world_from_object");
         const glm::dvec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         const double size = glm::length(x) * glm::length(y) * glm::length(z);
         if (!(std::abs(glm::dot(glm::cross(x, y), z)) > 1e-9 * size))
-            fault(name_of(i) + ": world_from_object can't be inverted");
+            fail(name_of(i) + ": world_from_object can't be inverted");
         if (!object.moves && !object.deforms) {
             if (object.node != ARHOST_NONE || object.skin != ARHOST_NONE)
-                fault(name_of(i) + " has a node or a skin, but neither moves nor deforms");
+                fail(name_of(i) + " has a node or a skin, but neither moves nor deforms");
             return;
         }
         if (scene_->duration_s == 0)
-            fault(name_of(i) + " moves or deforms, but the scene's duration_s is 0");
+            fail(name_of(i) + " moves or deforms, but the scene's duration_s is 0");
         if (object.node != ARHOST_NONE || object.moves)
             in_table(object.node, nodes_.size(), "node");
         if (object.skin != ARHOST_NONE)
             in_table(object.skin, skins_.size(), "skin");
         if (object.skin != ARHOST_NONE && (object.moves || !object.deforms || !is_identity(object.world_from_object)))
-            fault(name_of(i) +
-                  " has a skin, so it must deform, not move, and have the identity as world_from_object");
+            fail(name_of(i) + " has a skin, so it must deform, not move, and have the identity as world_from_object");
         if (object.deforms && geometries_[object.geometry].type != ARHOST_GEOMETRY_TRIANGLES)
-            fault(name_of(i) + " deforms, but has no triangles");
+            fail(name_of(i) + " deforms, but has no triangles");
     }
 
     static bool is_identity(const float (&m)[12]) {
@@ -233,7 +232,7 @@ private:
         return true;
     }
 
-    // Which object deforms a geometry; no other may have it.
+    // Finds the object that deforms each geometry; no other object may use it.
     void check_deforming() {
         deformers_.assign(geometries_.size(), ARHOST_NONE);
         std::vector<std::uint32_t> uses(geometries_.size(), 0);
@@ -244,33 +243,33 @@ private:
         }
         for (std::size_t i = 0; i < geometries_.size(); ++i)
             if (deformers_[i] != ARHOST_NONE && uses[i] > 1)
-                fault(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
-                      ", which another object has too");
+                fail(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
+                     ", which another object uses too");
     }
 
     void check_texture(std::size_t i) {
         const arhost_texture &texture = textures_[i];
         const std::string what = "texture " + std::to_string(i) + ": ";
         if (texture.format < ARHOST_TEXEL_SRGB8 || texture.format > ARHOST_TEXEL_RGBA32F)
-            fault(what + "its format is of no known kind");
+            fail(what + "its format is unknown");
         for (const arhost_wrap wrap : {texture.wrap_u, texture.wrap_v})
             if (wrap < ARHOST_WRAP_REPEAT || wrap > ARHOST_WRAP_MIRROR)
-                fault(what + "its wrapping is of no known kind");
+                fail(what + "its wrap mode is unknown");
         if (texture.name >= names_.size())
-            fault(what + "its name lies outside the names");
+            fail(what + "its name is outside the table of names");
         if (texture.width - 1 >= texture_side_limit || texture.height - 1 >= texture_side_limit)
-            fault(what + "it has " + std::to_string(texture.width) + " x " + std::to_string(texture.height) +
-                  " texels, outside 1 to " + std::to_string(texture_side_limit) + " a side");
+            fail(what + "it has " + std::to_string(texture.width) + " x " + std::to_string(texture.height) +
+                 " texels, outside 1 to " + std::to_string(texture_side_limit) + " a side");
         if (texture.texels.count != std::uint64_t(texture.width) * texture.height)
-            fault(what + "it has " + std::to_string(texture.texels.count) + " texels for " +
-                  std::to_string(texture.width) + " x " + std::to_string(texture.height));
+            fail(what + "it has " + std::to_string(texture.texels.count) + " texels for " +
+                 std::to_string(texture.width) + " x " + std::to_string(texture.height));
         if (texture.format != ARHOST_TEXEL_RGBA32F) {
             view<std::uint32_t>(texture.texels, what + "the buffer of texels");
         } else if (const auto texels = floats_of(view<glm::vec4>(texture.texels, what + "the buffer of texels"));
                    !all_radiances(texels)) {
             for (std::size_t t = 0; t < texels.size(); ++t)
                 if (!all_radiances(texels.subspan(t, 1)))
-                    fault(what + "texel " + std::to_string(t / 4) + " has the number " + number(texels[t]));
+                    fail(what + "texel " + std::to_string(t / 4) + " has the number " + number(texels[t]));
         }
     }
 
@@ -280,15 +279,15 @@ private:
         const auto columns = view<float>(environment.columns, "the environment's columns");
         if (environment.texture == ARHOST_NONE) {
             if (!rows.empty() || !columns.empty())
-                fault("there is no environment, yet it has rows or columns");
+                fail("there is no environment, but it has rows or columns");
             return;
         }
         if (environment.texture >= textures_.size())
-            fault("the environment has texture " + std::to_string(environment.texture) + ", but there are " +
-                  std::to_string(textures_.size()));
+            fail("the environment has texture " + std::to_string(environment.texture) + ", but there are " +
+                 std::to_string(textures_.size()));
         const arhost_texture &texture = textures_[environment.texture];
         if (texture.format != ARHOST_TEXEL_RGBA32F)
-            fault("the environment's texture is not of floats");
+            fail("the environment's texture is not RGBA32F");
         check_floats({&environment.intensity, 1}, 0, radiance_limit, "the environment's intensity");
         const float *m = environment.environment_from_world;
         check_floats(environment.environment_from_world, -1 - tolerance, 1 + tolerance,
@@ -296,37 +295,37 @@ private:
         const glm::vec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         if (!(glm::length(glm::cross(x, y) - z) <= tolerance && glm::length(glm::cross(y, z) - x) <= tolerance &&
               glm::length(glm::cross(z, x) - y) <= tolerance && is_unit({m, 3})))
-            fault("environment_from_world is not a rotation");
+            fail("environment_from_world is not a rotation");
         if (rows.size() != texture.height || columns.size() != texture.texels.count)
-            fault("the environment has " + std::to_string(rows.size()) + " rows and " +
-                  std::to_string(columns.size()) + " columns for a texture of " + std::to_string(texture.width) +
-                  " x " + std::to_string(texture.height));
+            fail("the environment has " + std::to_string(rows.size()) + " rows and " +
+                 std::to_string(columns.size()) + " columns for a texture of " + std::to_string(texture.width) +
+                 " x " + std::to_string(texture.height));
         check_cumulative(rows, "the environment's rows");
         for (std::size_t row = 0; row < rows.size(); ++row)
             check_cumulative(columns.subspan(row * texture.width, texture.width), "the environment's columns");
     }
 
     static void check_cumulative(std::span<const float> sums, const char *what) {
-        bool rises = sums.front() >= 0;
+        bool ascending = sums.front() >= 0;
         for (std::size_t i = 1; i < sums.size(); ++i)
-            rises &= sums[i] >= sums[i - 1];
-        if (!rises)
-            fault(std::string(what) + " are not cumulative sums");
+            ascending &= sums[i] >= sums[i - 1];
+        if (!ascending)
+            fail(std::string(what) + " are not cumulative sums");
         if (!within(sums.back(), 1 - tolerance, 1 + tolerance))
-            fault(std::string(what) + " end with " + number(sums.back()) + ", not with 1");
+            fail(std::string(what) + " end at " + number(sums.back()) + ", not at 1");
     }
 
     void check_node(std::size_t i) {
         const arhost_node &node = nodes_[i];
         const std::string what = "node " + std::to_string(i) + ": ";
         if (node.parent != ARHOST_NONE && node.parent >= i)
-            fault(what + "its parent " + std::to_string(node.parent) + " does not come before it");
+            fail(what + "its parent " + std::to_string(node.parent) + " does not precede it");
         check_floats(node.parent_from_node, -coordinate_limit_mm, coordinate_limit_mm, what + "parent_from_node");
         check_floats(node.translation, -coordinate_limit_mm, coordinate_limit_mm, what + "translation");
         check_floats(node.rotation, -1 - tolerance, 1 + tolerance, what + "rotation");
         check_floats(node.scale, -coordinate_limit_mm, coordinate_limit_mm, what + "scale");
         if (node.animated && !is_unit(node.rotation))
-            fault(what + "its rotation is not of length 1");
+            fail(what + "its rotation is not of length 1");
         check_floats(view<float>(node.morph_weights, what + "the buffer of morph_weights"), -coordinate_limit_mm,
                      coordinate_limit_mm, what + "a morph weight");
     }
@@ -335,37 +334,37 @@ private:
         const arhost_channel &channel = channels_[i];
         const std::string what = "channel " + std::to_string(i) + ": ";
         if (channel.node >= nodes_.size())
-            fault(what + "it has node " + std::to_string(channel.node) + ", but there are " +
-                  std::to_string(nodes_.size()));
+            fail(what + "it has node " + std::to_string(channel.node) + ", but there are " +
+                 std::to_string(nodes_.size()));
         if (channel.target < ARHOST_CHANNEL_TRANSLATION || channel.target > ARHOST_CHANNEL_MORPH_WEIGHTS)
-            fault(what + "its target is of no known kind");
+            fail(what + "its target is unknown");
         if (channel.interpolation < ARHOST_INTERPOLATION_STEP || channel.interpolation > ARHOST_INTERPOLATION_CUBIC)
-            fault(what + "its interpolation is of no known kind");
+            fail(what + "its interpolation is unknown");
         if (channel.reserved != 0)
-            fault(what + "a reserved field is not 0");
+            fail(what + "a reserved field is not 0");
         const bool weights = channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS;
         if (!weights && !nodes_[channel.node].animated)
-            fault(what + "its node is not animated");
+            fail(what + "its node is not animated");
         const auto times = view<float>(channel.times, what + "the buffer of times");
         const auto values = view<float>(channel.values, what + "the buffer of values");
         if (times.empty())
-            fault(what + "it has no keys");
+            fail(what + "it has no keys");
         check_floats(times, 0, duration_limit_s, what + "a time");
         for (std::size_t t = 1; t < times.size(); ++t)
             if (!(times[t] > times[t - 1]))
-                fault(what + "its times don't ascend");
+                fail(what + "its times are not strictly increasing");
         const std::uint64_t width = weights ? nodes_[channel.node].morph_weights.count
                                     : channel.target == ARHOST_CHANNEL_ROTATION ? 4
                                                                                 : 3;
         const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
         if (width == 0 || values.size() != times.size() * width * (cubic ? 3 : 1))
-            fault(what + "it has " + std::to_string(values.size()) + " values for " + std::to_string(times.size()) +
-                  " keys of " + std::to_string(width));
+            fail(what + "it has " + std::to_string(values.size()) + " values for " + std::to_string(times.size()) +
+                 " keys of " + std::to_string(width));
         check_floats(values, -coordinate_limit_mm, coordinate_limit_mm, what + "a value");
         if (channel.target == ARHOST_CHANNEL_ROTATION)
             for (std::size_t key = 0; key < times.size(); ++key)
                 if (!is_unit(values.subspan(cubic ? key * 12 + 4 : key * 4, 4)))
-                    fault(what + "the rotation of key " + std::to_string(key) + " is not of length 1");
+                    fail(what + "the rotation of key " + std::to_string(key) + " is not of length 1");
     }
 
     void check_skin(std::size_t i) {
@@ -373,12 +372,12 @@ private:
         const auto joints = view<std::uint32_t>(skins_[i].joints, what + "the buffer of joints");
         const auto matrices = view<glm::mat4x3>(skins_[i].node_from_mesh, what + "the buffer of node_from_mesh");
         if (joints.empty() || matrices.size() != joints.size())
-            fault(what + "it has " + std::to_string(joints.size()) + " joints and " +
-                  std::to_string(matrices.size()) + " matrices");
+            fail(what + "it has " + std::to_string(joints.size()) + " joints and " + std::to_string(matrices.size()) +
+                 " matrices");
         for (const std::uint32_t joint : joints)
             if (joint >= nodes_.size())
-                fault(what + "it has node " + std::to_string(joint) + ", but there are " +
-                      std::to_string(nodes_.size()));
+                fail(what + "it has node " + std::to_string(joint) + ", but there are " +
+                     std::to_string(nodes_.size()));
         check_floats(floats_of(matrices), -coordinate_limit_mm, coordinate_limit_mm, what + "node_from_mesh");
     }
 
@@ -386,12 +385,12 @@ private:
         const arhost_material &material = materials_[i];
         const std::string what = "material " + std::to_string(i) + ": ";
         if (material.model < ARHOST_MATERIAL_DIFFUSE || material.model > ARHOST_MATERIAL_METALLIC_ROUGHNESS)
-            fault(what + "its model is of no known kind");
+            fail(what + "its model is unknown");
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && texture >= textures_.size())
-                fault(what + "it has texture " + std::to_string(texture) + ", but there are " +
-                      std::to_string(textures_.size()));
+                fail(what + "it has texture " + std::to_string(texture) + ", but there are " +
+                     std::to_string(textures_.size()));
         check_floats(material.ambient, 0, 1, what + "ambient");
         check_floats(material.diffuse, 0, 1, what + "diffuse");
         check_floats(material.specular, 0, 1, what + "specular");
@@ -416,23 +415,23 @@ private:
         const arhost_light &light = lights_[i];
         const std::string what = "light " + std::to_string(i) + ": ";
         if (light.type < ARHOST_LIGHT_POINT || light.type > ARHOST_LIGHT_SPHERE)
-            fault(what + "its type is of no known kind");
+            fail(what + "its type is unknown");
         if (light.falloff != ARHOST_FALLOFF_NONE && light.falloff != ARHOST_FALLOFF_INVERSE_SQUARE)
-            fault(what + "its falloff is of no known kind");
+            fail(what + "its falloff is unknown");
         check_floats(light.position, -coordinate_limit_mm, coordinate_limit_mm, what + "position");
         check_floats(light.intensity, 0, std::numeric_limits<float>::max(), what + "intensity");
         const auto length_of = [](const float(&v)[3]) { return glm::length(glm::dvec3(v[0], v[1], v[2])); };
         check_floats(light.direction, -1 - tolerance, 1 + tolerance, what + "direction");
         if (light.type != ARHOST_LIGHT_POINT && light.type != ARHOST_LIGHT_SPHERE &&
             !within(static_cast<float>(length_of(light.direction)), 1 - tolerance, 1 + tolerance))
-            fault(what + "its direction is not of length 1");
+            fail(what + "its direction is not of length 1");
         check_floats(light.axis_u, -coordinate_limit_mm, coordinate_limit_mm, what + "axis_u");
         check_floats(light.axis_v, -coordinate_limit_mm, coordinate_limit_mm, what + "axis_v");
         check_floats({&light.radius, 1}, 0, coordinate_limit_mm, what + "radius");
         check_floats({&light.cosine_outer, 1}, -1, 1, what + "cosine_outer");
         check_floats({&light.cosine_inner, 1}, light.cosine_outer, 1, what + "cosine_inner");
         if (light.type == ARHOST_LIGHT_DIRECTIONAL && light.falloff != ARHOST_FALLOFF_NONE)
-            fault(what + "light from infinitely far can't fall off");
+            fail(what + "a directional light can't have a falloff");
     }
 
     // "geometry 3 (object 1 'bunny')"
@@ -448,7 +447,7 @@ private:
         const arhost_geometry &geometry = geometries_[i];
         try {
             if (geometry.reserved != 0)
-                fault("a reserved field is not 0");
+                fail("a reserved field is not 0");
             switch (geometry.type) {
             case ARHOST_GEOMETRY_TRIANGLES:
                 check_deformation(geometry, i);
@@ -456,14 +455,14 @@ private:
             case ARHOST_GEOMETRY_SPHERES:
                 return check_spheres(geometry);
             default:
-                fault("its type is of no known kind");
+                fail("its type is unknown");
             }
-        } catch (const Fault &inner) {
-            fault(geometry_name(i) + ": " + inner.text);
+        } catch (const Invalid &inner) {
+            fail(geometry_name(i) + ": " + inner.text);
         }
     }
 
-    // Joints and morph targets are there where an object uses them, and only there.
+    // Joints and morph targets must be present exactly if an object uses them.
     void check_deformation(const arhost_geometry &geometry, std::size_t i) {
         const std::uint64_t vertices = geometry.positions.count;
         const auto joints = view<glm::u16vec4>(geometry.joints, "the buffer of joints");
@@ -473,19 +472,19 @@ private:
         const arhost_object *object = deformers_[i] == ARHOST_NONE ? nullptr : &objects_[deformers_[i]];
         const bool skinned = object && object->skin != ARHOST_NONE;
         if (joints.size() != (skinned ? vertices : 0) || weights.size() != joints.size())
-            fault("it has " + std::to_string(joints.size()) + " joints and " + std::to_string(weights.size()) +
-                  " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +
-                  " a skin");
+            fail("it has " + std::to_string(joints.size()) + " joints and " + std::to_string(weights.size()) +
+                 " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +
+                 " a skin");
         const std::uint64_t targets =
             object && object->node != ARHOST_NONE ? nodes_[object->node].morph_weights.count : 0;
         if (object && !skinned && targets == 0)
-            fault("it deforms, but has neither a skin nor morph targets");
+            fail("it deforms, but has neither a skin nor morph targets");
         if (morph_positions.size() != targets * vertices || (targets > 0 && !object->deforms))
-            fault("it has " + std::to_string(morph_positions.size()) + " morph_positions for " +
-                  std::to_string(targets) + " targets and " + std::to_string(vertices) + " vertices");
+            fail("it has " + std::to_string(morph_positions.size()) + " morph_positions for " +
+                 std::to_string(targets) + " targets and " + std::to_string(vertices) + " vertices");
         if (!morph_normals.empty() && (morph_normals.size() != morph_positions.size() || geometry.normals.count == 0))
-            fault("it has " + std::to_string(morph_normals.size()) + " morph_normals for " +
-                  std::to_string(morph_positions.size()) + " morph_positions, or no normals");
+            fail("it has " + std::to_string(morph_normals.size()) + " morph_normals for " +
+                 std::to_string(morph_positions.size()) + " morph_positions, or no normals");
         check_coordinates(floats_of(morph_positions), 3, "morph position");
         check_coordinates(floats_of(morph_normals), 3, "morph normal");
         if (!skinned)
@@ -494,11 +493,10 @@ private:
         for (std::size_t v = 0; v < joints.size(); ++v) {
             const glm::u16vec4 &j = joints[v];
             if (std::max({j.x, j.y, j.z, j.w}) >= joint_count)
-                fault("vertex " + std::to_string(v) + " has a joint beyond the skin's " +
-                      std::to_string(joint_count));
+                fail("vertex " + std::to_string(v) + " has a joint beyond the skin's " + std::to_string(joint_count));
             const glm::vec4 &w = weights[v];
             if (!(std::min({w.x, w.y, w.z, w.w}) >= 0 && within(w.x + w.y + w.z + w.w, 1 - tolerance, 1 + tolerance)))
-                fault("vertex " + std::to_string(v) + " has weights below 0, or of a sum other than 1");
+                fail("vertex " + std::to_string(v) + " has negative weights, or weights whose sum is not 1");
         }
     }
 
@@ -507,8 +505,8 @@ private:
             return;
         for (std::size_t i = 0; i < values.size(); ++i)
             if (!within(values[i], -coordinate_limit_mm, coordinate_limit_mm))
-                fault(std::string(what) + " " + std::to_string(i / components) + " has the coordinate " +
-                      number(values[i]));
+                fail(std::string(what) + " " + std::to_string(i / components) + " has the coordinate " +
+                     number(values[i]));
     }
 
     Box check_triangles(const arhost_geometry &geometry) {
@@ -517,13 +515,13 @@ private:
         const auto texcoords = view<glm::vec2>(geometry.texcoords, "the buffer of texcoords");
         const auto triangles = view<glm::uvec3>(geometry.indices, "the buffer of indices");
         if (triangles.empty())
-            fault("it has no triangles");
+            fail("it has no triangles");
         if (!normals.empty() && normals.size() != positions.size())
-            fault("it has " + std::to_string(normals.size()) + " normals for " + std::to_string(positions.size()) +
-                  " vertices");
+            fail("it has " + std::to_string(normals.size()) + " normals for " + std::to_string(positions.size()) +
+                 " vertices");
         if (!texcoords.empty() && texcoords.size() != positions.size())
-            fault("it has " + std::to_string(texcoords.size()) + " texcoords for " +
-                  std::to_string(positions.size()) + " vertices");
+            fail("it has " + std::to_string(texcoords.size()) + " texcoords for " + std::to_string(positions.size()) +
+                 " vertices");
         check_coordinates(floats_of(positions), 3, "vertex");
         check_coordinates(floats_of(texcoords), 2, "texcoord");
         check_normals(normals);
@@ -539,9 +537,9 @@ private:
         for (const glm::vec3 &normal : normals)
             all &= is_unit(normal);
         if (!all)
-            fault("normal " +
-                  std::to_string(std::find_if_not(normals.begin(), normals.end(), is_unit) - normals.begin()) +
-                  " is not of unit length");
+            fail("normal " +
+                 std::to_string(std::find_if_not(normals.begin(), normals.end(), is_unit) - normals.begin()) +
+                 " is not of unit length");
     }
 
     static void check_indices(std::span<const glm::uvec3> triangles, std::size_t vertex_count) {
@@ -553,8 +551,8 @@ private:
         for (std::size_t i = 0; i < triangles.size(); ++i)
             if (const std::uint32_t index = std::max({triangles[i].x, triangles[i].y, triangles[i].z});
                 index >= vertex_count)
-                fault("triangle " + std::to_string(i) + " has the vertex " + std::to_string(index) +
-                      ", but there are " + std::to_string(vertex_count));
+                fail("triangle " + std::to_string(i) + " has the vertex " + std::to_string(index) +
+                     ", but there are " + std::to_string(vertex_count));
     }
 
     Box check_spheres(const arhost_geometry &geometry) {
@@ -562,13 +560,13 @@ private:
         for (const arhost_buffer &other : {geometry.normals, geometry.texcoords, geometry.indices, geometry.joints,
                                            geometry.weights, geometry.morph_positions, geometry.morph_normals})
             if (other.count != 0 || other.offset != 0 || other.stride != 0)
-                fault("spheres have no normals, texcoords or indices, nor do they deform");
+                fail("spheres can't have normals, texcoords, indices or deformation");
         if (spheres.empty())
-            fault("it has no spheres");
+            fail("it has no spheres");
         check_coordinates(floats_of(spheres), 4, "sphere");
         for (std::size_t i = 0; i < spheres.size(); ++i)
             if (!(spheres[i].w > 0))
-                fault("sphere " + std::to_string(i) + " has the radius " + number(spheres[i].w));
+                fail("sphere " + std::to_string(i) + " has the radius " + number(spheres[i].w));
         return box_of(spheres);
     }
 
@@ -576,21 +574,21 @@ private:
         const glm::vec3 low(scene_->bounds_min[0], scene_->bounds_min[1], scene_->bounds_min[2]);
         const glm::vec3 high(scene_->bounds_max[0], scene_->bounds_max[1], scene_->bounds_max[2]);
         if (!(low.x <= high.x && low.y <= high.y && low.z <= high.z))
-            fault("bounds_min is above bounds_max");
-        const glm::vec3 slack = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
+            fail("bounds_min is above bounds_max");
+        const glm::vec3 margin = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
         for (std::size_t i = 0; i < objects_.size(); ++i) {
-            if (objects_[i].deforms) // where it is then, only its motion tells
+            if (objects_[i].deforms) // its extent depends on its motion
                 continue;
             const Box box = transformed(objects_[i].world_from_object, boxes[objects_[i].geometry]);
-            const glm::vec3 below = low - box.min - slack, above = box.max - high - slack;
+            const glm::vec3 below = low - box.min - margin, above = box.max - high - margin;
             if (!(std::max({below.x, below.y, below.z, above.x, above.y, above.z}) <= 0))
-                fault(name_of(i) + " lies outside the scene's bounds");
+                fail(name_of(i) + " is outside the scene's bounds");
         }
     }
 
     std::span<const std::byte> arena_;
     const arhost_scene *scene_ = nullptr;
-    std::uint64_t unclaimed_ = 0; // bytes that no buffer has claimed yet
+    std::uint64_t unused_bytes_ = 0; // bytes not used by any buffer yet
     std::span<const arhost_geometry> geometries_;
     std::span<const arhost_texture> textures_;
     std::span<const arhost_material> materials_;
@@ -600,7 +598,7 @@ private:
     std::span<const arhost_channel> channels_;
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
-    std::vector<std::uint32_t> deformers_; // of each geometry: an object or ARHOST_NONE
+    std::vector<std::uint32_t> deformers_; // per geometry: object index or ARHOST_NONE
 };
 
 } // namespace
@@ -609,7 +607,7 @@ std::string validate(std::span<const std::byte> arena) {
     try {
         Checker(arena).run();
         return {};
-    } catch (const Fault &found) {
+    } catch (const Invalid &found) {
         return found.text;
     }
 }

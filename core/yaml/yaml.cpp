@@ -45,7 +45,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-// "outputs[0].path" → "outputs", 0, "path"; an index is a key of digits.
+// "outputs[0].path" → "outputs", "0", "path"
 std::vector<std::string> split_path(const std::string &path) {
     std::vector<std::string> parts(1);
     for (const char c : path) {
@@ -57,18 +57,18 @@ std::vector<std::string> split_path(const std::string &path) {
     return parts;
 }
 
-// A value as messages show it.
-std::string shown(const std::string &text) {
+// Quotes a value for messages.
+std::string in_quotes(const std::string &text) {
     return "'" + base::printable(text, 200) + "'";
 }
 
-std::string place_in(const std::string &name, const YAML::Mark &mark) {
+std::string position_in(const std::string &name, const YAML::Mark &mark) {
     return name + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": ";
 }
 
 std::filesystem::path without_dots(const std::filesystem::path &path) {
     std::filesystem::path result;
-    std::error_code error; // what is not there is no link
+    std::error_code error; // a missing file is not a link
     for (const std::filesystem::path &part : std::filesystem::absolute(path)) {
         if (part == ".." && std::filesystem::is_symlink(result, error))
             if (const auto target = std::filesystem::weakly_canonical(result, error); !error)
@@ -90,7 +90,7 @@ YAML::Mark mark_of(const std::string &text, std::size_t position) {
     return mark;
 }
 
-// Where documents begin, and whether the last value in quotation marks ends.
+// Collects the document starts, and detects an unterminated quoted value.
 class Marks : public YAML::EventHandler {
 public:
     std::vector<YAML::Mark> documents;
@@ -102,10 +102,10 @@ public:
     void OnAlias(const YAML::Mark &, YAML::anchor_t) override {}
     void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t, const std::string &) override {
         std::size_t i = static_cast<std::size_t>(std::max(mark.pos, 0));
-        while (i < text_.size() && (text_[i] == '&' || text_[i] == '!')) // its properties come first
-            i = behind_blanks(text_[i] == '!' && is_quote(i + 1) ? i + 1 : text_.find_first_of(" \t\r\n,[]{}", i));
+        while (i < text_.size() && (text_[i] == '&' || text_[i] == '!')) // node properties precede the value
+            i = skip_blanks(text_[i] == '!' && is_quote(i + 1) ? i + 1 : text_.find_first_of(" \t\r\n,[]{}", i));
         if (is_quote(i))
-            last_quotation_ = i;
+            last_quote_ = i;
     }
     void OnSequenceStart(const YAML::Mark &, const std::string &, YAML::anchor_t,
                          YAML::EmitterStyle::value) override {}
@@ -113,66 +113,67 @@ public:
     void OnMapStart(const YAML::Mark &, const std::string &, YAML::anchor_t, YAML::EmitterStyle::value) override {}
     void OnMapEnd() override {}
 
-    // The library takes the text's end for that of a quotation.
-    std::optional<YAML::Mark> open_quotation() const {
-        if (!last_quotation_)
+    // yaml-cpp accepts the end of the text as the end of a quoted value.
+    std::optional<YAML::Mark> unterminated_quote() const {
+        if (!last_quote_)
             return std::nullopt;
-        const char quote = text_[*last_quotation_];
-        for (std::size_t i = *last_quotation_ + 1; i < text_.size(); ++i)
+        const char quote = text_[*last_quote_];
+        for (std::size_t i = *last_quote_ + 1; i < text_.size(); ++i)
             if ((quote == '"' && text_[i] == '\\') || (quote == '\'' && text_.compare(i, 2, "''") == 0))
-                ++i; // of the next one too
+                ++i; // escaped
             else if (text_[i] == quote)
                 return std::nullopt;
-        return mark_of(text_, *last_quotation_);
+        return mark_of(text_, *last_quote_);
     }
 
 private:
     bool is_quote(std::size_t i) const { return i < text_.size() && (text_[i] == '"' || text_[i] == '\''); }
-    std::size_t behind_blanks(std::size_t i) const { // and comments
+    std::size_t skip_blanks(std::size_t i) const { // and comments
         while ((i = text_.find_first_not_of(" \t\r\n", i)) < text_.size() && text_[i] == '#')
             i = text_.find('\n', i);
         return i;
     }
 
     const std::string &text_;
-    std::optional<std::size_t> last_quotation_;
+    std::optional<std::size_t> last_quote_;
 };
 
-// Throws YAML::ParserException, also for what the library lets pass.
+// Throws YAML::ParserException, also for errors that yaml-cpp accepts.
 YAML::Node read(std::string text) {
-    while (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which marks do not count
+    while (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which YAML::Mark does not count
         text.erase(0, 3);
-    // The library takes some of them for the text's end, or for UTF-16.
+    // yaml-cpp interprets some control characters as the end of the text, or as UTF-16.
     if (const auto c = std::ranges::find_if(
             text, [](unsigned char c) { return (c < ' ' && c != '\t' && c != '\n' && c != '\r') || c == 0x7f; });
         c != text.end())
         throw YAML::ParserException(mark_of(text, static_cast<std::size_t>(c - text.begin())),
-                                    "a control character stands here, which YAML must not have");
+                                    "control characters are not allowed in YAML");
     if (!base::is_utf8(text)) {
         std::size_t line = 0, end = 0;
         while (end = std::min(text.find('\n', line), text.size()), base::is_utf8({&text[line], end - line}))
             line = end + 1;
-        throw YAML::ParserException(mark_of(text, line), "this line is no UTF-8, which YAML must be");
+        throw YAML::ParserException(mark_of(text, line), "this line is not valid UTF-8");
     }
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     Marks marks(text);
-    const auto expect_quotation_closed = [&] {
-        if (const auto quotation = marks.open_quotation())
-            throw YAML::ParserException(*quotation, "the quotation that begins here does not end");
+    const auto expect_quotes_terminated = [&] {
+        if (const auto quote = marks.unterminated_quote())
+            throw YAML::ParserException(*quote, "this quoted value is not terminated");
     };
     try {
-        // Not by YAML::LoadAll: of "[1], 2" it makes documents without end, as the comma begins one, and stays.
+        // Not YAML::LoadAll: for "[1], 2" it produces documents forever, since the comma starts one and is never
+        // consumed.
         while (marks.documents.size() < 2 && parser.HandleNextDocument(marks)) {
         }
     } catch (const YAML::Exception &) {
-        expect_quotation_closed(); // which tells more than what is missing at the end
+        expect_quotes_terminated(); // a better error than the one at the end of the text
         throw;
     }
-    expect_quotation_closed();
+    expect_quotes_terminated();
     if (marks.documents.size() > 1)
         throw YAML::ParserException(marks.documents[1],
-                                    "another document begins here; keep one (remove the '---', or what stands here)");
+                                    "a second document starts here; keep one (remove the '---' or this content)");
     return YAML::Load(text);
 }
 
@@ -194,10 +195,10 @@ Node Node::load(const std::filesystem::path &file) {
     if (std::filesystem::is_directory(file, ignored))
         throw Error(file.string() + ": is a folder, not a YAML file");
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
-        throw Error(file.string() + ": is no regular file");
-    if (!base::is_utf8(std::filesystem::absolute(file).native())) // nor would the paths in it be
+        throw Error(file.string() + ": is not a regular file");
+    if (!base::is_utf8(std::filesystem::absolute(file).native())) // paths in it would not be valid either
         throw Error(std::filesystem::absolute(file).string() +
-                    ": the file's path is no UTF-8; rename what is not, it or a folder above");
+                    ": the file's path is not valid UTF-8; rename the file or the folder");
     std::string content;
     errno = 0;
     try {
@@ -216,7 +217,7 @@ Node Node::parse(const std::string &text, const std::string &name) {
     try {
         return Node(read(text), "", document);
     } catch (const YAML::Exception &error) {
-        throw Error(place_in(name, error.mark) + "YAML syntax: " + error.msg);
+        throw Error(position_in(name, error.mark) + "YAML syntax: " + error.msg);
     }
 }
 
@@ -240,20 +241,20 @@ void Node::override_text(const std::string &path, const std::string &text, const
 
 void Node::replace(const std::string &path, const YAML::Node &value, const std::string &option) {
     YAML::Node at = node_;
-    std::string canonical; // as Node::path() would have it
+    std::string canonical; // in the format of Node::path()
     const std::vector<std::string> parts = split_path(path);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool last = i + 1 == parts.size();
-        const auto refuse = [&](const std::string &why) { throw Error(option + " " + path + ": " + why); };
+        const auto reject = [&](const std::string &why) { throw Error(option + " " + path + ": " + why); };
         if (parts[i].empty())
-            refuse("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
+            reject("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
         canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
         YAML::Node next;
         if (at.IsSequence()) {
             std::size_t index = 0;
             const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), index);
             if (error != std::errc() || *end != '\0' || index >= at.size())
-                refuse("'" + parts[i] + "' is no index of a list of " + std::to_string(at.size()));
+                reject("'" + parts[i] + "' is not an index of a list of " + std::to_string(at.size()));
             if (last)
                 at[index] = value;
             else
@@ -264,7 +265,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
             else
                 next.reset(at[parts[i]]);
         } else {
-            refuse("there is a plain value above '" + parts[i] + "', which can't have keys");
+            reject("the value above '" + parts[i] + "' is a scalar, which can't have keys");
         }
         if (!last)
             at.reset(next);
@@ -273,7 +274,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
 }
 
 std::string Node::option() const {
-    std::string nearest_option; // of the longest path, which comes last
+    std::string nearest_option; // the longest path comes last
     for (const auto &[path, option] : document_->overrides)
         if (path_.starts_with(path) &&
             (path_.size() == path.size() || path_[path.size()] == '.' || path_[path.size()] == '['))
@@ -308,7 +309,7 @@ void Node::allow_keys(std::span<const std::string_view> keys) const {
                        (near.empty() ? "known here: " + listed(keys) : "did you mean '" + near + "'?"));
         }
         if (!seen.insert(key).second)
-            value.fail("the key stands here twice; keep one of them");
+            value.fail("duplicate key; keep one of them");
     }
 }
 
@@ -327,7 +328,7 @@ Node Node::require(std::string_view key) const {
 
 std::vector<std::pair<std::string, Node>> Node::entries() const {
     if (!node_.IsMap())
-        fail(is_null() ? "is empty, a map of keys is needed" : "must be a map of keys");
+        fail(is_null() ? "is empty, must be a map of keys" : "must be a map of keys");
     std::vector<std::pair<std::string, Node>> found;
     for (const auto &entry : node_) {
         if (!entry.first.IsScalar())
@@ -347,9 +348,9 @@ std::vector<Node> Node::items() const {
     return found;
 }
 
-std::string Node::scalar(const char *wanted) const {
+std::string Node::scalar(const char *expected) const {
     if (!node_.IsScalar())
-        fail(std::string("must be ") + wanted + (node_.IsNull() ? ", is empty" : ""));
+        fail(std::string("must be ") + expected + (node_.IsNull() ? ", is empty" : ""));
     return node_.Scalar();
 }
 
@@ -359,7 +360,7 @@ bool Node::boolean() const {
         return true;
     if (text == "false")
         return false;
-    fail("must be true or false, is " + shown(text));
+    fail("must be true or false, is " + in_quotes(text));
 }
 
 std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
@@ -367,7 +368,7 @@ std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
     std::int64_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-        fail("must be a whole number, is " + shown(text));
+        fail("must be a whole number, is " + in_quotes(text));
     if (value < minimum || value > maximum)
         fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", is " +
              base::printable(text, 200));
@@ -384,7 +385,7 @@ double Node::real(double minimum, double maximum) const {
     const char *end_of_text = digits.data() + digits.size();
     const auto [end, error] = std::from_chars(digits.data(), end_of_text, value);
     if (error == std::errc::invalid_argument || end != end_of_text)
-        fail("must be a number, is " + shown(text));
+        fail("must be a number, is " + in_quotes(text));
     std::ostringstream range;
     if (std::isfinite(minimum) && std::isfinite(maximum))
         range << minimum << " to " << maximum;
@@ -394,7 +395,7 @@ double Node::real(double minimum, double maximum) const {
         range << "at most " << maximum;
     const bool too_small = error != std::errc() && std::abs(std::strtod(digits.c_str(), nullptr)) < 1;
     if (error != std::errc() || !std::isfinite(value))
-        fail((too_small ? "must be a number farther from 0" : "must be a finite number") +
+        fail((too_small ? "must not be that close to 0" : "must be a finite number") +
              (range.str().empty() ? "" : ", " + range.str()) + ", is " + base::printable(text, 200));
     if (value < minimum || value > maximum)
         fail("must be " + range.str() + ", is " + base::printable(text, 200));
@@ -405,8 +406,8 @@ std::string Node::text() const {
     std::string value = scalar("text");
     if (value.empty())
         fail("must not be empty");
-    if (value.find('\0') != std::string::npos) // where a name would end for the kernel
-        fail("must not have a NUL character in it");
+    if (value.find('\0') != std::string::npos) // the kernel would truncate names there
+        fail("must not contain a NUL character");
     return value;
 }
 
@@ -414,7 +415,7 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
     std::string value = text();
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
         const std::string near = nearest(value, choices);
-        fail(shown(value) + " is not one of " + listed(choices) +
+        fail(in_quotes(value) + " is not one of " + listed(choices) +
              (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
     return value;
@@ -445,7 +446,7 @@ std::filesystem::path Node::output_path() const {
 std::filesystem::path Node::path_below(const std::filesystem::path &folder) const {
     std::filesystem::path path = without_dots(folder / text());
     if (!base::is_utf8(path.native())) // plugins get paths as UTF-8
-        fail("the path " + shown(path) + " is no UTF-8; rename what is not, here or among the folders above");
+        fail("the path " + in_quotes(path) + " is not valid UTF-8; rename the file or the folder");
     return path;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// YAML that knows where it stands: every error names file, line, column and key, and says what to mend.
-// Used for configurations, scenes and calibrations.
+// YAML with source positions: every error names file, line, column and key, and says how to fix it. Used for
+// configurations, scenes and calibrations.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -32,7 +32,7 @@ public:
 class Node {
 public:
     Node(const Node &) = default;
-    // YAML::Node's own assignment would change the document that this node stands in.
+    // YAML::Node's own assignment would modify the document.
     Node &operator=(const Node &other) {
         if (this != &other) {
             node_.reset(other.node_);
@@ -42,72 +42,71 @@ public:
         return *this;
     }
 
-    // Reads a file. An Error tells why it can't be read or where its syntax is wrong.
+    // Reads a file. Throws Error if it can't be read or has a syntax error.
     static Node load(const std::filesystem::path &file);
-    // `name` stands for the file in messages.
+    // `name` is used as the file name in messages.
     static Node parse(const std::string &text, const std::string &name);
 
-    // A plain value that stands in no file.
+    // A scalar without a file.
     static Node scalar(const std::string &text, const std::string &name);
 
-    // Replaces or adds the value at a path of keys ("tracker.options.dictionary", "outputs[0].path"):
-    // for `--set` and other options. Errors about it then name the option instead of a line. Call it on the
-    // root.
+    // Replaces or adds the value at a key path ("tracker.options.dictionary", "outputs[0].path"), for `--set` and
+    // other options. Errors about it then name the option instead of a line. Call it on the root.
     void override_value(const std::string &path, const std::string &value, const std::string &option = "--set");
-    // The same for a plain text, which is taken as it is.
+    // The same with plain text, which is not parsed as YAML.
     void override_text(const std::string &path, const std::string &text, const std::string &option);
 
     bool is_map() const { return node_.IsMap(); }
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
     bool is_null() const { return node_.IsNull(); }
-    bool is_overridden() const { return !option().empty(); } // itself or a node above it
+    bool is_overridden() const { return !option().empty(); } // it or an ancestor
     const std::string &path() const { return path_; }        // from the root, "" for the root itself
     std::filesystem::path file() const;
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
-    // Maps. `allow_keys` refuses keys that are not in the list (naming the nearest one) or come twice;
-    // call it before the look-ups.
+    // Maps. `allow_keys` rejects unknown keys (suggesting the nearest one) and duplicates; call it before lookups.
     void allow_keys(std::span<const std::string_view> keys) const;
     void allow_keys(std::initializer_list<std::string_view> keys) const {
         allow_keys(std::span(keys.begin(), keys.size()));
     }
     std::optional<Node> find(std::string_view key) const;
     Node require(std::string_view key) const;
-    std::vector<std::pair<std::string, Node>> entries() const; // in the file's order
+    std::vector<std::pair<std::string, Node>> entries() const; // in file order
 
     std::vector<Node> items() const; // of a sequence
 
-    // Scalars, with a range where one is given (inclusive).
+    // Scalars, with an optional inclusive range.
     bool boolean() const;
     std::int64_t integer(std::int64_t minimum = std::numeric_limits<std::int64_t>::min(),
                          std::int64_t maximum = std::numeric_limits<std::int64_t>::max()) const;
     double real(double minimum = -std::numeric_limits<double>::infinity(),
                 double maximum = std::numeric_limits<double>::infinity()) const; // finite
     std::string text() const;                                                    // not empty
-    // One of `choices`; the message lists them and names the nearest.
+    // One of `choices`; the error lists them and suggests the nearest.
     std::string choice(std::span<const std::string_view> choices) const;
     std::string choice(std::initializer_list<std::string_view> choices) const {
         return choice(std::span(choices.begin(), choices.size()));
     }
     std::vector<double> reals() const;                  // a sequence of finite numbers
-    std::vector<double> reals(std::size_t count) const; // exactly so many
+    std::vector<double> reals(std::size_t count) const; // exactly `count` numbers
 
-    // Absolute paths in UTF-8, without dots: `..` behind a link leads up from its target, as it does for the kernel.
-    std::filesystem::path input_path() const;  // from the folder of the document's file (after `--set` as below)
-    std::filesystem::path output_path() const; // from the working directory
+    // Absolute UTF-8 paths without `.` and `..`; `..` after a symbolic link resolves from its target, as in the
+    // kernel.
+    std::filesystem::path input_path() const;  // relative to the document's file (from `--set`: as below)
+    std::filesystem::path output_path() const; // relative to the working directory
 
 private:
     struct Document {
         std::string name;
-        std::map<std::string, std::string> overrides; // path of keys → the option that set it
+        std::map<std::string, std::string> overrides; // key path → option that set it
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}
-    std::string scalar(const char *wanted) const;
+    std::string scalar(const char *expected) const;
     std::filesystem::path path_below(const std::filesystem::path &folder) const;
-    std::string option() const; // that overrides this node, or ""
+    std::string option() const; // the option that overrides this node, or ""
     void replace(const std::string &path, const YAML::Node &value, const std::string &option);
 
     YAML::Node node_;
@@ -115,7 +114,7 @@ private:
     std::shared_ptr<Document> document_;
 };
 
-// "dictionary" for "dictionry" out of the candidates, or "" where none is near.
+// The most similar candidate ("dictionary" for "dictionry"), or "" if none is similar.
 std::string nearest(std::string_view word, std::span<const std::string_view> candidates);
 
 } // namespace arhost::yaml

@@ -100,9 +100,8 @@ TEST(Documentation, LinksToFilesThatAreThere) {
 }
 
 TEST(Documentation, NamesCommandsThatAreThere) {
-    for (const char *command :
-         {"tools/demo", "tools/test", "tools/bench", "tools/check-style", "tools/tidy", "tools/setup",
-          "tools/get-models", "tools/gallery", "tools/make-tentacles", "tools/likeness"})
+    for (const char *command : {"tools/demo", "tools/test", "tools/bench", "tools/check-style", "tools/tidy",
+                                "tools/setup", "tools/get-models", "tools/gallery", "tools/likeness"})
         EXPECT_EQ(::access((root / command).c_str(), X_OK), 0) << command;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every input that is kept, once: what the fuzzers start from, and each that has shown a defect. And a number of
-// inputs like them, always the same ones: a defect that any change brings is often found without libFuzzer.
+// Runs every input of the corpus once: the fuzzers' seeds, and all inputs that have revealed a bug. Then runs a fixed
+// number of deterministic mutations, which often finds regressions without libFuzzer.
 #include "mutator.hpp"
 #include "targets.hpp"
 
@@ -17,7 +17,7 @@ using namespace arhost::fuzz;
 
 namespace {
 
-std::vector<std::filesystem::path> kept_for(const Target &target) {
+std::vector<std::filesystem::path> corpus_of(const Target &target) {
     std::vector<std::filesystem::path> files;
     for (const auto &entry :
          std::filesystem::directory_iterator(std::filesystem::path(ARHOST_FUZZ_CORPUS) / target.name))
@@ -35,8 +35,8 @@ Mutator::Content content_of(const std::filesystem::path &file) {
 
 class Corpus : public testing::TestWithParam<Target> {};
 
-TEST_P(Corpus, PassesWithoutADefect) {
-    const auto files = kept_for(GetParam());
+TEST_P(Corpus, InputsPass) {
+    const auto files = corpus_of(GetParam());
     ASSERT_GT(files.size(), 0u);
     for (const auto &file : files) {
         SCOPED_TRACE(file);
@@ -44,13 +44,13 @@ TEST_P(Corpus, PassesWithoutADefect) {
     }
 }
 
-TEST_P(Corpus, AndWhatIsLikeItPasses) {
-    std::vector<Mutator::Content> kept;
-    for (const auto &file : kept_for(GetParam()))
-        kept.push_back(content_of(file));
+TEST_P(Corpus, MutationsPass) {
+    std::vector<Mutator::Content> corpus;
+    for (const auto &file : corpus_of(GetParam()))
+        corpus.push_back(content_of(file));
     constexpr std::uint32_t seed = 1;
-    Mutator mutator(std::move(kept), seed);
-    // What was tried last is left behind where it ends the process.
+    Mutator mutator(std::move(corpus), seed);
+    // Left behind if the input crashes the process.
     const std::filesystem::path last = testing::TempDir() + "arhost-fuzz-" + std::string(GetParam().name) + "-" +
                                        std::to_string(::getpid()) + ".input";
     for (unsigned i = 0; i < GetParam().tries; ++i) {

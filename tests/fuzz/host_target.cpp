@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole host beside workers that are played by the fuzzer's bytes: they do what a worker would do next, spoilt in
-// some places or not, send what they like, scribble over their memory, and die when they like. No process is started,
-// and no time counts: all deadlines are an hour.
+// The whole host with simulated workers, driven by the fuzzer's bytes: they follow the protocol with or without
+// corruption, send arbitrary messages, overwrite their memory, and exit at any time. No process is started, and no
+// timing matters: all deadlines are an hour.
 #include "../core/scene/scene_samples.hpp"
 #include "input.hpp"
 #include "targets.hpp"
@@ -55,20 +55,20 @@ base::UniqueFd scene_memory() {
     return fd;
 }
 
-base::UniqueFd some_descriptor(unsigned kind) {
+base::UniqueFd arbitrary_descriptor(unsigned kind) {
     switch (kind % 4) {
     case 0:
         return scene_memory();
     case 1:
         return base::checked(::open("/dev/null", O_RDWR | O_CLOEXEC), "/dev/null");
-    case 2: // no memory behind it, and its seals shut
+    case 2: // empty, and sealing not allowed
         return base::checked(::memfd_create("empty", MFD_CLOEXEC), "memfd_create");
     default:
         return base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
     }
 }
 
-// One worker, seen from its own end.
+// The worker side of one connection.
 class Worker {
 public:
     Worker(pid_t process, Channel channel, base::UniqueFd doorbell, base::UniqueFd output, base::UniqueFd death)
@@ -85,11 +85,11 @@ public:
             return send(input.text(input.number()), {}, input);
         case 4:
             if (worker_page_)
-                input.spoil(worker_page_.bytes());
+                input.corrupt(worker_page_.bytes());
             return ring_doorbell(doorbell_.get());
         case 5:
             if (output_memory_)
-                input.spoil(output_memory_.bytes());
+                input.corrupt(output_memory_.bytes());
             return;
         case 6: {
             const std::string text = input.text(input.number());
@@ -99,7 +99,7 @@ public:
         case 7:
             return misbehave(input.number());
         default:
-            return go_on(input);
+            return step(input);
         }
     }
 
@@ -119,15 +119,15 @@ public:
 private:
     void misbehave(unsigned how) {
         if (how % 3 == 0)
-            return die(static_cast<int>(how / 3)); // as of wait(2): signals, too
+            return die(static_cast<int>(how / 3)); // wait(2) status, including signals
         if (how % 3 == 1)
             return channel_.close();
         for (unsigned i = 0; i < how * 40; ++i)
             ring_doorbell(doorbell_.get());
     }
 
-    // What a good worker would do next. What it says and answers may be spoilt.
-    void go_on(Input &input) {
+    // The next step of a correct worker; its messages and results may be corrupted.
+    void step(Input &input) {
         if (finished_)
             return die(0);
         pollfd ready{channel_.fd(), POLLIN, 0};
@@ -153,8 +153,8 @@ private:
             finish(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
     }
 
-    void finish(const char *last_words, base::UniqueFd fd, Input &input) {
-        send(last_words, std::move(fd), input);
+    void finish(const char *text, base::UniqueFd fd, Input &input) {
+        send(text, std::move(fd), input);
         finished_ = true;
     }
 
@@ -236,22 +236,22 @@ private:
             for (const int diagonal : {0, 5, 10, 15})
                 found.markers[0].mt[diagonal] = 1;
             found.markers[0].mt[14] = -500;
-            input.spoil(slot.first(sizeof(arhost_marker) + offsetof(arhost_tracker_result, markers)));
+            input.corrupt(slot.first(sizeof(arhost_marker) + offsetof(arhost_tracker_result, markers)));
         }
-        input.spoil(std::as_writable_bytes(std::span(&result, 1)));
+        input.corrupt(std::as_writable_bytes(std::span(&result, 1)));
         results_->push(result);
         ring_doorbell(doorbell_.get());
     }
 
-    // With `fd` and up to four others, which are a message's most.
+    // Sends `fd` and up to four further descriptors, the maximum of a message.
     void send(std::string text, base::UniqueFd fd, Input &input) const {
-        input.spoil(std::as_writable_bytes(std::span(text)));
+        input.corrupt(std::as_writable_bytes(std::span(text)));
         const unsigned more = input.number() < 200 ? 0 : input.number();
         std::vector<base::UniqueFd> fds;
         if (fd)
             fds.push_back(std::move(fd));
         for (unsigned i = 0; i < more % 4; ++i)
-            fds.push_back(some_descriptor(more >> 2 >> i));
+            fds.push_back(arbitrary_descriptor(more >> 2 >> i));
         const auto bytes = std::as_bytes(std::span(text));
         switch (fds.size()) {
         case 0:
@@ -275,7 +275,7 @@ private:
     bool finished_ = false;
 };
 
-class Troupe final : public supervise::Starter {
+class SimulatedWorkers final : public supervise::Starter {
 public:
     supervise::Spawned spawn(const std::filesystem::path &, const supervise::LogFunction &) override {
         supervise::Spawned spawned;
@@ -287,7 +287,7 @@ public:
         if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
             base::throw_errno("pipe2");
         spawned.output.reset(pipe_ends[0]);
-        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // signals can't be sent to it
+        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // not a real pidfd: rejects signals
         spawned.pid = next_pid_++;
         workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker),
                               base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"));
@@ -297,7 +297,7 @@ public:
     supervise::Exit wait_exit(pid_t pid) override {
         const auto found = std::ranges::find(workers_, pid, &Worker::pid);
         if (found == workers_.end() || !found->dead)
-            throw std::logic_error("the host waits for a worker that lives");
+            throw std::logic_error("the host waits for a running worker");
         const supervise::Exit exit{pid, found->wait_status, 0};
         workers_.erase(found);
         return exit;
@@ -308,36 +308,36 @@ public:
         for (Worker &worker : workers_)
             if (!worker.dead)
                 living.push_back(&worker);
-        const unsigned who = input.number(); // 0: the next in turn
+        const unsigned index = input.number(); // 0: the next in turn
         if (!living.empty())
-            living[(who ? who : turn_++) % living.size()]->act(input);
+            living[(index ? index : turn_++) % living.size()]->act(input);
     }
 
 private:
     unsigned turn_ = 0;
-    pid_t next_pid_ = 1 << 22; // above the highest that Linux gives to a process
+    pid_t next_pid_ = 1 << 22; // above the maximum PID of Linux
     std::list<Worker> workers_;
 };
 
 } // namespace
 
 void run_host(Bytes bytes) {
-    [[maybe_unused]] static const auto ignored = ::signal(SIGPIPE, SIG_IGN); // as arhost does
+    [[maybe_unused]] static const auto ignored = ::signal(SIGPIPE, SIG_IGN); // like arhost
     static const run_config::Configuration lockstep = make_configuration("lockstep"),
                                            live = make_configuration("live");
     Input input(bytes);
     const run_config::Configuration &configuration = input.number() % 2 ? live : lockstep;
-    Troupe troupe;
+    SimulatedWorkers workers;
     Reactor reactor;
-    host::Pipeline pipeline(configuration, {reactor, troupe, "", [](arhost_severity, auto &, auto &) {}},
+    host::Pipeline pipeline(configuration, {reactor, workers, "", [](arhost_severity, auto &, auto &) {}},
                             [](const host::Progress &) {});
-    // Readable for ever: one act after every look of the host.
+    // Always readable: one action per reactor iteration.
     const base::UniqueFd always = base::checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
     const auto acting = reactor.watch(always.get(), [&] {
         if (input.empty())
-            pipeline.interrupt(); // the second ends it at once
+            pipeline.interrupt(); // the second one stops immediately
         else
-            troupe.act(input);
+            workers.act(input);
     });
     pipeline.run();
     (void)host::report(pipeline.statistics(), pipeline.components(), 0)

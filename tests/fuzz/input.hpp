@@ -11,15 +11,15 @@
 
 namespace arhost::fuzz {
 
-// The bytes that the fuzzer has thought of, taken from the front. Zeros once they are used up.
+// The fuzzer's bytes, consumed from the front; zeros after the end.
 class Input {
 public:
-    explicit Input(std::span<const std::uint8_t> bytes) : left_(bytes) {}
+    explicit Input(std::span<const std::uint8_t> bytes) : remaining_(bytes) {}
 
-    bool empty() const { return left_.empty(); }
-    std::span<const std::uint8_t> take(std::size_t most) {
-        const auto taken = left_.first(std::min(most, left_.size()));
-        left_ = left_.subspan(taken.size());
+    bool empty() const { return remaining_.empty(); }
+    std::span<const std::uint8_t> take(std::size_t limit) {
+        const auto taken = remaining_.first(std::min(limit, remaining_.size()));
+        remaining_ = remaining_.subspan(taken.size());
         return taken;
     }
     template <class T = std::uint8_t> T number() {
@@ -29,14 +29,14 @@ public:
         std::copy(bytes.begin(), bytes.end(), reinterpret_cast<std::uint8_t *>(&value));
         return value;
     }
-    std::string text(std::size_t most) {
-        const auto bytes = take(most);
+    std::string text(std::size_t limit) {
+        const auto bytes = take(limit);
         return {bytes.begin(), bytes.end()};
     }
 
-    // Overwrites some places of what is valid, so that the rest of it still passes the checks. No more input: none.
-    void spoil(std::span<std::byte> valid) {
-        for (unsigned places = number(); places > 0 && !valid.empty() && !empty(); --places) {
+    // Overwrites some ranges of valid data, so that the rest still passes validation. Nothing without input.
+    void corrupt(std::span<std::byte> valid) {
+        for (unsigned ranges = number(); ranges > 0 && !valid.empty() && !empty(); --ranges) {
             const std::size_t at = number<std::uint16_t>() % valid.size();
             const auto bytes = take(1 + number() % 8);
             std::memcpy(valid.data() + at, bytes.data(), std::min(bytes.size(), valid.size() - at));
@@ -44,7 +44,7 @@ public:
     }
 
 private:
-    std::span<const std::uint8_t> left_;
+    std::span<const std::uint8_t> remaining_;
 };
 
 } // namespace arhost::fuzz

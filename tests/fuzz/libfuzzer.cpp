@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// libFuzzer's entry. The environment chooses the target, as libFuzzer starts itself again with its own arguments
-// only.
+// libFuzzer entry point. The environment selects the target, because libFuzzer restarts itself with only its own
+// arguments.
 #include "targets.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ using namespace arhost::fuzz;
 
 namespace {
 
-const Target &chosen() {
+const Target &selected_target() {
     const char *name = std::getenv("ARHOST_FUZZ_TARGET");
     const auto *found = std::ranges::find(targets, std::string_view(name ? name : ""), &Target::name);
     if (found == std::end(targets)) {
@@ -28,7 +28,7 @@ const Target &chosen() {
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
-    static const Target &target = chosen();
+    static const Target &target = selected_target();
     target.run({data, size});
     return 0;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// New inputs out of those that are kept, by a few random changes to one of them. The same seed gives the same inputs.
+// Mutates corpus inputs by a few random changes. The same seed gives the same inputs.
 #pragma once
 
 #include <algorithm>
@@ -18,23 +18,23 @@ class Mutator {
 public:
     using Content = std::vector<std::uint8_t>;
 
-    Mutator(std::vector<Content> kept, std::uint32_t seed) : kept_(std::move(kept)), random_(seed) {}
+    Mutator(std::vector<Content> corpus, std::uint32_t seed) : corpus_(std::move(corpus)), random_(seed) {}
 
     Content next() {
-        Content content = any();
+        Content content = pick();
         for (std::size_t changes = 1 + below(5); changes > 0; --changes)
             change(content);
-        constexpr std::size_t longest = 1 << 16;
-        content.resize(std::min(content.size(), longest));
+        constexpr std::size_t size_limit = 1 << 16;
+        content.resize(std::min(content.size(), size_limit));
         return content;
     }
 
 private:
-    std::size_t below(std::size_t end) { return random_() % end; } // distributions differ between libraries
-    const Content &any() { return kept_[below(kept_.size())]; }
+    std::size_t below(std::size_t end) { return random_() % end; } // std distributions differ between libraries
+    const Content &pick() { return corpus_[below(corpus_.size())]; }
 
     void change(Content &content) {
-        // Some bytes of it; none, too.
+        // A range, possibly empty.
         const auto at = static_cast<std::ptrdiff_t>(below(content.size() + 1));
         const auto begin = content.begin() + at;
         const auto length = static_cast<std::ptrdiff_t>(
@@ -51,15 +51,15 @@ private:
         case 2:
             content.erase(begin, begin + length);
             break;
-        case 3: // once more, there or elsewhere
+        case 3: // duplicate, in place or elsewhere
             content.insert(content.begin() + static_cast<std::ptrdiff_t>(below(content.size() + 1)), range.begin(),
                            range.end());
             break;
         case 4:
             std::fill_n(begin, length, static_cast<std::uint8_t>(random_()));
             break;
-        case 5: { // goes on as another one does
-            const Content &other = any();
+        case 5: { // splice with the tail of another input
+            const Content &other = pick();
             content.erase(begin, content.end());
             content.insert(content.end(),
                            other.begin() + static_cast<std::ptrdiff_t>(
@@ -67,7 +67,7 @@ private:
                            other.end());
             break;
         }
-        case 6: { // a number at the end of some type's range, in its place or in a smaller one's
+        case 6: { // a boundary value of some integer type
             const std::uint64_t power = std::uint64_t{1} << below(64);
             const std::uint64_t number = power - below(2);
             for (std::ptrdiff_t i = 0; i < std::min<std::ptrdiff_t>(length, 8); ++i)
@@ -83,7 +83,7 @@ private:
         }
     }
 
-    std::vector<Content> kept_;
+    std::vector<Content> corpus_;
     std::mt19937 random_;
 };
 

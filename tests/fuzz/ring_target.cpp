@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pages and slots that a worker writes, read as the host reads them. Each lies alone in its memory, so that the
-// address sanitizer sees every byte that is read beside it.
+// Reads the pages and slots that a worker writes like the host does. Each has its own allocation, so that
+// AddressSanitizer detects every out-of-bounds read.
 #include "input.hpp"
 #include "targets.hpp"
 
@@ -20,9 +20,9 @@ namespace {
 
 using namespace ipc;
 
-void require(bool condition, const char *otherwise) {
+void require(bool condition, const char *message) {
     if (!condition)
-        throw std::logic_error(otherwise);
+        throw std::logic_error(message);
 }
 
 arhost_tracker_result valid_result() {
@@ -43,17 +43,17 @@ arhost_tracker_result valid_result() {
 void take_result(Input &input) {
     const auto slot = std::make_unique<arhost_tracker_result>(valid_result());
     const auto bytes = std::as_writable_bytes(std::span(slot.get(), 1));
-    input.spoil(bytes);
+    input.corrupt(bytes);
     const auto record = std::make_unique<arhost_record>();
     if (host::take_tracker_result(bytes, {0, 1}, *record))
         return;
-    require(record->marker_count <= 2, "more markers than there are");
+    require(record->marker_count <= 2, "more markers than expected");
     for (std::uint32_t i = 0; i < record->marker_count; ++i)
         for (const double number : record->markers[i].mt)
             require(std::isfinite(number), "a pose is not finite");
 }
 
-void lay_over(const arhost_render_info &info) {
+void overlay(const arhost_render_info &info) {
     arhost_frame_format format{};
     format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
     format.width = 21;
@@ -81,7 +81,7 @@ void run_ring(Bytes bytes) {
         Result result{};
         switch (input.number() % 6) {
         case 0:
-            input.spoil(std::as_writable_bytes(std::span(worker.get(), 1)));
+            input.corrupt(std::as_writable_bytes(std::span(worker.get(), 1)));
             break;
         case 1:
             commands.push(command);
@@ -94,13 +94,13 @@ void run_ring(Bytes bytes) {
             answers.push(result);
             break;
         case 4:
-            // The peer does not write while this test pops: at most what the ring holds comes.
+            // The peer does not write in the meantime, so at most the ring's capacity can be popped.
             for (std::uint32_t popped = 0; results.pop(result) == RingResult::done; ++popped) {
-                require(popped < ring_capacity, "more entries than the ring holds");
+                require(popped < ring_capacity, "more entries than the ring's capacity");
                 host::take_frame_info(result.frame, record.capture_ns, 0, record);
-                lay_over(result.render);
+                overlay(result.render);
                 const std::chrono::nanoseconds busy(result.busy_ns), device = host::device_time(result.render, busy);
-                require(device.count() == 0 || device <= busy, "a device's time is longer than the image's");
+                require(device.count() == 0 || device <= busy, "the device time exceeds the image's time");
             }
             break;
         case 5:

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the loader reads, and what the host takes from it.
+// Inputs of the scene loader, and its output as read by the host.
 #include "../core/scene/scene_samples.hpp"
 #include "input.hpp"
 #include "targets.hpp"
 
 #include "scene/gltf.hpp"
 #include "scene/loader.hpp"
+#include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
 
 #include <stdexcept>
@@ -16,9 +17,9 @@ namespace {
 
 using namespace scene;
 
-constexpr std::size_t enough = std::size_t(64) << 20; // of an arena that is written out
+constexpr std::size_t arena_size_limit = std::size_t(64) << 20;
 
-// What the host finds good is used without further checks.
+// A valid arena is used without further checks.
 void use(std::span<const std::byte> arena) {
     const auto &header = *reinterpret_cast<const arhost_scene *>(arena.data());
     MotionEvaluator evaluator(header);
@@ -27,7 +28,7 @@ void use(std::span<const std::byte> arena) {
 }
 
 void check(ArenaBuilder builder) {
-    if (builder.byte_size() > enough)
+    if (builder.byte_size() > arena_size_limit)
         return;
     const Arena arena = std::move(builder).build();
     if (validate(arena.bytes()).empty())
@@ -89,7 +90,7 @@ void run_scene(Bytes bytes) {
     }
 }
 
-// The first byte decides: the bytes themselves, or a valid arena with some places overwritten.
+// The first byte selects: raw bytes, or a valid arena with some ranges overwritten.
 void run_arena(Bytes bytes) {
     Input input(bytes);
     if (input.number() == 0) {
@@ -102,7 +103,7 @@ void run_arena(Bytes bytes) {
         return;
     }
     Arena arena = scene::test::full_scene().build();
-    input.spoil(arena.bytes());
+    input.corrupt(arena.bytes());
     if (validate(arena.bytes()).empty())
         use(arena.bytes());
 }

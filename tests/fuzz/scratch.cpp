@@ -25,7 +25,7 @@ public:
         if (!::mkdtemp(pattern.data()))
             throw std::runtime_error("mkdtemp " + pattern);
         path = pattern;
-        lock_ = locked(path);
+        lock_ = lock(path);
     }
     ~Folder() {
         std::error_code ignored;
@@ -36,21 +36,21 @@ public:
     fs::path path;
 
 private:
-    // For as long as this process lives, however it ends; -1: somebody else's.
-    static int locked(const fs::path &folder) {
+    // Locks until this process ends, however it ends; -1: another process holds the lock.
+    static int lock(const fs::path &folder) {
         const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
         if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
             return fd;
         ::close(fd);
         return -1;
     }
-    // Of processes that a crash or a signal has ended. A folder that is just being made may lack its lock.
-    static void remove_abandoned(const fs::path &of) {
+    // Removes folders of crashed processes. Skips recent ones, which may not be locked yet.
+    static void remove_abandoned(const fs::path &parent) {
         std::error_code ignored;
-        for (const auto &entry : fs::directory_iterator(of, ignored))
+        for (const auto &entry : fs::directory_iterator(parent, ignored))
             if (entry.path().filename().string().starts_with("arhost-fuzz-") &&
                 fs::last_write_time(entry, ignored) < fs::file_time_type::clock::now() - std::chrono::minutes(1))
-                if (const int fd = locked(entry); fd >= 0) {
+                if (const int fd = lock(entry); fd >= 0) {
                     fs::remove_all(entry, ignored);
                     ::close(fd);
                 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What reads bytes that arhost did not make. Each target takes any bytes and returns; it throws or crashes only
-// where there is a defect. `tools/fuzz` runs them under libFuzzer, corpus_test.cpp on the inputs that are kept.
+// Fuzz targets: all code that reads untrusted bytes. Each accepts any bytes and returns; throwing or crashing is a
+// bug. `tools/fuzz` runs them under libFuzzer, corpus_test.cpp on the corpus.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +14,22 @@ namespace arhost::fuzz {
 using Bytes = std::span<const std::uint8_t>;
 
 struct Target {
-    std::string_view name; // and of its folder in corpus/
+    std::string_view name; // also the name of its folder in corpus/
     void (*run)(Bytes);
-    unsigned tries; // by corpus_test.cpp: what takes some seconds
+    unsigned tries; // mutations in corpus_test.cpp; takes some seconds
 };
 
-void run_configuration(Bytes); // YAML, and the options of the plugins in it
+void run_configuration(Bytes); // YAML including plugin options
 void run_calibration(Bytes);
 void run_trajectory(Bytes);
-void run_pattern(Bytes); // a NUL between the pattern and a file's name
+void run_pattern(Bytes); // pattern, NUL, file name
 void run_scene(Bytes);
 void run_obj(Bytes);
 void run_ply(Bytes);
-void run_gltf(Bytes);  // .glb too
-void run_arena(Bytes); // what the loader's process hands to the host
-void run_ring(Bytes);  // what a worker writes into the memory that it shares with the host
-void run_host(Bytes);  // the whole host: all that its workers send, write, and leave undone
+void run_gltf(Bytes);  // including .glb
+void run_arena(Bytes); // output of the scene loader process
+void run_ring(Bytes);  // shared memory written by a worker
+void run_host(Bytes);  // the whole host with misbehaving workers
 
 inline constexpr Target targets[] = {
     {"configuration", run_configuration, 8000},
@@ -45,7 +45,7 @@ inline constexpr Target targets[] = {
     {"host", run_host, 1000},
 };
 
-// A folder of this process's own, in memory where there is such a place.
+// A per-process scratch folder, in /dev/shm if available.
 const std::filesystem::path &scratch();
 std::filesystem::path write_scratch(const std::filesystem::path &name, Bytes content);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Files that a user or another program writes: a fault in one is an Error, and nothing else.
+// Files written by users or other programs: errors in them may only throw Error.
 #include "input.hpp"
 #include "targets.hpp"
 
@@ -33,7 +33,7 @@ ipc::PluginDescription plugin_of(arhost_kind kind) {
     return plugin;
 }
 
-// What configurations name is there.
+// Creates the files that configurations refer to.
 void make_folder() {
     for (const char *plugin : {"source.so", "tracker.so", "rt.so", "sink.so"})
         write_scratch(std::filesystem::path("plugins") / plugin, {});

@@ -134,12 +134,12 @@ const std::vector<Case> cases = {
     {"OpenQuotation",
      replaced(good, "plugin: rt_counter", "plugin: \"rt_counter"),
      small_scene,
-     {"run.yaml:5:", "the quotation that begins here does not end"}},
+     {"run.yaml:5:", "this quoted value is not terminated"}},
     {"OutputsThatMeet",
      good + "timeline: ./counted.txt\n",
      small_scene,
      {"run.yaml:", "timeline", "choose another path"}},
-    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"another document begins here; keep one"}},
+    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"a second document starts here; keep one"}},
     {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
     {"SceneWithMissingMesh",
      good,
@@ -356,7 +356,7 @@ TEST(BadCommandLine, IsRefused) {
         {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 needs --g1"},
         {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
         {{"--config", "run.yaml", "--no\033[2J"}, "not expected: --no [2J"},
-        {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "no UTF-8"},
+        {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "not valid UTF-8"},
     };
     for (const auto &line : lines) {
         EXPECT_EQ(run.run(line.arguments), 2);

@@ -200,8 +200,7 @@ TEST(Replay, TakesTheDissertationsFormat) {
         EXPECT_EQ(lines[30]["eye"], nlohmann::json::parse("[0, 0, 529]"));
         EXPECT_TRUE(lines[11]["eye"].is_null());
         EXPECT_EQ(run.stats()["frames"]["augmented"], 20);
-        EXPECT_EQ(run.output().find("t.txt:31: the last line is cut short and is left out") != std::string::npos,
-                  cut);
+        EXPECT_EQ(run.output().find("t.txt:31: ignores the truncated last line") != std::string::npos, cut);
     }
 }
 
@@ -321,8 +320,8 @@ TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
         {{"replay", "--scene", "scene.yaml"}, "--trajectory is required"},
         {replay("t.txt", {}), "--scene is missing: the scene to trace"},
         {replay("none.txt"), "none.txt: can't be read: No such file or directory"},
-        {replay("."), "is no regular file"},
-        {replay("garbage.txt"), "garbage.txt:2:1: is no JSON; delete the line"},
+        {replay("."), "is not a regular file"},
+        {replay("garbage.txt"), "garbage.txt:2:1: is not valid JSON; delete the line"},
         {replay("empty.txt"), "empty.txt: has no frame"},
         {replay("nan.txt"), "nan.txt:1:5: 'nan' is no number"},
         {replay("scene.yaml"), "scene.yaml:1:1: 'version:' is no number"},
@@ -372,6 +371,6 @@ TEST(Replay, IsCheckedLikeAnyConfiguration) {
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
     run.write("t.txt", run.read("t.txt") + "{\"frame\"");
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: the last line is cut short"));
+    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: ignores the truncated last line"));
     EXPECT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
 }

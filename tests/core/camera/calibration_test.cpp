@@ -22,7 +22,7 @@ protected:
         std::ofstream(folder_.path() / "camera.yaml") << text;
         return folder_.path() / "camera.yaml";
     }
-    // The error of reading `text`, without the folder's name.
+    // The error of reading `text`, without the folder name.
     std::string error_in(const std::string &text, std::optional<Size> expected = {}) const {
         const auto file = write(text);
         const std::string message = error_of([&] { read_calibration(file, expected); });
@@ -40,7 +40,7 @@ arhost_intrinsics parsed(const std::string &text) {
     return parse_camera(yaml::Node::parse(text, "lab.yaml"));
 }
 
-// A calibration with other lines for the distortion.
+// A calibration with the given distortion lines.
 std::string with_distortion(const std::string &lines) {
     return "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
            "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
@@ -52,7 +52,7 @@ const std::string no_distortion = "distortion_coefficients: [0, 0, 0, 0]\n";
 
 } // namespace
 
-TEST_F(Calibration, IsReadAsOpenCvsFileStorageWritesIt) {
+TEST_F(Calibration, ReadsOpenCvFileStorage) {
     const std::vector<double> k = {0.0995485, -0.206384, 0.00754589, 0.00336531, 1e-17};
     const auto file = folder_.path() / "camera.yaml";
     {
@@ -74,7 +74,7 @@ TEST_F(Calibration, IsReadAsOpenCvsFileStorageWritesIt) {
     EXPECT_EQ(coefficients(intrinsics), k);
 }
 
-TEST_F(Calibration, OfOpenCvsTutorialsIsRead) {
+TEST_F(Calibration, ReadsOpenCvTutorialFiles) {
     ARHOST_REQUIRE_SHARED_DATA("markers/opencv_doc/tutorial_camera_charuco.yml");
     const arhost_intrinsics charuco =
         read_calibration(test::shared_data("markers/opencv_doc/tutorial_camera_charuco.yml"));
@@ -90,11 +90,12 @@ TEST_F(Calibration, OfOpenCvsTutorialsIsRead) {
     EXPECT_EQ(read_calibration(without_size, Size{640, 480}).fx, 628.158);
     EXPECT_EQ(read_calibration(without_size, Size{640, 480}).width, 640u);
     EXPECT_EQ(error_of([&] { read_calibration(without_size); }),
-              without_size.string() + ":2:1: the key 'image_width' is missing; give the size of the calibration's "
-                                      "images in px, here or as width and height beside 'file' in the configuration");
+              without_size.string() +
+                  ":2:1: the key 'image_width' is missing; give the size of the calibration's "
+                  "images in px, here or as width and height next to 'file' in the configuration");
 }
 
-TEST_F(Calibration, IsReadUnderTheKeysOfOlderOpenCvs) {
+TEST_F(Calibration, ReadsKeysOfOlderOpenCvReleases) {
     const auto intrinsics = read_calibration(
         write("%YAML:1.0\nimage_Width: 640\nimage_Height: 480\nCamera_Matrix: [600, 0, 320, 0, 601, 240, 0, 0, 1]\n"
               "Distortion_Coefficients: [0.1, 0, 0, 0, 0]\n"));
@@ -102,7 +103,7 @@ TEST_F(Calibration, IsReadUnderTheKeysOfOlderOpenCvs) {
     EXPECT_EQ(intrinsics.coefficients[0], 0.1);
 }
 
-TEST_F(Calibration, IsReadFromRosCameraInfo) {
+TEST_F(Calibration, ReadsRosCameraInfo) {
     const auto plumb_bob = read_calibration(
         write("image_width: 640\nimage_height: 480\ncamera_name: usb\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
               "  data: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n"
@@ -116,19 +117,19 @@ TEST_F(Calibration, IsReadFromRosCameraInfo) {
     EXPECT_EQ(equidistant.coefficient_count, 4u);
 }
 
-TEST_F(Calibration, OfAFisheyeLensIsToldByItsModel) {
+TEST_F(Calibration, DetectsFisheyeByItsModelKey) {
     const std::string four = "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n";
     EXPECT_EQ(read_calibration(write(with_distortion(four))).distortion, ARHOST_DISTORTION_BROWN);
     EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + four))).distortion,
               ARHOST_DISTORTION_FISHEYE);
     EXPECT_EQ(read_calibration(write(with_distortion("fisheye_model: 1\n" + four))).distortion,
               ARHOST_DISTORTION_FISHEYE);
-    // Of a fisheye, coefficients of 0 do not mean a lens without distortion.
+    // A fisheye lens with coefficients of 0 still has distortion.
     EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + no_distortion))).distortion,
               ARHOST_DISTORTION_FISHEYE);
 }
 
-TEST_F(Calibration, TakesEachCountOfBrownsCoefficients) {
+TEST_F(Calibration, AcceptsAllBrownCoefficientCounts) {
     for (const std::size_t count : {4, 5, 8, 12}) {
         std::string list = "0.5";
         for (std::size_t i = 1; i < count; ++i)
@@ -142,13 +143,13 @@ TEST_F(Calibration, TakesEachCountOfBrownsCoefficients) {
               ARHOST_DISTORTION_NONE);
 }
 
-TEST_F(Calibration, WithCoefficientsOfZeroHasNoDistortion) {
+TEST_F(Calibration, HasNoDistortionIfAllCoefficientsAreZero) {
     const auto intrinsics = read_calibration(write(with_distortion(no_distortion)));
     EXPECT_EQ(intrinsics.distortion, ARHOST_DISTORTION_NONE);
     EXPECT_EQ(intrinsics.coefficient_count, 0u);
 }
 
-TEST_F(Calibration, TakesFourteenCoefficientsOnlyWithoutTilt) {
+TEST_F(Calibration, AcceptsFourteenCoefficientsOnlyWithoutTilt) {
     const std::string twelve = "distortion_coefficients: [0.1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.2, ";
     EXPECT_EQ(read_calibration(write(with_distortion(twelve + "0, 0]\n"))).coefficient_count, 12u);
     EXPECT_EQ(error_in(with_distortion(twelve + "0, 0.01]\n")),
@@ -156,33 +157,33 @@ TEST_F(Calibration, TakesFourteenCoefficientsOnlyWithoutTilt) {
               "without CALIB_TILTED_MODEL");
 }
 
-TEST_F(Calibration, ThatIsWrongNamesLineKeyAndTheMend) {
+TEST_F(Calibration, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(
         error_in(with_distortion("distortion_coefficients: [1, 2, 3]\n")),
         "camera.yaml:10:26: distortion_coefficients: the Brown model has 4, 5, 8 or 12 coefficients (k1 k2 p1 p2 "
-        "[k3 [k4 k5 k6 [s1 s2 s3 s4]]]), here are 3");
-    EXPECT_EQ(error_in(with_distortion("distortion_model: fisheye\ndistortion_coefficients: [1, 2, 3, 4, 5]\n")),
-              "camera.yaml:11:26: distortion_coefficients: the fisheye model has 4 coefficients (k1 k2 k3 k4), here "
-              "are 5");
+        "[k3 [k4 k5 k6 [s1 s2 s3 s4]]]), not 3");
+    EXPECT_EQ(
+        error_in(with_distortion("distortion_model: fisheye\ndistortion_coefficients: [1, 2, 3, 4, 5]\n")),
+        "camera.yaml:11:26: distortion_coefficients: the fisheye model has 4 coefficients (k1 k2 k3 k4), not 5");
     EXPECT_EQ(error_in(with_distortion("distortion_model: radtn\n" + no_distortion)),
               "camera.yaml:10:19: distortion_model: 'radtn' is not one of brown, plumb_bob, radtan, "
               "rational_polynomial, fisheye, equidistant, none; did you mean 'radtan'?");
     EXPECT_EQ(error_in(with_distortion("distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4]\n")),
               "camera.yaml:11:26: distortion_coefficients: the model is none, but a coefficient is not 0; set the "
               "model to brown or fisheye");
-    EXPECT_EQ(error_in(with_distortion("")), "camera.yaml:3:1: the key 'distortion_coefficients' is missing; of a "
-                                             "lens without distortion it is [0, 0, 0, 0]");
+    EXPECT_EQ(error_in(with_distortion("")), "camera.yaml:3:1: the key 'distortion_coefficients' is missing; for a "
+                                             "lens without distortion, write [0, 0, 0, 0]");
     EXPECT_EQ(error_in("image_width: 640\nimage_height: 480\n" + no_distortion),
               "camera.yaml:1:1: the key 'camera_matrix' is missing; is this a camera calibration?");
     EXPECT_EQ(error_in("image_width: 640\n"), "camera.yaml:1:1: the key 'image_height' is missing; give the size of "
-                                              "the calibration's images in px, here or as width and height beside "
+                                              "the calibration's images in px, here or as width and height next to "
                                               "'file' in the configuration");
     EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"),
-              "camera.yaml:1:1: is no calibration in YAML; let OpenCV's FileStorage write it to a name that ends in "
-              ".yaml");
+              "camera.yaml:1:1: is not a YAML calibration; let OpenCV's FileStorage write it to a file named "
+              "*.yaml");
 }
 
-TEST_F(Calibration, WithAWrongCameraMatrixNamesIt) {
+TEST_F(Calibration, RejectsInvalidCameraMatrices) {
     const auto with_matrix = [](const std::string &value) {
         return "image_width: 640\nimage_height: 480\ncamera_matrix: " + value + "\n" + no_distortion;
     };
@@ -202,23 +203,23 @@ TEST_F(Calibration, WithAWrongCameraMatrixNamesIt) {
               "camera.yaml:3:39: camera_matrix.dt: 'u' is not one of d, f; did you mean 'd'?");
 }
 
-TEST_F(Calibration, ForAnotherImageSizeNamesBoth) {
+TEST_F(Calibration, RejectsAnotherImageSizeAndNamesBoth) {
     EXPECT_EQ(error_in(with_distortion(no_distortion), Size{1280, 720}),
-              "camera.yaml:3:14: image_width: the calibration is for images of 640×480 px, but 1280×720 px are asked "
-              "for; calibrate at that size");
+              "camera.yaml:3:14: image_width: the calibration is for images of 640×480 px, but 1280×720 px are "
+              "requested; calibrate at that size");
     const auto intrinsics = read_calibration(write(with_distortion(no_distortion)), Size{640, 480});
     EXPECT_EQ(error_of([&] { check_size(intrinsics, 640, 480); }), "no error");
     EXPECT_EQ(error_of([&] { check_size(intrinsics, 1280, 720); }),
               "the camera is calibrated for images of 640×480 px, but the frames are 1280×720 px; calibrate at the "
-              "frames' size, or set the source to the calibration's");
+              "frame size, or set the source to the calibration size");
 }
 
-TEST_F(Calibration, ThatIsMissingIsReported) {
+TEST_F(Calibration, ReportsAMissingFile) {
     EXPECT_EQ(error_of([] { read_calibration("/no/camera.yaml"); }),
               "/no/camera.yaml: can't be read: No such file or directory");
 }
 
-TEST(CameraBlock, PutsThePrincipalPointAtTheImagesCentreByDefault) {
+TEST(CameraBlock, DefaultsToACentredPrincipalPoint) {
     const arhost_intrinsics intrinsics = parsed("{width: 640, height: 480, fx: 600}");
     EXPECT_EQ(intrinsics.struct_size, sizeof intrinsics);
     EXPECT_EQ(intrinsics.fx, 600);
@@ -229,7 +230,7 @@ TEST(CameraBlock, PutsThePrincipalPointAtTheImagesCentreByDefault) {
     EXPECT_EQ(intrinsics.coefficient_count, 0u);
 }
 
-TEST(CameraBlock, TakesAFieldOfViewInPlaceOfFocalLengths) {
+TEST(CameraBlock, AcceptsAFieldOfViewInsteadOfFocalLengths) {
     const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, vertical_fov_degrees: 45, cx: 400}");
     // The image's edges are half a pixel beyond the outermost centres, 300 px from its middle.
     EXPECT_NEAR(intrinsics.fx, 724.2640687, 1e-6);
@@ -241,12 +242,12 @@ TEST(CameraBlock, TakesAFieldOfViewInPlaceOfFocalLengths) {
     EXPECT_EQ(dissertation.cx, 399.5);
     EXPECT_EQ(dissertation.distortion, ARHOST_DISTORTION_NONE);
     EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, fx: 9, vertical_fov_degrees: 45}"); }),
-              "lab.yaml:1:52: vertical_fov_degrees: stands for fx and fy; keep it or them");
+              "lab.yaml:1:52: vertical_fov_degrees: replaces fx and fy; keep either it or them");
     EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, vertical_fov_degrees: 180}"); }),
               "lab.yaml:1:45: vertical_fov_degrees: must be 0.01 to 179, is 180");
 }
 
-TEST(CameraBlock, TakesEveryNumberGiven) {
+TEST(CameraBlock, UsesEveryGivenNumber) {
     const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, fx: 700, fy: 701, cx: 400, cy: 300,\n"
                                                 " distortion: {model: fisheye, coefficients: [0.1, 0.2, 0.3, 0.4]}}");
     EXPECT_EQ(intrinsics.width, 800u);
@@ -262,7 +263,7 @@ TEST(CameraBlock, TakesEveryNumberGiven) {
         ARHOST_DISTORTION_BROWN);
 }
 
-TEST(CameraBlock, ReadsAFileBesideTheConfiguration) {
+TEST(CameraBlock, ReadsAFileRelativeToTheConfiguration) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";
     std::ofstream(folder.path() / "lab.yaml") << "{file: camera.yaml, width: 640, height: 480}\n";
@@ -271,7 +272,7 @@ TEST(CameraBlock, ReadsAFileBesideTheConfiguration) {
     EXPECT_EQ(intrinsics.height, 480u);
 }
 
-TEST(CameraBlock, ThatIsWrongNamesLineKeyAndTheMend) {
+TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\n"); }), "lab.yaml:1:1: the key 'fx' is missing");
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 0\n"); }),
               "lab.yaml:3:5: fx: the focal length must be greater than 0 px, is 0");
@@ -280,7 +281,7 @@ TEST(CameraBlock, ThatIsWrongNamesLineKeyAndTheMend) {
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 600\nf: 1\n"); }),
               "lab.yaml:4:4: f: unknown key; did you mean 'fx'?");
     EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: brown}}"); }),
-              "lab.yaml:1:48: distortion: the key 'coefficients' is missing, the list of the model's numbers");
+              "lab.yaml:1:48: distortion: the key 'coefficients' is missing; it lists the model's coefficients");
     EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: lens}}"); }),
               "lab.yaml:1:56: distortion.model: 'lens' is not one of none, brown, fisheye");
     EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, width: 640}"); }),
@@ -290,16 +291,16 @@ TEST(CameraBlock, ThatIsWrongNamesLineKeyAndTheMend) {
               "lab.yaml:1:25: fx: unknown key; known here: file, width, height");
 }
 
-TEST(CameraBlock, NeedsWidthAndHeightTogetherBesideAFile) {
+TEST(CameraBlock, RequiresWidthAndHeightTogether) {
     const test::ScratchFolder folder;
     const std::string file = (folder.path() / "camera.yaml").string();
     std::ofstream(file) << "{}\n";
     EXPECT_EQ(error_of([&] { parsed("{file: " + file + ", width: 640}"); }),
-              "lab.yaml:1:1: width and height go together; give both or none");
+              "lab.yaml:1:1: width and height go together; set both or neither");
 }
 
 // The examples of docs/camera.md.
-TEST(CameraDocumentation, HasExamplesThatCanBeRead) {
+TEST(CameraDocumentation, HasValidExamples) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";
     std::ifstream page(std::string(ARHOST_SOURCE_DIRECTORY) + "/docs/camera.md");

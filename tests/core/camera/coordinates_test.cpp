@@ -18,7 +18,7 @@ namespace {
 
 using test::error_of;
 
-glm::dvec3 turned_back(const Coordinates &coordinates, const glm::dvec3 &marker_point) {
+glm::dvec3 to_scene(const Coordinates &coordinates, const glm::dvec3 &marker_point) {
     return glm::dvec3(glm::inverse(rotation_of(coordinates)) * glm::dvec4(marker_point, 1));
 }
 
@@ -29,12 +29,12 @@ Coordinates parsed(const std::string &text) {
 } // namespace
 
 // -ar 1 -rt 2 -g 90 -x 1 -y 0 -z 0, the dissertation's own example.
-TEST(Coordinates, OfTheDissertationsExampleMapMarkerXyzToXzMinusY) {
+TEST(Coordinates, OfTheDissertationsExampleMapXyzToXzMinusY) {
     const Coordinates coordinates{1, 2, {{90, {1, 0, 0}}}};
-    EXPECT_EQ(turned_back(coordinates, {1, 2, 3}), glm::dvec3(1, 3, -2));
+    EXPECT_EQ(to_scene(coordinates, {1, 2, 3}), glm::dvec3(1, 3, -2));
 }
 
-TEST(Coordinates, OfEqualProfilesTurnNothing) {
+TEST(Coordinates, OfEqualProfilesDoNotRotate) {
     EXPECT_EQ(rotation_of({1, 1, {}}), glm::dmat4(1));
     EXPECT_EQ(rotation_of({3, 3, {}}), glm::dmat4(1));
 }
@@ -48,13 +48,13 @@ TEST(Coordinates, MultiplyTheFirstRotationByTheSecond) {
 }
 
 TEST(Coordinates, AreExactForMultiplesOf90Degrees) {
-    EXPECT_EQ(turned_back({1, 2, {{180, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, -2, -3));
-    EXPECT_EQ(turned_back({1, 2, {{-90, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, -3, 2));
-    EXPECT_EQ(turned_back({1, 2, {{450, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, 3, -2));
-    EXPECT_EQ(turned_back({1, 2, {{360, {0, 1, 0}}}}, {1, 2, 3}), glm::dvec3(1, 2, 3));
+    EXPECT_EQ(to_scene({1, 2, {{180, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, -2, -3));
+    EXPECT_EQ(to_scene({1, 2, {{-90, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, -3, 2));
+    EXPECT_EQ(to_scene({1, 2, {{450, {1, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, 3, -2));
+    EXPECT_EQ(to_scene({1, 2, {{360, {0, 1, 0}}}}, {1, 2, 3}), glm::dvec3(1, 2, 3));
 }
 
-TEST(Coordinates, TurnByAnyAngleAboutAnyAxisAsRodriguesDoes) {
+TEST(Coordinates, RotateByAnyAngleAboutAnyAxis) {
     std::mt19937 random(1);
     std::uniform_real_distribution<double> angle(-720, 720), component(-5, 5);
     for (int i = 0; i < 1000; ++i) {
@@ -69,22 +69,22 @@ TEST(Coordinates, TurnByAnyAngleAboutAnyAxisAsRodriguesDoes) {
     }
 }
 
-TEST(Coordinates, TakeAxesOfAnyLength) {
+TEST(Coordinates, AcceptAxesOfAnyLength) {
     for (const double length : {1e-300, 1.0, 1e300})
-        EXPECT_EQ(turned_back({1, 2, {{90, {length, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, 3, -2)) << length;
+        EXPECT_EQ(to_scene({1, 2, {{90, {length, 0, 0}}}}, {1, 2, 3}), glm::dvec3(1, 3, -2)) << length;
 }
 
 TEST(Coordinates, FollowTheScenesAxes) {
     EXPECT_EQ(rotation_of(default_for(ARHOST_AXES_Z_UP)), glm::dmat4(1));
-    EXPECT_EQ(turned_back(default_for(ARHOST_AXES_Y_UP), {1, 2, 3}), glm::dvec3(1, 3, -2));
+    EXPECT_EQ(to_scene(default_for(ARHOST_AXES_Y_UP), {1, 2, 3}), glm::dvec3(1, 3, -2));
     EXPECT_EQ(problem_with(default_for(ARHOST_AXES_Z_UP)), "");
     EXPECT_EQ(problem_with(default_for(ARHOST_AXES_Y_UP)), "");
 }
 
-TEST(Coordinates, ThatCantBeUsedSayWhy) {
+TEST(Coordinates, ThatAreInvalidHaveAnExplanation) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
     EXPECT_EQ(problem_with({1, 2, {{90, {0, 0, 0}}}}),
-              "rotation 1: the axis is (0, 0, 0), which is no direction; about x it is [1, 0, 0]");
+              "rotation 1: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
     EXPECT_EQ(problem_with({1, 2, {{90, {1, 0, 0}}, {nan, {1, 0, 0}}}}),
               "rotation 2: the angle must be a finite number of degrees");
     EXPECT_EQ(problem_with({1, 2, {{inf, {1, 0, 0}}}}), "rotation 1: the angle must be a finite number of degrees");
@@ -92,17 +92,17 @@ TEST(Coordinates, ThatCantBeUsedSayWhy) {
     EXPECT_EQ(problem_with({1, 2, {}}), "the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 to 2 it "
                                         "is 90 degrees about [1, 0, 0]");
     EXPECT_EQ(problem_with({2, 2, {{90, {1, 0, 0}}}}),
-              "the profiles ar and rt are both 2, so the rotations would not be used; leave them out, or set rt to "
+              "the profiles ar and rt are both 2, so the rotations would have no effect; remove them, or set rt to "
               "the ray tracer's profile");
     EXPECT_EQ(problem_with({1, 2, {{1, {1, 0, 0}}, {2, {1, 0, 0}}, {3, {1, 0, 0}}}}),
-              "at most two rotations are possible, here are 3");
+              "at most two rotations are allowed, not 3");
     EXPECT_EQ(
         problem_with({1, 4, {{90, {1, 0, 0}}}}),
         "the profiles ar and rt must be 1 (x right, y back, z up), 2 (x right, y up, z front) or 3 (other); they "
         "are 1 and 4");
 }
 
-TEST(Coordinates, AreReadFromYaml) {
+TEST(Coordinates, AreParsedFromYaml) {
     const Coordinates coordinates =
         parsed("ar: 1\nrt: 3\nrotations: [{degrees: 90, axis: [1, 0, 0]}, {degrees: -12.5, axis: [0, 2, 0]}]\n");
     EXPECT_EQ(coordinates.ar, 1);
@@ -115,10 +115,9 @@ TEST(Coordinates, AreReadFromYaml) {
     EXPECT_TRUE(parsed("{ar: 2, rt: 2}").rotations.empty());
 }
 
-TEST(Coordinates, InYamlThatAreWrongNameTheLine) {
+TEST(Coordinates, ErrorsInYamlNameTheLine) {
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [0, 0, 0]}\n"); }),
-              "lab.yaml:4:25: rotations[0].axis: the axis is (0, 0, 0), which is no direction; about x it is [1, 0, "
-              "0]");
+              "lab.yaml:4:25: rotations[0].axis: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: .nan, axis: [1, 0, 0]}\n"); }),
               "lab.yaml:4:15: rotations[0].degrees: must be a finite number, is .nan");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [1, 0]}\n"); }),

@@ -37,7 +37,7 @@ std::vector<cv::Point3d> points_in_view() {
     return points;
 }
 
-void expect_as(const std::vector<cv::Point2d> &expected, const arhost_intrinsics &intrinsics) {
+void expect_projection(const std::vector<cv::Point2d> &expected, const arhost_intrinsics &intrinsics) {
     const std::vector<cv::Point3d> points = points_in_view();
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto pixel = project(intrinsics, {points[i].x, points[i].y, points[i].z});
@@ -55,11 +55,11 @@ class BrownLens : public testing::TestWithParam<std::vector<double>> {};
 
 } // namespace
 
-TEST_P(BrownLens, ProjectsAsOpenCvDoes) {
+TEST_P(BrownLens, ProjectsLikeOpenCv) {
     const auto intrinsics = lens(GetParam().empty() ? ARHOST_DISTORTION_NONE : ARHOST_DISTORTION_BROWN, GetParam());
     std::vector<cv::Point2d> expected;
     cv::projectPoints(points_in_view(), cv::Vec3d(), cv::Vec3d(), matrix(intrinsics), GetParam(), expected);
-    expect_as(expected, intrinsics);
+    expect_projection(expected, intrinsics);
 }
 INSTANTIATE_TEST_SUITE_P(Coefficients, BrownLens,
                          testing::Values(std::vector<double>{}, std::vector<double>{0.12, -0.31, 0.002, -0.003},
@@ -68,16 +68,16 @@ INSTANTIATE_TEST_SUITE_P(Coefficients, BrownLens,
                                          std::vector<double>{0.1, -0.2, 0.001, 0.002, 0.05, 0.2, -0.1, 0.03, 0.004,
                                                              -0.005, 0.006, -0.007}));
 
-TEST(FisheyeLens, ProjectsAsOpenCvDoes) {
+TEST(FisheyeLens, ProjectsLikeOpenCv) {
     const std::vector<double> k{0.07, -0.02, 0.013, -0.004};
     const auto intrinsics = lens(ARHOST_DISTORTION_FISHEYE, k);
     std::vector<cv::Point2d> expected;
     cv::fisheye::projectPoints(points_in_view(), expected, cv::Vec3d(), cv::Vec3d(), matrix(intrinsics), k);
-    expect_as(expected, intrinsics);
+    expect_projection(expected, intrinsics);
 }
 
-// Pixel centres are at integers, so the middle of 640 pixels lies between 319 and 320.
-TEST(Lens, SeesTheOpticalAxisAtTheImagesCentre) {
+// Pixel centres are at integers, so the centre of 640 pixels is between 319 and 320.
+TEST(Lens, ProjectsTheOpticalAxisToTheImageCentre) {
     const auto camera = parse_camera(yaml::Node::parse("{width: 640, height: 480, fx: 600}", "lab.yaml"));
     const auto pixel = project(camera, {0, 0, 1000});
     ASSERT_TRUE(pixel);
@@ -85,7 +85,7 @@ TEST(Lens, SeesTheOpticalAxisAtTheImagesCentre) {
     EXPECT_EQ(*project(camera, {10, 20, 1000}), glm::dvec2(325.5, 251.5)); // right and down
 }
 
-TEST(Lens, SeesNothingBehindTheCamera) {
+TEST(Lens, DoesNotProjectPointsBehindTheCamera) {
     const auto intrinsics = lens(ARHOST_DISTORTION_NONE, {});
     EXPECT_FALSE(project(intrinsics, {0, 0, 0}));
     EXPECT_FALSE(project(intrinsics, {10, 10, -500}));

@@ -36,7 +36,7 @@ Pose pose(const cv::Matx33d &rotation, const cv::Vec3d &translation_mm) {
     return pose;
 }
 
-// The marker straight ahead, facing the camera.
+// The marker on the optical axis, facing the camera.
 Pose facing(double distance_mm) {
     return pose(cv::Matx33d::eye(), {0, 0, -distance_mm});
 }
@@ -55,7 +55,7 @@ void expect_near(const double (&actual)[3], const glm::dvec3 &expected, double t
 
 } // namespace
 
-TEST(CameraFromMarker, StandsInFrontOfAMarkerThatFacesIt) {
+TEST(CameraFromMarker, IsInFrontOfAMarkerThatFacesIt) {
     const auto camera = camera_from_marker(facing(500).mt, z_up, {});
     ASSERT_TRUE(camera);
     expect_near(camera->eye, {0, 0, 500}, 0);
@@ -64,7 +64,7 @@ TEST(CameraFromMarker, StandsInFrontOfAMarkerThatFacesIt) {
     EXPECT_EQ(camera->struct_size, sizeof(arhost_camera));
 }
 
-TEST(CameraFromMarker, StandsAboveInAWorldWhoseYIsUp) {
+TEST(CameraFromMarker, IsAboveTheMarkerInAYUpWorld) {
     const auto camera = camera_from_marker(facing(500).mt, y_up, {});
     ASSERT_TRUE(camera);
     expect_near(camera->eye, {0, 500, 0}, 0);
@@ -74,7 +74,7 @@ TEST(CameraFromMarker, StandsAboveInAWorldWhoseYIsUp) {
 
 // The camera 400 mm high and 300 mm in front of the marker, looking at it: w = (0, -0.6, 0.8),
 // v = (0, 0.8, 0.6); the rows of the rotation are u, v, w, and t = −R·eye = (0, 0, −500).
-TEST(CameraFromMarker, StandsWhereAHandComputedPosePutsIt) {
+TEST(CameraFromMarker, MatchesAHandComputedPose) {
     const cv::Matx33d rotation(1, 0, 0, 0, 0.8, 0.6, 0, -0.6, 0.8);
     const auto marker = pose(rotation, {0, 0, -500});
     const auto flat = camera_from_marker(marker.mt, z_up, {});
@@ -89,8 +89,8 @@ TEST(CameraFromMarker, StandsWhereAHandComputedPosePutsIt) {
     expect_near(upright->up, {0, 0.6, -0.8}, 1e-15);
 }
 
-// Equations 3.2 to 3.5 by OpenCV's matrices, with both rotations.
-TEST(CameraFromMarker, AgreesWithAnIndependentInverseForRandomPoses) {
+// Equations 3.2 to 3.5 computed with OpenCV, with one and two rotations.
+TEST(CameraFromMarker, MatchesAnIndependentInverseForRandomPoses) {
     std::mt19937 random(2);
     std::uniform_real_distribution<double> angle(-360, 360), component(-1, 1);
     for (int i = 0; i < 2000; ++i) {
@@ -121,8 +121,8 @@ TEST(CameraFromMarker, AgreesWithAnIndependentInverseForRandomPoses) {
     }
 }
 
-// MT itself says where a point of the marker's world is in eye space (GL: y up, looking along −z).
-TEST(CameraFromMarker, SeesThePointsOfTheMarkerWhereMtPutsThem) {
+// MT maps marker points to eye space (OpenGL: y up, looking along −z).
+TEST(CameraFromMarker, SeesMarkerPointsWhereMtMapsThem) {
     std::mt19937 random(3);
     for (int i = 0; i < 500; ++i) {
         const Pose marker = random_pose(random);
@@ -130,7 +130,7 @@ TEST(CameraFromMarker, SeesThePointsOfTheMarkerWhereMtPutsThem) {
         ASSERT_TRUE(camera);
         const glm::dvec3 on_marker(random() % 100, random() % 100, random() % 100);
         const cv::Vec4d eye_space = cv::Matx44d(marker.mt).t() * cv::Vec4d(on_marker.x, on_marker.y, on_marker.z, 1);
-        const glm::dvec3 seen = in_camera(*camera, {on_marker.x, on_marker.z, -on_marker.y}); // the y-up world's
+        const glm::dvec3 seen = in_camera(*camera, {on_marker.x, on_marker.z, -on_marker.y}); // y-up world
         EXPECT_NEAR(seen.x, eye_space[0], 1e-9);
         EXPECT_NEAR(seen.y, -eye_space[1], 1e-9);
         EXPECT_NEAR(seen.z, -eye_space[2], 1e-9);
@@ -149,8 +149,8 @@ TEST(CameraFromMarker, KeepsTheIntrinsics) {
     EXPECT_EQ(camera->intrinsics.struct_size, sizeof intrinsics);
 }
 
-// The recorded cameras have six digits, so look_at − eye is known to about 1e-3.
-TEST(CameraFromMarker, GivesBackTheCamerasOfTheRecordedTrajectories) {
+// The recorded cameras have six digits, so look_at − eye is accurate to about 1e-3.
+TEST(CameraFromMarker, ReproducesTheCamerasOfRecordedTrajectories) {
     ARHOST_REQUIRE_SHARED_DATA("seed-samples/camPose.txt");
     for (const char *name : {"seed-samples/camPose.txt", "seed-samples/camPoseDragon.txt"}) {
         std::ifstream file(test::shared_data(name));
@@ -159,7 +159,7 @@ TEST(CameraFromMarker, GivesBackTheCamerasOfTheRecordedTrajectories) {
             std::istringstream numbers(line);
             glm::dvec3 eye, look_at, up;
             if (!(numbers >> eye.x >> eye.y >> eye.z >> look_at.x >> look_at.y >> look_at.z >> up.x >> up.y >> up.z))
-                continue; // the last line is cut short
+                continue; // the last line is truncated
             const glm::dvec3 w = glm::normalize(eye - look_at), u = glm::normalize(glm::cross(up, w));
             const glm::dvec3 v = glm::cross(w, u);
             const cv::Matx33d rotation(u.x, u.y, u.z, v.x, v.y, v.z, w.x, w.y, w.z);
@@ -175,8 +175,8 @@ TEST(CameraFromMarker, GivesBackTheCamerasOfTheRecordedTrajectories) {
     }
 }
 
-TEST(CameraFromMarker, RefusesWhatIsNoPose) {
-    const auto refused = [](const char *why, auto change) {
+TEST(CameraFromMarker, RejectsInvalidPoses) {
+    const auto expect_rejected = [](const char *why, auto change) {
         Pose broken = facing(500);
         change(broken.mt);
         EXPECT_STREQ(problem_with(broken.mt), why);
@@ -185,20 +185,20 @@ TEST(CameraFromMarker, RefusesWhatIsNoPose) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
     EXPECT_EQ(problem_with(facing(500).mt), nullptr);
     for (int i = 0; i < 16; ++i) {
-        refused("the pose has a number that is not finite", [&](double *mt) { mt[i] = nan; });
-        refused("the pose has a number that is not finite", [&](double *mt) { mt[i] = -inf; });
+        expect_rejected("the pose is not finite", [&](double *mt) { mt[i] = nan; });
+        expect_rejected("the pose is not finite", [&](double *mt) { mt[i] = -inf; });
     }
     for (const int i : {3, 7, 11, 15})
-        refused("the pose's last row is not 0 0 0 1", [&](double *mt) { mt[i] += 1e-12; });
-    refused("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1 + 1e-6; });
-    refused("the pose's rotation is not orthonormal", [](double *mt) { mt[1] = 2e-6; });
-    refused("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1e200; });
-    refused("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = mt[5] = mt[10] = 0; });
-    refused("the pose mirrors: its rotation is left-handed", [](double *mt) { mt[10] = -1; });
-    refused("the pose is more than 1000 km away", [](double *mt) { mt[14] = -1.1e9; });
+        expect_rejected("the pose's last row is not 0 0 0 1", [&](double *mt) { mt[i] += 1e-12; });
+    expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1 + 1e-6; });
+    expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[1] = 2e-6; });
+    expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1e200; });
+    expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = mt[5] = mt[10] = 0; });
+    expect_rejected("the pose's rotation is left-handed", [](double *mt) { mt[10] = -1; });
+    expect_rejected("the pose is more than 1000 km away", [](double *mt) { mt[14] = -1.1e9; });
 }
 
-TEST(CameraFromMarker, TakesARotationThatIsOrthonormalTo1e6) {
+TEST(CameraFromMarker, AcceptsARotationThatIsOrthonormalTo1e6) {
     Pose nearly = facing(500);
     nearly.mt[1] = 9e-7;
     EXPECT_TRUE(camera_from_marker(nearly.mt, z_up, {}));

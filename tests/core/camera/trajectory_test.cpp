@@ -37,7 +37,7 @@ protected:
         std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
         return read_trajectory(file());
     }
-    // The message, without the file's name, which it begins with.
+    // The message without the file name that it starts with.
     std::string error(const std::string &text) const {
         const std::string message = error_of([&] { read(text); });
         EXPECT_THAT(message, testing::StartsWith(file().string() + ":"));
@@ -49,7 +49,7 @@ using Trajectories = TrajectoryFile;
 
 } // namespace
 
-TEST_F(Trajectories, AreReadWithIntrinsicsTimesAndFramesWithoutACamera) {
+TEST_F(Trajectories, ReadIntrinsicsTimesAndFramesWithoutACamera) {
     const Trajectory trajectory = read(header + line(0) + line(1, lost) + line(5));
     EXPECT_EQ(trajectory.clock, ARHOST_CLOCK_MEDIA);
     EXPECT_EQ(trajectory.fps, 25);
@@ -69,7 +69,7 @@ TEST_F(Trajectories, AreReadWithIntrinsicsTimesAndFramesWithoutACamera) {
     EXPECT_EQ(trajectory.end(), 6u);
 }
 
-TEST_F(Trajectories, FindTheFrameWithANumberOrTheNextOne) {
+TEST_F(Trajectories, FindAFrameByNumberOrTheNextOne) {
     const Trajectory trajectory = read(header + line(2) + line(3) + line(7));
     EXPECT_EQ(trajectory.at_or_after(0)->frame, 2u);
     EXPECT_EQ(trajectory.at_or_after(3)->frame, 3u);
@@ -77,7 +77,7 @@ TEST_F(Trajectories, FindTheFrameWithANumberOrTheNextOne) {
     EXPECT_EQ(trajectory.at_or_after(8), nullptr);
 }
 
-TEST_F(Trajectories, MakeTheCamerasOfTheRun) {
+TEST_F(Trajectories, ConvertViewsToCameras) {
     const Trajectory trajectory = read(header + line(0));
     const arhost_camera camera = camera_of(*trajectory.frames[0].view, *trajectory.intrinsics);
     EXPECT_EQ(camera.struct_size, sizeof camera);
@@ -87,19 +87,19 @@ TEST_F(Trajectories, MakeTheCamerasOfTheRun) {
     EXPECT_EQ(camera.intrinsics.fy, 601.2);
 }
 
-TEST_F(Trajectories, AreReadUpToALastLineThatIsCutShortAnywhere) {
+TEST_F(Trajectories, IgnoreATruncatedLastLine) {
     const std::string whole = header + line(0) + line(1), second = line(1);
     for (std::size_t cut = 1; cut + 1 < second.size(); ++cut) {
         const Trajectory trajectory = read(header + line(0) + second.substr(0, cut));
         EXPECT_EQ(trajectory.frames.size(), 1u) << cut;
-        EXPECT_EQ(trajectory.warning, file().string() + ":3: the last line is cut short and is left out");
+        EXPECT_EQ(trajectory.warning, file().string() + ":3: ignores the truncated last line");
     }
-    const Trajectory only_the_line_end_is_missing = read(whole.substr(0, whole.size() - 1));
-    EXPECT_EQ(only_the_line_end_is_missing.frames.size(), 2u);
-    EXPECT_EQ(only_the_line_end_is_missing.warning, "");
+    const Trajectory without_final_line_end = read(whole.substr(0, whole.size() - 1));
+    EXPECT_EQ(without_final_line_end.frames.size(), 2u);
+    EXPECT_EQ(without_final_line_end.warning, "");
 }
 
-TEST_F(Trajectories, ThatCanNotBeReadNameThePlaceAndTheMend) {
+TEST_F(Trajectories, ErrorsNamePositionAndFix) {
     const auto replaced = [](std::string text, const std::string &from, const std::string &to) {
         EXPECT_NE(text.find(from), std::string::npos) << from;
         return text.replace(text.find(from), from.size(), to);
@@ -108,9 +108,9 @@ TEST_F(Trajectories, ThatCanNotBeReadNameThePlaceAndTheMend) {
         std::string text;
         std::vector<const char *> expected;
     } cases[] = {
-        {"", {"has no frame; record one with sink_trajectory"}},
-        {header, {"has no frame"}},
-        {header.substr(0, 100), {"1:101: the first line is cut short"}},
+        {"", {"contains no frames; record one with sink_trajectory"}},
+        {header, {"contains no frames"}},
+        {header.substr(0, 100), {"1:101: the first line is truncated"}},
         {replaced(header, "arhost-trajectory", "arhost-trajectroy") + line(0),
          {"1:12: format:", "did you mean 'arhost-trajectory'"}},
         {replaced(header, "\"version\": 1", "\"version\": 2") + line(0), {"1:44: version: must be 1"}},
@@ -118,11 +118,11 @@ TEST_F(Trajectories, ThatCanNotBeReadNameThePlaceAndTheMend) {
         {replaced(header, "\"fx\": 600.1", "\"fx\": -1") + line(0), {"1:", "camera.fx: the focal length must be"}},
         {replaced(header, "\"fx\": 600.1", "\"fx\": .nan") + line(0), {"camera.fx: must be a finite number"}},
         {replaced(header, ", -0.2, 0.001", "") + line(0), {"camera.distortion.coefficients"}},
-        {header + "garbage\n" + line(1), {"2:1: is no JSON; delete the line"}},
-        {header + line(0) + "{\"frame\": 1, nonsense\n" + line(2), {"3:15: is no JSON"}},
-        {header + std::string("\0\0\0\n", 4), {"2:1: is no JSON"}},
+        {header + "garbage\n" + line(1), {"2:1: is not valid JSON; delete the line"}},
+        {header + line(0) + "{\"frame\": 1, nonsense\n" + line(2), {"3:15: is not valid JSON"}},
+        {header + std::string("\0\0\0\n", 4), {"2:1: is not valid JSON"}},
         {header + "[1]\n", {"2:1: must be an object"}},
-        {header + "\n" + line(0), {"2:1: is no JSON"}},
+        {header + "\n" + line(0), {"2:1: is not valid JSON"}},
         {header + "{\"capture_ns\": 0}\n", {"2:1: the key 'frame' is missing"}},
         {header + line(0, "\"up\": [0, 1, 0]"), {"2:1: the key 'eye' is missing"}},
         {header + line(0, R"("eye": [1, 2, 3], "up": [0, 1, 0])"), {"2:1: the key 'look_at' is missing"}},
@@ -131,34 +131,36 @@ TEST_F(Trajectories, ThatCanNotBeReadNameThePlaceAndTheMend) {
         {header + "{\"eye\": null, \"frame\": " + std::string(100'000, '[') + std::string(100'000, ']') + "}\n",
          {"frame: must be a whole number"}},
         {header + line(0, R"("eye": [1, 2, 2e9], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
-         {"eye: eye and look_at must lie within 1e9 mm"}},
-        {header + line(3) + line(3), {"3:2: frame: must be greater than the line before's, 3"}},
+         {"eye: eye and look_at must be within 1e9 mm"}},
+        {header + line(3) + line(3), {"3:2: frame: must be greater than in the previous line, 3"}},
         {header + line(3) + "{\"frame\": 4, \"capture_ns\": 5, \"eye\": null}\n",
-         {"3:14: capture_ns: must not be less than the line before's"}},
+         {"3:14: capture_ns: must not be less than in the previous line"}},
         {header + line(0, R"("eye": [1, 2], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
          {"2:31: eye: must be three numbers, or null in a frame without a camera"}},
         {header + line(0, R"("eye": [1, 2, 3], "look_at": [0, 0, "a"], "up": [0, 1, 0])"),
          {"look_at: must be three"}},
-        {header + line(0, R"("eye": [1, 2, NaN], "look_at": [0, 0, 0], "up": [0, 1, 0])"), {"2:", "is no JSON"}},
-        {header + line(0, R"("eye": [1, 2, 1e999], "look_at": [0, 0, 0], "up": [0, 1, 0])"), {"2:", "is no JSON"}},
+        {header + line(0, R"("eye": [1, 2, NaN], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
+         {"2:", "is not valid JSON"}},
+        {header + line(0, R"("eye": [1, 2, 1e999], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
+         {"2:", "is not valid JSON"}},
         {header + line(0, R"("eye": [1, 2, 3], "look_at": [1, 2, 3], "up": [0, 1, 0])"),
-         {"eye: look_at must be another point than eye"}},
-        {header + line(0, R"("eye": [0, 0, 5], "look_at": [0, 0, 4], "up": [0, 0, 2])"), {"eye: up must have"}},
+         {"eye: look_at must differ from eye"}},
+        {header + line(0, R"("eye": [0, 0, 5], "look_at": [0, 0, 4], "up": [0, 0, 2])"), {"eye: up must not be 0"}},
     };
     for (const auto &c : cases)
         for (const char *part : c.expected)
             EXPECT_THAT(error(c.text), HasSubstr(part)) << c.text;
 }
 
-TEST_F(Trajectories, ThatAreNoFilesAreRefused) {
+TEST_F(Trajectories, RejectPathsThatAreNotRegularFiles) {
     EXPECT_EQ(error_of([&] { read_trajectory(file()); }),
               file().string() + ": can't be read: No such file or directory");
-    EXPECT_THAT(error_of([&] { read_trajectory(folder_.path()); }), HasSubstr("is no regular file"));
+    EXPECT_THAT(error_of([&] { read_trajectory(folder_.path()); }), HasSubstr("is not a regular file"));
     ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
-    EXPECT_THAT(error_of([&] { read_trajectory(file()); }), HasSubstr("is no regular file"));
+    EXPECT_THAT(error_of([&] { read_trajectory(file()); }), HasSubstr("is not a regular file"));
 }
 
-TEST_F(Trajectories, OfTheDissertationHaveNoIntrinsicsAndThirtyFramesASecond) {
+TEST_F(Trajectories, OfTheDissertationHaveNoIntrinsicsAnd30FramesPerSecond) {
     const Trajectory trajectory = read(record + record + record);
     EXPECT_FALSE(trajectory.intrinsics);
     EXPECT_FALSE(trajectory.clock);
@@ -171,7 +173,7 @@ TEST_F(Trajectories, OfTheDissertationHaveNoIntrinsicsAndThirtyFramesASecond) {
     EXPECT_THAT(trajectory.frames[1].view->up, ElementsAre(0.0461728, 0.497528, 0.866218));
 }
 
-TEST_F(Trajectories, OfTheDissertationMayHaveEmptyLinesForFramesWithoutACamera) {
+TEST_F(Trajectories, OfTheDissertationAllowEmptyLinesForFramesWithoutACamera) {
     const Trajectory trajectory = read("\n" + record + " \r\n" + record + "\n");
     ASSERT_EQ(trajectory.frames.size(), 5u);
     for (const std::size_t empty : {0, 2, 4})
@@ -179,33 +181,33 @@ TEST_F(Trajectories, OfTheDissertationMayHaveEmptyLinesForFramesWithoutACamera) 
     EXPECT_TRUE(trajectory.frames[3].view);
 }
 
-TEST_F(Trajectories, OfTheDissertationAreReadUpToALastLineThatIsCutShortAnywhere) {
+TEST_F(Trajectories, OfTheDissertationIgnoreATruncatedLastLine) {
     for (std::size_t cut = 1; cut + 2 < record.size(); ++cut) {
         const Trajectory trajectory = read(record + record.substr(0, cut));
         EXPECT_EQ(trajectory.frames.size(), 1u) << record.substr(0, cut);
-        EXPECT_EQ(trajectory.warning, file().string() + ":2: the last line is cut short and is left out");
+        EXPECT_EQ(trajectory.warning, file().string() + ":2: ignores the truncated last line");
     }
-    // The space behind the ninth number says that it is whole.
+    // The blank after the ninth number shows that it is complete.
     const Trajectory whole = read(record + record.substr(0, record.size() - 1));
     EXPECT_EQ(whole.frames.size(), 2u);
     EXPECT_EQ(whole.warning, "");
 }
 
-TEST_F(Trajectories, OfTheDissertationThatCanNotBeReadNameThePlaceAndTheMend) {
-    EXPECT_THAT(error("what is this\n"), HasSubstr("1:1: 'what' is no number; a line has nine"));
-    EXPECT_THAT(error(record + "1 2 x 4 5 6 7 8 9\n"), HasSubstr("2:5: 'x' is no number"));
-    EXPECT_THAT(error(record + "1 2 nan 4 5 6 7 8 9\n"), HasSubstr("2:5: 'nan' is no number"));
-    EXPECT_THAT(error(record + "1 2 inf 4 5 6 7 8 9\n"), HasSubstr("2:5: 'inf' is no number"));
-    EXPECT_THAT(error(record + "1 2 1e999 4 5 6 7 8 9\n"), HasSubstr("2:5: '1e999' is no number"));
-    EXPECT_THAT(error("1 2 3\n" + record), HasSubstr("1:6: has 3 numbers; eye, look_at and up are nine"));
+TEST_F(Trajectories, OfTheDissertationErrorsNamePositionAndFix) {
+    EXPECT_THAT(error("what is this\n"), HasSubstr("1:1: 'what' is not a number; a line has nine"));
+    EXPECT_THAT(error(record + "1 2 x 4 5 6 7 8 9\n"), HasSubstr("2:5: 'x' is not a number"));
+    EXPECT_THAT(error(record + "1 2 nan 4 5 6 7 8 9\n"), HasSubstr("2:5: 'nan' is not a number"));
+    EXPECT_THAT(error(record + "1 2 inf 4 5 6 7 8 9\n"), HasSubstr("2:5: 'inf' is not a number"));
+    EXPECT_THAT(error(record + "1 2 1e999 4 5 6 7 8 9\n"), HasSubstr("2:5: '1e999' is not a number"));
+    EXPECT_THAT(error("1 2 3\n" + record), HasSubstr("1:6: has 3 numbers; eye, look_at and up need nine"));
     EXPECT_THAT(error("1 2 3 4 5 6 7 8 9 10\n"), HasSubstr("1:19: has more than nine numbers"));
-    EXPECT_THAT(error("1 2 3 1 2 3 7 8 9\n"), HasSubstr("1:1: look_at must be another point"));
-    EXPECT_THAT(error("0 0 3 0 0 2 0 0 9\n"), HasSubstr("1:1: up must have"));
+    EXPECT_THAT(error("1 2 3 1 2 3 7 8 9\n"), HasSubstr("1:1: look_at must differ"));
+    EXPECT_THAT(error("0 0 3 0 0 2 0 0 9\n"), HasSubstr("1:1: up must not be 0"));
     EXPECT_THAT(error(std::string("\0\0", 2) + "\n"), HasSubstr("1:1: "));
-    EXPECT_THAT(error("1 2 3"), HasSubstr("has no frame"));
+    EXPECT_THAT(error("1 2 3"), HasSubstr("contains no frames"));
 }
 
-TEST_F(Trajectories, AreReadAsTheDocumentationShowsThem) {
+TEST_F(Trajectories, ReadTheExampleOfTheDocumentation) {
     std::ifstream stream(ARHOST_SOURCE_DIRECTORY "/docs/trajectories.md");
     const std::string document{std::istreambuf_iterator<char>(stream), {}};
     const std::size_t begin = document.find("```json\n") + 8;
@@ -215,7 +217,7 @@ TEST_F(Trajectories, AreReadAsTheDocumentationShowsThem) {
     EXPECT_FALSE(trajectory.frames[1].view);
 }
 
-TEST_F(Trajectories, OfTheDissertationAreReadAsItsSamplesAre) {
+TEST_F(Trajectories, ReadTheDissertationsSampleFiles) {
     ARHOST_REQUIRE_SHARED_DATA("seed-samples/camPose.txt");
     const struct {
         const char *file;
@@ -225,7 +227,7 @@ TEST_F(Trajectories, OfTheDissertationAreReadAsItsSamplesAre) {
         const Trajectory trajectory = read_trajectory(test::shared_data(sample.file));
         EXPECT_EQ(trajectory.frames.size(), sample.frames) << sample.file;
         EXPECT_THAT(trajectory.warning,
-                    HasSubstr(":" + std::to_string(sample.frames + 1) + ": the last line is cut"));
+                    HasSubstr(":" + std::to_string(sample.frames + 1) + ": ignores the truncated last line"));
         EXPECT_TRUE(std::ranges::all_of(trajectory.frames, [](const auto &frame) { return frame.view.has_value(); }));
     }
 }

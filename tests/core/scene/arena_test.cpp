@@ -50,7 +50,7 @@ float *ball(Arena &a) {
     return elements<float>(a, geometries(a)[1].positions);
 }
 
-// All buffers of the small scene, absent ones left out.
+// All non-empty buffers of the small scene.
 std::vector<arhost_buffer *> buffers(Arena &a) {
     arhost_scene &scene = header(a);
     arhost_geometry *g = geometries(a);
@@ -60,7 +60,7 @@ std::vector<arhost_buffer *> buffers(Arena &a) {
 
 } // namespace
 
-TEST(ArenaBuilder, WritesWhatItWasGiven) {
+TEST(ArenaBuilder, WritesAllInput) {
     ArenaBuilder builder = small_scene();
     builder.settings = {ARHOST_AXES_Y_UP, 7, glm::vec3(0.1f, 0.2f, 0.3f), glm::vec3(0.4f), 0.5f, 0.25f};
     EXPECT_EQ(builder.triangle_count(), 2u);
@@ -95,7 +95,7 @@ TEST(ArenaBuilder, WritesWhatItWasGiven) {
     EXPECT_THAT(objects(arena)[0].world_from_object, testing::ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0));
 }
 
-TEST(ArenaBuilder, LeavesSixteenSpareBytesBehindEveryBufferAndOverlapsNone) {
+TEST(ArenaBuilder, LeavesSixteenSpareBytesAfterEachBufferWithoutOverlap) {
     Arena arena = small_scene().build();
     std::vector<arhost_buffer *> all = buffers(arena);
     std::sort(all.begin(), all.end(), [](auto *a, auto *b) { return a->offset < b->offset; });
@@ -108,7 +108,7 @@ TEST(ArenaBuilder, LeavesSixteenSpareBytesBehindEveryBufferAndOverlapsNone) {
     EXPECT_LE(end, arena.scene().byte_size);
 }
 
-TEST(ArenaBuilder, WritesIntoMemoryOfTheCallerAndNothingBehindIt) {
+TEST(ArenaBuilder, WritesIntoTheCallersMemoryAndNotBeyond) {
     ArenaBuilder builder = small_scene();
     const std::size_t size = builder.byte_size();
     Arena memory(size + 64);
@@ -116,17 +116,17 @@ TEST(ArenaBuilder, WritesIntoMemoryOfTheCallerAndNothingBehindIt) {
     std::move(builder).write(memory.bytes());
     EXPECT_EQ(validate(memory.bytes()), "");
     EXPECT_THAT(memory.bytes().subspan(size), testing::Each(std::byte(0xa5)));
-    const Arena again = small_scene().build(); // no byte depends on what the memory held before
+    const Arena again = small_scene().build(); // the output does not depend on the previous content
     EXPECT_EQ(std::memcmp(memory.bytes().data(), again.bytes().data(), size), 0);
 }
 
-TEST(ArenaBuilder, RefusesMemoryThatIsTooSmallOrNotAligned) {
+TEST(ArenaBuilder, RejectsMemoryThatIsTooSmallOrMisaligned) {
     Arena memory(small_scene().byte_size() + 64);
     EXPECT_THROW(small_scene().write(memory.bytes().first(small_scene().byte_size() - 1)), std::invalid_argument);
     EXPECT_THROW(small_scene().write(memory.bytes().subspan(8)), std::invalid_argument);
 }
 
-TEST(ArenaBuilder, PutsTransformedObjectsIntoTheBounds) {
+TEST(ArenaBuilder, IncludesTransformedObjectsInTheBounds) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
     const glm::mat4x3 moved(glm::vec3(2, 0, 0), glm::vec3(0, 2, 0), glm::vec3(0, 0, 2), glm::vec3(100, 0, 0));
@@ -143,7 +143,7 @@ TEST(ArenaBuilder, CanWriteASceneWithoutObjects) {
     EXPECT_EQ(arena.scene().objects.count, 0u);
 }
 
-TEST(ArenaBuilder, PutsMovingObjectsWhereTheyAreAtTimeZero) {
+TEST(ArenaBuilder, WritesMovingObjectsAtTheirPoseAtTimeZero) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;
     MotionNode node;
@@ -180,21 +180,21 @@ TEST(ArenaBuilder, WritesTexturesEnvironmentAndMotion) {
 
 struct Corruption {
     const char *field;
-    std::function<void(Arena &)> spoil;
+    std::function<void(Arena &)> corrupt;
     const char *message;
 };
 
-class RefusesWrong : public testing::TestWithParam<Corruption> {};
+class Rejects : public testing::TestWithParam<Corruption> {};
 
-TEST_P(RefusesWrong, Field) {
+TEST_P(Rejects, Field) {
     Arena arena = small_scene().build();
     ASSERT_EQ(validate(arena.bytes()), "");
-    GetParam().spoil(arena);
+    GetParam().corrupt(arena);
     EXPECT_THAT(validate(arena.bytes()), HasSubstr(GetParam().message));
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Validate, RefusesWrong,
+    Validate, Rejects,
     testing::Values(
         Corruption{"Magic", [](Arena &a) { header(a).magic ^= 1; }, "magic number"},
         Corruption{"Version", [](Arena &a) { header(a).version = 1; }, "version is 1, not 2"},
@@ -202,8 +202,8 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ByteSizeTooLarge", [](Arena &a) { header(a).byte_size += 64; }, "bytes, but"},
         Corruption{"ByteSizeHuge", [](Arena &a) { header(a).byte_size = ~0ull; }, "bytes, but"},
         Corruption{"ByteSizeTooSmall", [](Arena &a) { header(a).byte_size = 8; }, "bytes, but"},
-        Corruption{"ByteSizeCutsTheLastBuffer", [](Arena &a) { header(a).byte_size -= 64; }, "reaches past the end"},
-        Corruption{"Axes", [](Arena &a) { header(a).axes = 0; }, "axes are of no known kind"},
+        Corruption{"ByteSizeCutsTheLastBuffer", [](Arena &a) { header(a).byte_size -= 64; }, "extends past the end"},
+        Corruption{"Axes", [](Arena &a) { header(a).axes = 0; }, "axes are unknown"},
         Corruption{"MaxDepth", [](Arena &a) { header(a).max_depth = 101; }, "max_depth is 101, more than 100"},
         Corruption{"Ambient", [](Arena &a) { header(a).ambient[1] = nan_value; }, "the ambient light is nan"},
         Corruption{"Background", [](Arena &a) { header(a).background[2] = -1; }, "the background is -1"},
@@ -212,44 +212,44 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ShadowAlphaTranslucent", [](Arena &a) { header(a).shadow_alpha_translucent = nan_value; },
                    "shadow_alpha_translucent is nan"},
         Corruption{"BoundsNotFinite", [](Arena &a) { header(a).bounds_min[0] = nan_value; }, "bounds_min is nan"},
-        Corruption{"BoundsTurnedRound", [](Arena &a) { header(a).bounds_min[0] = 11; },
+        Corruption{"BoundsInverted", [](Arena &a) { header(a).bounds_min[0] = 11; },
                    "bounds_min is above bounds_max"},
         Corruption{"BoundsTooSmall", [](Arena &a) { header(a).bounds_max[2] = 20; },
-                   "object 1 'ball' lies outside the scene's bounds"},
+                   "object 1 'ball' is outside the scene's bounds"},
         Corruption{"GeometryTableStride", [](Arena &a) { header(a).geometries.stride = 8; },
                    "the table of geometries has a stride of 8 bytes"},
         Corruption{"MaterialTableCount", [](Arena &a) { header(a).materials.count = 0xffffffff; },
-                   "the table of materials reaches past the end"},
+                   "the table of materials extends past the end"},
         Corruption{"ObjectTableOffset", [](Arena &a) { header(a).objects.offset += 4; },
-                   "the table of objects does not begin at a multiple of 64"},
+                   "the table of objects is not aligned to 64 bytes"},
         Corruption{"LightTableOffsetHuge", [](Arena &a) { header(a).lights.offset = ~0ull & ~63ull; },
-                   "the table of lights reaches past the end"},
+                   "the table of lights extends past the end"},
         Corruption{"NamesOverHeader", [](Arena &a) { header(a).names.offset = 64; },
-                   "the names lies over the header"},
-        Corruption{"NamesWithoutEnd",
+                   "the table of names overlaps the header"},
+        Corruption{"NamesNotTerminated",
                    [](Arena &a) { elements<char>(a, header(a).names)[header(a).names.count - 1] = 'x'; },
-                   "the last name has no end"},
+                   "the last name is not terminated"},
         Corruption{"NameWithEscape", [](Arena &a) { elements<char>(a, header(a).names)[0] = '\033'; },
                    "control character"},
         Corruption{"AbsentBufferWithOffset",
                    [](Arena &a) {
                        header(a).lights = {64, 0, 0};
                    },
-                   "is absent, yet"},
+                   "is absent, but"},
         Corruption{"ObjectName", [](Arena &a) { objects(a)[1].name = header(a).names.count; },
-                   "name of object 1 lies outside"},
+                   "name of object 1 is outside"},
         Corruption{"ObjectGeometry", [](Arena &a) { objects(a)[0].geometry = 2; },
                    "object 0 'square' has geometry 2, but there are 2"},
         Corruption{"ObjectMaterial", [](Arena &a) { objects(a)[1].material = ARHOST_NONE; },
                    "object 1 'ball' has material 4294967295, but there are 1"},
         Corruption{"ObjectRole", [](Arena &a) { objects(a)[1].role = 4; },
-                   "object 1 'ball' has a role of no known kind"},
+                   "object 1 'ball' has an unknown role"},
         Corruption{"ObjectTransformNotFinite", [](Arena &a) { objects(a)[0].world_from_object[11] = nan_value; },
                    "object 0 'square': a number of world_from_object is nan"},
         Corruption{"ObjectTransformFlat", [](Arena &a) { objects(a)[0].world_from_object[4] = 0; },
                    "world_from_object can't be inverted"},
         Corruption{"MaterialModel", [](Arena &a) { materials(a)[0].model = 7; },
-                   "material 0: its model is of no known kind"},
+                   "material 0: its model is unknown"},
         Corruption{"MaterialTexture", [](Arena &a) { materials(a)[0].colour_texture = 0; }, "texture 0, but there are 0"},
         Corruption{"MaterialIndex", [](Arena &a) { materials(a)[0].index = 0.5f; }, "index is 0.5, outside 1 to 4"},
         Corruption{"MaterialExtinction", [](Arena &a) { materials(a)[0].extinction[1] = -1; }, "extinction is -1"},
@@ -263,23 +263,23 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"MaterialExponent", [](Arena &a) { materials(a)[0].exponent = 0.5f; }, "exponent is 0.5"},
         Corruption{"MaterialReflectivity", [](Arena &a) { materials(a)[0].reflectivity[2] = 1.1f; },
                    "reflectivity is 1.1"},
-        Corruption{"LightType", [](Arena &a) { lights(a)[0].type = 6; }, "light 0: its type is of no known kind"},
+        Corruption{"LightType", [](Arena &a) { lights(a)[0].type = 6; }, "light 0: its type is unknown"},
         Corruption{"LightDirection",
                    [](Arena &a) {
                        lights(a)[0].type = ARHOST_LIGHT_SPOT;
                        lights(a)[0].direction[2] = 0.5f;
                    },
                    "its direction is not of length 1"},
-        Corruption{"LightFallsOffFromInfinity",
+        Corruption{"DirectionalLightWithFalloff",
                    [](Arena &a) {
                        lights(a)[0].type = ARHOST_LIGHT_DIRECTIONAL;
                        lights(a)[0].falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
                    },
-                   "can't fall off"},
+                   "can't have a falloff"},
         Corruption{"LightCone", [](Arena &a) { lights(a)[0].cosine_outer = 0.5f; }, "cosine_inner is 0"},
         Corruption{"LightRadius", [](Arena &a) { lights(a)[0].radius = -1; }, "radius is -1"},
         Corruption{"LightFalloff", [](Arena &a) { lights(a)[0].falloff = 0; },
-                   "light 0: its falloff is of no known kind"},
+                   "light 0: its falloff is unknown"},
         Corruption{"LightPosition", [](Arena &a) { lights(a)[0].position[0] = -nan_value; }, "light 0: position is"},
         Corruption{"LightIntensity",
                    [](Arena &a) { lights(a)[0].intensity[0] = std::numeric_limits<float>::infinity(); },
@@ -287,15 +287,15 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto &info) { return std::string(info.param.field); });
 
 INSTANTIATE_TEST_SUITE_P(
-    ValidateGeometry, RefusesWrong,
+    ValidateGeometry, Rejects,
     testing::Values(
         Corruption{"GeometryType", [](Arena &a) { geometries(a)[0].type = 3; },
-                   "geometry 0 (object 0 'square'): its type is of no known kind"},
+                   "geometry 0 (object 0 'square'): its type is unknown"},
         Corruption{"GeometryReserved", [](Arena &a) { geometries(a)[0].reserved = 1; }, "reserved field"},
         Corruption{"TrianglesAsSpheres", [](Arena &a) { geometries(a)[0].type = ARHOST_GEOMETRY_SPHERES; },
                    "stride of 12 bytes, not 16"},
         Corruption{"PositionsCount", [](Arena &a) { geometries(a)[0].positions.count = 100000; },
-                   "the buffer of positions reaches past the end"},
+                   "the buffer of positions extends past the end"},
         Corruption{"NormalsCount", [](Arena &a) { geometries(a)[0].normals.count = 3; },
                    "it has 3 normals for 4 vertices"},
         Corruption{"TexcoordsCount", [](Arena &a) { geometries(a)[0].texcoords.count = 3; },
@@ -328,20 +328,20 @@ INSTANTIATE_TEST_SUITE_P(
                    [](Arena &a) {
                        geometries(a)[1].indices = {0, 0, 12};
                    },
-                   "spheres have no normals, texcoords or indices"},
+                   "spheres can't have normals, texcoords, indices"},
         Corruption{"PositionsOverHeader", [](Arena &a) { geometries(a)[0].positions.offset = 0; },
-                   "lies over the header"},
+                   "overlaps the header"},
         Corruption{"NoSpheres", [](Arena &a) { geometries(a)[1].positions = {}; }, "it has no spheres"}),
     [](const auto &info) { return std::string(info.param.field); });
 
-TEST(Validate, AsksForSixteenReadableBytesBehindTheLastBuffer) {
+TEST(Validate, RequiresSixteenReadableBytesAfterTheLastBuffer) {
     Arena arena = small_scene().build();
     const arhost_buffer &last = header(arena).geometries;
     const std::uint64_t end = last.offset + std::uint64_t(last.count) * last.stride;
     header(arena).byte_size = end + 16;
     EXPECT_EQ(validate(arena.bytes()), "");
     header(arena).byte_size = end + 15;
-    EXPECT_THAT(validate(arena.bytes()), HasSubstr("the table of geometries reaches past the end"));
+    EXPECT_THAT(validate(arena.bytes()), HasSubstr("the table of geometries extends past the end"));
 }
 
 TEST(Validate, AcceptsLargerMemoryThanTheScene) { // a memfd is mapped in whole pages
@@ -351,21 +351,21 @@ TEST(Validate, AcceptsLargerMemoryThanTheScene) { // a memfd is mapped in whole 
     EXPECT_EQ(validate(large.bytes()), "");
 }
 
-TEST(Validate, RefusesMemoryThatIsTooShortOrNotAligned) {
+TEST(Validate, RejectsMemoryThatIsTooShortOrMisaligned) {
     const Arena arena = small_scene().build();
     EXPECT_THAT(validate({}), HasSubstr("too short for its header"));
     EXPECT_THAT(validate(arena.bytes().first(sizeof(arhost_scene) - 1)), HasSubstr("too short for its header"));
-    EXPECT_THAT(validate(arena.bytes().subspan(8)), HasSubstr("multiple of 64 bytes in memory"));
+    EXPECT_THAT(validate(arena.bytes().subspan(8)), HasSubstr("not aligned to 64 bytes in memory"));
     for (std::size_t size = 0; size < arena.bytes().size(); ++size)
         EXPECT_NE(validate(arena.bytes().first(size)), "");
 }
 
-class RefusesWrongInAFullScene : public testing::TestWithParam<Corruption> {};
+class RejectsInFullScene : public testing::TestWithParam<Corruption> {};
 
-TEST_P(RefusesWrongInAFullScene, Field) {
+TEST_P(RejectsInFullScene, Field) {
     Arena arena = full_scene().build();
     ASSERT_EQ(validate(arena.bytes()), "");
-    GetParam().spoil(arena);
+    GetParam().corrupt(arena);
     EXPECT_THAT(validate(arena.bytes()), HasSubstr(GetParam().message));
 }
 
@@ -390,15 +390,15 @@ float *floats(Arena &a, const arhost_buffer &buffer) {
 } // namespace
 
 INSTANTIATE_TEST_SUITE_P(
-    Textures, RefusesWrongInAFullScene,
+    Textures, RejectsInFullScene,
     testing::Values(
-        Corruption{"Format", [](Arena &a) { textures(a)[0].format = 4; },
-                   "texture 0: its format is of no known kind"},
+        Corruption{"Format", [](Arena &a) { textures(a)[0].format = 4; }, "texture 0: its format is unknown"},
         Corruption{"FormatOfOtherSize", [](Arena &a) { textures(a)[0].format = ARHOST_TEXEL_RGBA32F; },
                    "texture 0: the buffer of texels has a stride of 4 bytes, not 16"},
-        Corruption{"WrapU", [](Arena &a) { textures(a)[0].wrap_u = 0; }, "its wrapping is of no known kind"},
-        Corruption{"WrapV", [](Arena &a) { textures(a)[1].wrap_v = 4; }, "texture 1: its wrapping"},
-        Corruption{"Name", [](Arena &a) { textures(a)[1].name = header(a).names.count; }, "outside the names"},
+        Corruption{"WrapU", [](Arena &a) { textures(a)[0].wrap_u = 0; }, "its wrap mode is unknown"},
+        Corruption{"WrapV", [](Arena &a) { textures(a)[1].wrap_v = 4; }, "texture 1: its wrap mode"},
+        Corruption{"Name", [](Arena &a) { textures(a)[1].name = header(a).names.count; },
+                   "outside the table of names"},
         Corruption{"Width", [](Arena &a) { textures(a)[0].width = 0; }, "has 0 x 3 texels, outside 1 to 16384"},
         Corruption{"Height", [](Arena &a) { textures(a)[0].height = 16385; }, "2 x 16385 texels"},
         Corruption{"TexelCount", [](Arena &a) { textures(a)[0].height = 2; }, "has 6 texels for 2 x 2"},
@@ -414,9 +414,9 @@ INSTANTIATE_TEST_SUITE_P(
                    "object 1 'ball' has a textured material, but its geometry has no texcoords"},
         Corruption{"Environment", [](Arena &a) { header(a).environment.texture = 2; },
                    "the environment has texture 2, but there are 2"},
-        Corruption{"EnvironmentOfBytes", [](Arena &a) { header(a).environment.texture = 0; }, "is not of floats"},
-        Corruption{"EnvironmentGone", [](Arena &a) { header(a).environment.texture = ARHOST_NONE; },
-                   "there is no environment, yet"},
+        Corruption{"EnvironmentOfBytes", [](Arena &a) { header(a).environment.texture = 0; }, "is not RGBA32F"},
+        Corruption{"EnvironmentMissing", [](Arena &a) { header(a).environment.texture = ARHOST_NONE; },
+                   "there is no environment, but"},
         Corruption{"EnvironmentIntensity", [](Arena &a) { header(a).environment.intensity = nan_value; },
                    "the environment's intensity is nan"},
         Corruption{"EnvironmentScaled", [](Arena &a) { header(a).environment.environment_from_world[4] = 0.9f; },
@@ -434,11 +434,11 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ColumnsBelowZero", [](Arena &a) { floats(a, header(a).environment.columns)[2] = -0.1f; },
                    "columns are not cumulative sums"},
         Corruption{"ColumnsEnd", [](Arena &a) { floats(a, header(a).environment.columns)[3] = 0.9f; },
-                   "columns end with 0.9, not with 1"}),
+                   "columns end at 0.9, not at 1"}),
     [](const auto &info) { return std::string(info.param.field); });
 
 INSTANTIATE_TEST_SUITE_P(
-    Motion, RefusesWrongInAFullScene,
+    Motion, RejectsInFullScene,
     testing::Values(
         Corruption{"Duration", [](Arena &a) { header(a).duration_s = nan_value; }, "duration_s is nan"},
         Corruption{"NoDuration", [](Arena &a) { header(a).duration_s = 0; },
@@ -447,17 +447,18 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ObjectWithoutNode", [](Arena &a) { objects(a)[1].node = ARHOST_NONE; }, "has node 4294967295"},
         Corruption{"ObjectSkin", [](Arena &a) { objects(a)[2].skin = 1; },
                    "object 2 'bend' has skin 1, but there are 1"},
-        Corruption{"NodeOfWhatStands", [](Arena &a) { objects(a)[0].node = 0; }, "but neither moves nor deforms"},
+        Corruption{"NodeOfStaticObject", [](Arena &a) { objects(a)[0].node = 0; }, "but neither moves nor deforms"},
         Corruption{"SkinnedMoves", [](Arena &a) { objects(a)[2].moves = 1; },
                    "has a skin, so it must deform, not move"},
-        Corruption{"SkinnedPlaced", [](Arena &a) { objects(a)[2].world_from_object[9] = 1; }, "have the identity"},
+        Corruption{"SkinnedWithTransform", [](Arena &a) { objects(a)[2].world_from_object[9] = 1; },
+                   "have the identity"},
         Corruption{"SpheresDeform", [](Arena &a) { objects(a)[1].deforms = 1; }, "deforms, but has no triangles"},
         Corruption{"DeformingShared",
                    [](Arena &a) {
                        objects(a)[0].geometry = 2;
                        objects(a)[0].material = 1;
                    },
-                   "object 2 'bend' deforms geometry 2, which another object has too"},
+                   "object 2 'bend' deforms geometry 2, which another object uses too"},
         Corruption{"DeformsWithNothing",
                    [](Arena &a) {
                        objects(a)[1].geometry = 0;
@@ -466,22 +467,22 @@ INSTANTIATE_TEST_SUITE_P(
                        objects(a)[0].material = 1;
                    },
                    "it deforms, but has neither a skin nor morph targets"},
-        Corruption{"JointsOfWhatDoesNotDeform", [](Arena &a) { geometries(a)[0].joints = geometries(a)[2].joints; },
+        Corruption{"JointsOfStaticGeometry", [](Arena &a) { geometries(a)[0].joints = geometries(a)[2].joints; },
                    "has 4 joints and 0 weights for 4 vertices without a skin"},
         Corruption{"JointCount", [](Arena &a) { geometries(a)[2].joints.count = 3; }, "3 joints and 4 weights"},
         Corruption{"WeightCount", [](Arena &a) { geometries(a)[2].weights.count = 3; }, "4 joints and 3 weights"},
         Corruption{"JointIndex", [](Arena &a) { elements<std::uint16_t>(a, geometries(a)[2].joints)[15] = 2; },
                    "vertex 3 has a joint beyond the skin's 2"},
         Corruption{"WeightSum", [](Arena &a) { floats(a, geometries(a)[2].weights)[4] = 0.9f; },
-                   "vertex 1 has weights below 0, or of a sum other than 1"},
+                   "vertex 1 has negative weights, or weights whose sum is not 1"},
         Corruption{"WeightNotANumber", [](Arena &a) { floats(a, geometries(a)[2].weights)[3] = nan_value; },
-                   "vertex 0 has weights"},
+                   "vertex 0 has negative weights"},
         Corruption{"WeightBelowZero",
                    [](Arena &a) {
                        floats(a, geometries(a)[2].weights)[0] = 1.5f;
                        floats(a, geometries(a)[2].weights)[1] = -0.5f;
                    },
-                   "vertex 0 has weights below 0"},
+                   "vertex 0 has negative weights"},
         Corruption{"MorphPositionCount", [](Arena &a) { geometries(a)[2].morph_positions.count = 3; },
                    "has 3 morph_positions for 1 targets and 4 vertices"},
         Corruption{"MorphNormalCount", [](Arena &a) { geometries(a)[2].morph_normals.count = 3; }, "3 morph_normals"},
@@ -489,9 +490,8 @@ INSTANTIATE_TEST_SUITE_P(
                    "morph position 1 has the coordinate nan"},
         Corruption{"MorphNormal", [](Arena &a) { floats(a, geometries(a)[2].morph_normals)[0] = 2e9f; },
                    "morph normal 0 has the coordinate 2e+09"},
-        Corruption{"NodeParent", [](Arena &a) { nodes(a)[1].parent = 1; },
-                   "node 1: its parent 1 does not come before"},
-        Corruption{"NodePlace", [](Arena &a) { nodes(a)[1].parent_from_node[3] = nan_value; },
+        Corruption{"NodeParent", [](Arena &a) { nodes(a)[1].parent = 1; }, "node 1: its parent 1 does not precede"},
+        Corruption{"NodeTransform", [](Arena &a) { nodes(a)[1].parent_from_node[3] = nan_value; },
                    "parent_from_node is nan"},
         Corruption{"NodeTranslation", [](Arena &a) { nodes(a)[0].translation[0] = 2e9f; }, "translation is 2e+09"},
         Corruption{"NodeRotation", [](Arena &a) { nodes(a)[0].rotation[3] = 0.5f; }, "rotation is not of length 1"},
@@ -501,15 +501,15 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"NodeWeight", [](Arena &a) { floats(a, nodes(a)[2].morph_weights)[0] = nan_value; },
                    "a morph weight is nan"},
         Corruption{"ChannelNode", [](Arena &a) { channels(a)[0].node = 3; }, "channel 0: it has node 3"},
-        Corruption{"ChannelNodeStands", [](Arena &a) { channels(a)[0].node = 1; }, "its node is not animated"},
-        Corruption{"ChannelTarget", [](Arena &a) { channels(a)[0].target = 5; }, "its target is of no known kind"},
+        Corruption{"ChannelNodeNotAnimated", [](Arena &a) { channels(a)[0].node = 1; }, "its node is not animated"},
+        Corruption{"ChannelTarget", [](Arena &a) { channels(a)[0].target = 5; }, "its target is unknown"},
         Corruption{"ChannelInterpolation", [](Arena &a) { channels(a)[0].interpolation = 0; },
-                   "its interpolation is of no known kind"},
+                   "its interpolation is unknown"},
         Corruption{"ChannelReserved", [](Arena &a) { channels(a)[0].reserved = 1; }, "a reserved field is not 0"},
         Corruption{"ChannelWithoutKeys", [](Arena &a) { channels(a)[2].times = channels(a)[2].values = {}; },
                    "channel 2: it has no keys"},
         Corruption{"ChannelTimes", [](Arena &a) { floats(a, channels(a)[0].times)[1] = 0; },
-                   "its times don't ascend"},
+                   "its times are not strictly increasing"},
         Corruption{"ChannelTimeNotANumber", [](Arena &a) { floats(a, channels(a)[0].times)[0] = nan_value; },
                    "a time is nan"},
         Corruption{"ChannelTimeBelowZero", [](Arena &a) { floats(a, channels(a)[0].times)[0] = -1; }, "a time is -1"},
@@ -517,7 +517,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "has 5 values for 2 keys of 3"},
         Corruption{"ChannelOfOtherWidth", [](Arena &a) { channels(a)[0].target = ARHOST_CHANNEL_ROTATION; },
                    "has 6 values for 2 keys of 4"},
-        Corruption{"ChannelOfNoWeights", [](Arena &a) { channels(a)[3].node = 1; }, "keys of 0"},
+        Corruption{"ChannelWithoutWeights", [](Arena &a) { channels(a)[3].node = 1; }, "keys of 0"},
         Corruption{"ChannelCubicTooShort",
                    [](Arena &a) { channels(a)[0].interpolation = ARHOST_INTERPOLATION_CUBIC; },
                    "has 6 values for 2 keys of 3"},
@@ -534,8 +534,8 @@ INSTANTIATE_TEST_SUITE_P(
                    "node_from_mesh is nan"}),
     [](const auto &info) { return std::string(info.param.field); });
 
-// A few bytes could otherwise keep the host busy for hours.
-TEST(Validate, RefusesThatManyGeometriesShareOneLargeBuffer) {
+// Otherwise, a small arena could keep the host busy for hours.
+TEST(Validate, RejectsGeometriesThatShareABuffer) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
     for (int i = 0; i < 1000; ++i)
@@ -546,10 +546,10 @@ TEST(Validate, RefusesThatManyGeometriesShareOneLargeBuffer) {
     ASSERT_EQ(validate(arena.bytes()), "");
     for (int i = 0; i < 1000; ++i)
         geometries(arena)[i] = geometries(arena)[1000];
-    EXPECT_THAT(validate(arena.bytes()), HasSubstr("shares bytes with other buffers"));
+    EXPECT_THAT(validate(arena.bytes()), HasSubstr("overlaps other buffers"));
 }
 
-TEST(Validate, IsQuickWhereManyObjectsShareOneVeryLongName) {
+TEST(Validate, IsFastIfManyObjectsShareAVeryLongName) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
     const std::uint32_t geometry = builder.add_triangles(square());
@@ -560,10 +560,10 @@ TEST(Validate, IsQuickWhereManyObjectsShareOneVeryLongName) {
     for (int i = 1; i < 10'000; ++i)
         objects(arena)[i].name = 0;
     objects(arena)[9'999].role = 0;
-    EXPECT_EQ(validate(arena.bytes()), "object 9999 '" + std::string(64, 'x') + "' has a role of no known kind");
+    EXPECT_EQ(validate(arena.bytes()), "object 9999 '" + std::string(64, 'x') + "' has an unknown role");
 }
 
-TEST(Validate, ReadsEveryBufferOnlyInsideTheArena) {
+TEST(Validate, ReadsBuffersOnlyWithinTheArena) {
     const std::size_t buffer_count = [] {
         Arena arena = small_scene().build();
         return buffers(arena).size();
@@ -576,27 +576,27 @@ TEST(Validate, ReadsEveryBufferOnlyInsideTheArena) {
             for (const std::uint32_t count : counts)
                 for (const std::uint32_t stride : strides) {
                     if (offset == 0 && count == 0 && stride == 0)
-                        continue; // means: absent
+                        continue; // an absent buffer is valid
                     Arena arena = small_scene().build();
                     *buffers(arena)[i] = {offset, count, stride};
                     EXPECT_NE(validate(arena.bytes()), "") << i << ' ' << offset << ' ' << count << ' ' << stride;
                 }
 }
 
-// Whatever stands in it: an answer, and no read outside (the sanitizers' builds see those).
+// Any content yields a result without out-of-bounds reads (checked by the sanitizer builds).
 TEST(Validate, SurvivesRandomBytes) {
     const Arena whole = full_scene().build();
     std::mt19937 random(1);
-    int refused = 0;
+    int rejected = 0;
     Arena arena(whole.bytes().size());
     for (int round = 0; round < 100000; ++round) {
         std::memcpy(arena.bytes().data(), whole.bytes().data(), whole.bytes().size());
         for (unsigned flips = 1 + random() % 4; flips > 0; --flips)
             arena.bytes()[random() % arena.bytes().size()] ^= std::byte(1 + random() % 255);
         const bool is_valid = validate(arena.bytes()).empty();
-        refused += !is_valid;
-        if (is_valid && arena.scene().duration_s > 0) // what passes must do no harm where it is used
+        rejected += !is_valid;
+        if (is_valid && arena.scene().duration_s > 0) // a valid arena must be safe to evaluate
             MotionEvaluator(arena.scene()).at(0.7);
     }
-    EXPECT_GT(refused, 25000); // the others hit spare bytes or changed one valid number into another
+    EXPECT_GT(rejected, 25000); // other flips hit spare bytes or keep the value valid
 }

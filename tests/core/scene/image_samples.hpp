@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Images written by hand, small ones. Rows from the top.
+// Encoders for small test images. Top row first.
 #pragma once
 
 #include <zlib.h>
@@ -17,7 +17,7 @@ inline std::string big_endian(std::uint32_t value) {
             static_cast<char>(value)};
 }
 
-// `channels` 1 to 4, `depth` 8 or 16 bits; `samples` as they lie in the file.
+// `channels` 1 to 4, `depth` 8 or 16 bits; `samples` as stored in the file.
 inline std::string png(std::uint32_t width, std::uint32_t height, int channels, const std::string &samples,
                        int depth = 8) {
     const auto chunk = [](const std::string &type, const std::string &data) {

@@ -35,7 +35,7 @@ public:
     Arena load_texture(const std::string &texture, const LoadCallbacks &callbacks = {}) {
         return load("materials: {a: {model: diffuse, texture: " + texture + "}}\n" + plane, callbacks);
     }
-    // Behind "s.yaml:", without the folder.
+    // The error message without the folder.
     std::string error_of(const std::string &text) {
         try {
             load(text);
@@ -73,7 +73,7 @@ std::vector<float> floats(const Arena &a, std::size_t i = 0) {
 
 } // namespace
 
-TEST(Textures, ComeFromPngWithTheFirstRowAtTheTopAndStraightAlpha) {
+TEST(Textures, OfPngHaveTheTopRowFirstAndStraightAlpha) {
     const Arena arena = Scene("a.png", png(1, 2, 4, {10, 20, 30, 40, 50, 60, 70, 80})).load_texture("a.png");
     ASSERT_EQ(arena.scene().textures.count, 1u);
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_SRGB8);
@@ -82,10 +82,10 @@ TEST(Textures, ComeFromPngWithTheFirstRowAtTheTopAndStraightAlpha) {
     EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_REPEAT);
     EXPECT_THAT(bytes(arena), ElementsAre(10, 20, 30, 40, 50, 60, 70, 80));
     EXPECT_EQ(material(arena).colour_texture, 0u);
-    EXPECT_THAT(material(arena).diffuse, testing::Each(1.0f)) << "where the texture gives the colour";
+    EXPECT_THAT(material(arena).diffuse, testing::Each(1.0f)) << "default with a texture";
 }
 
-TEST(Textures, GetTheChannelsThatTheyLack) {
+TEST(Textures, GetMissingChannels) {
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 1, {7})).load_texture("a.png")), ElementsAre(7, 7, 7, 255));
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 2, {7, 9})).load_texture("a.png")), ElementsAre(7, 7, 7, 9));
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 3, {1, 2, 3})).load_texture("a.png")), ElementsAre(1, 2, 3, 255));
@@ -98,7 +98,7 @@ TEST(Textures, GetTheChannelsThatTheyLack) {
     EXPECT_EQ(grey_jpeg[255], 255);
 }
 
-TEST(Textures, OfFloatsAreLinearAndKeptWithinTheirRange) {
+TEST(Textures, OfFloatsAreLinearAndClamped) {
     const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
     EXPECT_EQ(texture(radiance).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_EQ(texture(radiance).height, 2u);
@@ -114,10 +114,10 @@ TEST(Textures, OfFloatsAreLinearAndKeptWithinTheirRange) {
     const Arena arena =
         Scene("a.exr", exr({0.5f, std::nanf("")}, {-1, 2e6f}, {3, INFINITY})).load_texture("a.exr", callbacks);
     EXPECT_THAT(floats(arena), ElementsAre(3, 0, 0.5f, 1, 1e6f, 1e6f, 0, 1));
-    EXPECT_THAT(info, testing::Contains(HasSubstr("a.exr: 4 numbers below 0, above 1e6 or not a number")));
+    EXPECT_THAT(info, testing::Contains(HasSubstr("a.exr: 4 values below 0, above 1e6 or NaN")));
 }
 
-TEST(Textures, SayHowTheyAreWrappedAndEncoded) {
+TEST(Textures, HaveWrapModeAndEncoding) {
     const Arena arena =
         Scene("a.png", png(1, 1, 1, {7})).load_texture("{image: a.png, wrap: mirror, encoding: linear}");
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA8);
@@ -142,20 +142,20 @@ TEST(Textures, OfTheSameFileAreStoredOnce) {
     EXPECT_EQ(texture(arena, 2).wrap_u, ARHOST_WRAP_CLAMP);
 }
 
-TEST(Textures, TellWhatIsWrongWithTheirFile) {
+TEST(Textures, ErrorsNameFileAndKey) {
     const auto error = [](const std::string &name, const std::string &content) {
         return Scene(name, content)
             .error_of("materials:\n  a: {model: diffuse, texture: " + name + "}\nobjects: []\n");
     };
     EXPECT_EQ(error("a.png", "GIF89a"),
-              "s.yaml:4:32: materials.a.texture: a.png: is none of PNG, JPEG, PPM, HDR and EXR "
-              "by its content; convert it to one of them");
+              "s.yaml:4:32: materials.a.texture: a.png: its content is not PNG, JPEG, PPM, HDR or "
+              "EXR; convert it to one of them");
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
     EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: can't be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: can't be loaded: "));
-    EXPECT_THAT(error("a.jpg", jpeg().substr(0, jpeg().size() - 3)), HasSubstr("a.jpg: is cut short: "));
+    EXPECT_THAT(error("a.jpg", jpeg().substr(0, jpeg().size() - 3)), HasSubstr("a.jpg: is truncated: "));
     EXPECT_EQ(error("a.png", png(16385, 1, 1, "")), "s.yaml:4:32: materials.a.texture: a.png: has 16385 x 1 pixels; "
-                                                    "up to 16384 a side are loaded, so scale it down");
+                                                    "the limit is 16384 per side, so scale it down");
     EXPECT_EQ(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: b.png}\nobjects: []\n"),
               "s.yaml:4:32: materials.a.texture: b.png: can't be read: No such file or directory");
     EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: .}\nobjects: []\n"),
@@ -177,15 +177,15 @@ TEST(Textures, NeedTextureCoordinates) {
         "another material, or a mesh with texture coordinates");
 }
 
-TEST(Textures, StopWhenTheLoadingIsCancelled) {
+TEST(Textures, CanBeCancelledWhileLoading) {
     LoadCallbacks callbacks;
     callbacks.cancelled = [] { return true; };
     EXPECT_THROW(Scene("a.png", png(64, 64, 1, "")).load_texture("a.png", callbacks), Cancelled);
 }
 
-// A direction has u = ½ + atan2(x, −z)/2π of the environment: the image's middle lies at −z, ¾ at +x.
-TEST(Environments, LieAboutTheScenesUp) {
-    const auto looked_up = [](const std::string &axes, double degrees, glm::vec3 d) {
+// u = ½ + atan2(x, −z)/2π: the image's centre is at −z, u = ¾ at +x.
+TEST(Environments, AreOrientedByTheScenesUpAxis) {
+    const auto environment_direction = [](const std::string &axes, double degrees, glm::vec3 d) {
         ScratchFolder folder;
         write_file(folder.path() / "a.png", png(1, 1, 1, {7}));
         write_file(folder.path() / "s.yaml", "version: 1\naxes: " + axes +
@@ -198,13 +198,13 @@ TEST(Environments, LieAboutTheScenesUp) {
         return std::vector<float>{std::round(row(0) * 1e5f) / 1e5f + 0.f, std::round(row(1) * 1e5f) / 1e5f + 0.f,
                                   std::round(row(2) * 1e5f) / 1e5f + 0.f};
     };
-    EXPECT_THAT(looked_up("y-up", 0, {1, 2, 3}), ElementsAre(1, 2, 3));
-    EXPECT_THAT(looked_up("z-up", 0, {0, 0, 1}), ElementsAre(0, 1, 0)) << "up";
-    EXPECT_THAT(looked_up("z-up", 0, {0, 1, 0}), ElementsAre(0, 0, -1)) << "away: the image's middle";
-    EXPECT_THAT(looked_up("z-up", 0, {1, 0, 0}), ElementsAre(1, 0, 0));
-    // Turned left by 90° seen from above, the middle is at the left.
-    EXPECT_THAT(looked_up("z-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
-    EXPECT_THAT(looked_up("y-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
+    EXPECT_THAT(environment_direction("y-up", 0, {1, 2, 3}), ElementsAre(1, 2, 3));
+    EXPECT_THAT(environment_direction("z-up", 0, {0, 0, 1}), ElementsAre(0, 1, 0)) << "up";
+    EXPECT_THAT(environment_direction("z-up", 0, {0, 1, 0}), ElementsAre(0, 0, -1)) << "away: the image's centre";
+    EXPECT_THAT(environment_direction("z-up", 0, {1, 0, 0}), ElementsAre(1, 0, 0));
+    // Rotated left by 90° seen from above, the centre is at the left.
+    EXPECT_THAT(environment_direction("z-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
+    EXPECT_THAT(environment_direction("y-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
 }
 
 TEST(Environments, HaveCumulativeSums) {
@@ -218,11 +218,12 @@ TEST(Environments, HaveCumulativeSums) {
     EXPECT_THAT(floats(arena), ElementsAre(1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
     const auto *rows = at<float>(arena, environment.rows), *columns = at<float>(arena, environment.columns);
     EXPECT_THAT(std::vector<float>(rows, rows + 2), ElementsAre(1, 1));
-    EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(1, 1, 0.5f, 1)) << "evenly where all is black";
-    EXPECT_THAT(arena.scene().ambient, testing::Each(0.0f)) << "the environment lights from everywhere";
+    EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(1, 1, 0.5f, 1))
+        << "uniform if all texels are black";
+    EXPECT_THAT(arena.scene().ambient, testing::Each(0.0f)) << "the environment replaces ambient light";
 }
 
-TEST(Environments, WeighRowsByTheirExtent) {
+TEST(Environments, WeightRowsBySolidAngle) {
     const Arena arena = Scene("a.png", png(1, 3, 1, {'\xbc', '\xbc', '\xbc'}))
                             .load("ambient: 0.1\nenvironment: {image: a.png}\nmaterials: {}\nobjects: []\n");
     const auto *rows = at<float>(arena, arena.scene().environment.rows);
@@ -233,7 +234,7 @@ TEST(Environments, WeighRowsByTheirExtent) {
     EXPECT_EQ(arena.scene().ambient[0], 0.1f);
 }
 
-TEST(Environments, TellWhatIsWrong) {
+TEST(Environments, ErrorsNameFileAndKey) {
     const auto error = [](const std::string &text) {
         return Scene("a.png", png(1, 1, 1, {7})).error_of(text + "\nmaterials: {}\nobjects: []\n");
     };

@@ -63,7 +63,7 @@ const char *name(const Arena &a, std::size_t i = 0) {
     return at<char>(a, a.scene().names) + object(a, i).name;
 }
 
-// The normal that a triangle's winding gives.
+// A triangle's geometric normal.
 glm::vec3 facing(const Arena &a, std::size_t triangle) {
     const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
     return glm::normalize(glm::cross(position(a, t.y) - position(a, t.x), position(a, t.z) - position(a, t.x)));
@@ -78,7 +78,7 @@ Arena load_object(const std::string &shape, const std::string &more = "") {
 }
 
 void expect_near(const glm::vec3 &found, const glm::vec3 &expected) {
-    EXPECT_LT(glm::distance(found, expected), 1e-4f) << found.x << ' ' << found.y << ' ' << found.z << " in place of "
+    EXPECT_LT(glm::distance(found, expected), 1e-4f) << found.x << ' ' << found.y << ' ' << found.z << " instead of "
                                                      << expected.x << ' ' << expected.y << ' ' << expected.z;
 }
 
@@ -117,7 +117,7 @@ TEST(SceneFile, SetsTheScene) {
     EXPECT_EQ(arena.scene().shadow_alpha_translucent, 0.0f);
 }
 
-TEST(SceneFile, TakesColoursAsLinearNumbersOrAsSrgb) {
+TEST(SceneFile, AcceptsLinearAndSrgbColours) {
     const Arena arena = load("version: 1\naxes: z-up\nmaterials:\n"
                              "  a: {model: diffuse, diffuse: 0.25, ambient: [1, 0, 0.5]}\n"
                              "  b: {model: diffuse, diffuse: '#ff8000'}\n"
@@ -165,7 +165,7 @@ TEST(SceneFile, DescribesGlass) {
     EXPECT_THAT(plain.extinction, testing::Each(0.0f));
     EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
     EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
-    // exp(−extinction · 110 mm) is the colour again.
+    // exp(−extinction · 110 mm) gives the colour.
     EXPECT_THAT(dragon.extinction, ElementsAre(FloatNear(0.00202858f, 1e-7f), FloatNear(0.00105940f, 1e-7f), 0));
     EXPECT_THAT(dragon.shadow_attenuation, ElementsAre(0.4f, 0.7f, 0.4f));
     EXPECT_EQ(dragon.reflection_depth, 50u);
@@ -205,12 +205,12 @@ TEST(SceneFile, DescribesLightsOfEveryType) {
     EXPECT_THAT(light(arena, 0).direction, ElementsAre(0, 0, -1));
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_outer, 0.5f);
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_inner, std::sqrt(0.75f));
-    EXPECT_THAT(light(arena, 2).axis_u, ElementsAre(-2, 0, 0)); // the width is level
+    EXPECT_THAT(light(arena, 2).axis_u, ElementsAre(-2, 0, 0)); // the width is horizontal
     EXPECT_THAT(light(arena, 2).axis_v, ElementsAre(0, 0, 3));
     EXPECT_EQ(light(arena, 3).radius, 3);
     EXPECT_THAT(error_of(start + "lights:\n  - {type: spot, position: [0, 0, 9], direction: [0, 0, 0], "
                                  "outer_degrees: 60, intensity: 1}\nobjects: []\n"),
-                testing::HasSubstr("direction: has no direction"));
+                testing::HasSubstr("direction: must have a length between 1e-9 and 1e9"));
     EXPECT_THAT(error_of(start + "lights:\n  - {type: directional, position: [0, 0, 9], direction: [0, 0, 1], "
                                  "intensity: 1}\nobjects: []\n"),
                 testing::HasSubstr("position: unknown key"));
@@ -275,15 +275,15 @@ TEST(Shapes, PlanesFaceAlongTheirNormal) {
     expect_near(facing(ceiling, 0), {0, 0, -1});
 }
 
-TEST(Shapes, PlanesLieFlatWhereverUpIs) {
+TEST(Shapes, PlanesAreHorizontalByDefault) {
     const Arena arena = load("version: 1\naxes: y-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
                              "  - {plane: {size: [4, 2]}, material: a}\n");
     expect_near(facing(arena, 0), {0, 1, 0});
     EXPECT_THAT(arena.scene().bounds_min, ElementsAre(-2, 0, -1));
 }
 
-// Seen from outside, a face's texture stands upright: right is where u grows, up where v falls.
-TEST(Shapes, FacesShowTheirTextureWholeAndUpright) {
+// Seen from outside, each face's texture is upright: u increases to the right, v decreases upwards.
+TEST(Shapes, FacesShowTheWholeTextureUpright) {
     for (const std::string axes : {"z-up", "y-up"}) {
         const Arena arena = load("version: 1\naxes: " + axes + "\nmaterials: {a: {model: mirror}}\nobjects:\n" +
                                  "  - {cuboid: {size: [2, 4, 6]}, material: a}\n");
@@ -308,8 +308,8 @@ TEST(Shapes, FacesShowTheirTextureWholeAndUpright) {
     }
 }
 
-TEST(Transforms, AreAppliedOneAfterTheOther) {
-    // The seed's T·S·R: (1, 0, 0) → rotated (0, 1, 0) → scaled (0, 3, 0) → moved (10, 3, 0)
+TEST(Transforms, AreAppliedInOrder) {
+    // T·S·R: (1, 0, 0) → rotated (0, 1, 0) → scaled (0, 3, 0) → moved (10, 3, 0)
     const Arena arena = load_with_mesh(triangle_with_normals,
                                        ", transform: [{rotate: {axis: [0, 0, 2], degrees: 90}}, {scale: [2, 3, 4]}, "
                                        "{translate: [10, 0, 0]}]");
@@ -319,19 +319,19 @@ TEST(Transforms, AreAppliedOneAfterTheOther) {
     EXPECT_THAT(object(arena).world_from_object, ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0));
 }
 
-TEST(Transforms, TurnRightHanded) {
-    const auto turned = [](const std::string &axis) {
+TEST(Transforms, RotateRightHanded) {
+    const auto rotated = [](const std::string &axis) {
         return load_object("sphere: {centre: [1, 2, 3], radius: 1}",
                            ", transform: [{rotate: {axis: " + axis + ", degrees: 90}}]");
     };
-    expect_near(glm::vec3(sphere(turned("[1, 0, 0]"))), {1, -3, 2});
-    expect_near(glm::vec3(sphere(turned("[0, 1, 0]"))), {3, 2, -1});
-    expect_near(glm::vec3(sphere(turned("[0, 0, 1]"))), {-2, 1, 3});
-    expect_near(glm::vec3(sphere(turned("[1, 1, 1]"))), {2.5773503f, 0.8452995f, 2.5773503f});
+    expect_near(glm::vec3(sphere(rotated("[1, 0, 0]"))), {1, -3, 2});
+    expect_near(glm::vec3(sphere(rotated("[0, 1, 0]"))), {3, 2, -1});
+    expect_near(glm::vec3(sphere(rotated("[0, 0, 1]"))), {-2, 1, 3});
+    expect_near(glm::vec3(sphere(rotated("[1, 1, 1]"))), {2.5773503f, 0.8452995f, 2.5773503f});
 }
 
-TEST(Transforms, TurnNormalsByTheInverseTranspose) {
-    // A slope of 45°, made twice as steep: the normal (0, 1, 1) gets (0, 1/1, 1/2).
+TEST(Transforms, TransformNormalsByTheInverseTranspose) {
+    // A 45° slope scaled to twice the height: the normal (0, 1, 1) becomes (0, 1/1, 1/2).
     const Arena arena = load_with_mesh("v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n",
                                        ", transform: [{scale: [1, 1, 2]}]");
     const glm::vec3 normal = *at<glm::vec3>(arena, geometry(arena).normals);
@@ -339,7 +339,7 @@ TEST(Transforms, TurnNormalsByTheInverseTranspose) {
     expect_near(facing(arena, 0), normal);
 }
 
-TEST(Transforms, ThatMirrorKeepTheOutsideOutside) {
+TEST(Transforms, ThatMirrorKeepFrontFaces) {
     const std::string slope = "v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n";
     for (const std::string scale : {"[-1, 1, 1]", "[1, -1, 1]", "[1, 1, -1]", "-2", "[-1, -1, 1]"}) {
         const Arena arena = load_with_mesh(slope, ", transform: [{scale: " + scale + "}]");
@@ -356,7 +356,7 @@ TEST(Transforms, ScaleASpheresRadius) {
     EXPECT_EQ(geometry(arena).type, ARHOST_GEOMETRY_SPHERES);
 }
 
-TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
+TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     const std::string ball = start + "objects:\n  - {sphere: {radius: 1}, material: grey";
     EXPECT_EQ(error_of("axes: z-up\n"), "s.yaml:1:1: the key 'version' is missing");
     EXPECT_EQ(error_of("version: 2\naxes: z-up\n"), "s.yaml:1:10: version: must be 1");
@@ -366,9 +366,9 @@ TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
               "s.yaml:3:11: material: unknown key; did you mean 'materials'?");
     EXPECT_EQ(error_of(start + "max_depth: 101\n"), "s.yaml:5:12: max_depth: must be 0 to 100, is 101");
     EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
-              "s.yaml:6:10: objects: the key stands here twice; keep one of them");
+              "s.yaml:6:10: objects: duplicate key; keep one of them");
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
-              "s.yaml:5:9: materials.grey: the material stands here twice; keep one of them");
+              "s.yaml:5:9: materials.grey: duplicate material; keep one of them");
     EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
               "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror, metal, glass, "
               "metallic-roughness; did you mean "
@@ -388,26 +388,26 @@ TEST(SceneErrors, NameFileLineColumnKeyAndTheMend) {
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0], intensity: 1}\n"),
               "s.yaml:6:16: lights[0].position: must be a list of 3 numbers, has 2");
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2e9], intensity: 1}\n"),
-              "s.yaml:6:16: lights[0].position: must lie within 1e9 mm");
+              "s.yaml:6:16: lights[0].position: must be within 1e9 mm");
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2], intensity: -1}\n"),
               "s.yaml:6:38: lights[0].intensity: must be 0 to 1e12");
     EXPECT_EQ(error_of(start + "objects:\n  - {material: grey}\n"),
               "s.yaml:6:5: objects[0]: needs one of mesh, gltf, sphere, cuboid and plane");
     EXPECT_EQ(error_of(ball + ", cuboid: {size: 1}}\n"),
-              "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; make two objects of them");
+              "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; split it into two objects");
     EXPECT_EQ(error_of(ball + "y}\n"),
               "s.yaml:6:37: objects[0].material: 'greyy' is not one of grey; did you mean 'grey'?");
-    EXPECT_EQ(error_of(ball + ", smooth: true}\n"), "s.yaml:6:51: objects[0].smooth: belongs to a mesh only");
+    EXPECT_EQ(error_of(ball + ", smooth: true}\n"), "s.yaml:6:51: objects[0].smooth: is only allowed with 'mesh'");
     EXPECT_EQ(error_of(ball + ", role: ghost}\n"),
               "s.yaml:6:49: objects[0].role: 'ghost' is not one of virtual, catcher, occluder");
     EXPECT_EQ(error_of(ball + ", name: \"a\\tb\"}\n"),
-              "s.yaml:6:49: objects[0].name: must not hold control characters");
+              "s.yaml:6:49: objects[0].name: must not contain control characters");
     EXPECT_EQ(error_of(start + "objects:\n  - {sphere: {radius: 0}, material: grey}\n"),
-              "s.yaml:6:23: objects[0].sphere.radius: must be more than 0");
+              "s.yaml:6:23: objects[0].sphere.radius: must be greater than 0");
     EXPECT_EQ(error_of(start + "objects:\n  - {cuboid: {size: [1, 0, 1]}, material: grey}\n"),
               "s.yaml:6:21: objects[0].cuboid.size: each side must be 1e-6 to 1e9 mm");
     EXPECT_EQ(error_of(start + "objects:\n  - {plane: {size: 1, normal: [0, 0, 0]}, material: grey}\n"),
-              "s.yaml:6:31: objects[0].plane.normal: has no direction");
+              "s.yaml:6:31: objects[0].plane.normal: must have a length between 1e-9 and 1e9");
 }
 
 TEST(SceneErrors, NameTheStepOfATransform) {
@@ -415,23 +415,23 @@ TEST(SceneErrors, NameTheStepOfATransform) {
         return error_of(start + "objects:\n  - sphere: {radius: 1}\n    material: grey\n    transform:\n" + steps);
     };
     EXPECT_EQ(with("      - scale: 0\n"),
-              "s.yaml:9:16: objects[0].transform[0].scale: each factor must be 1e-9 to 1e9, or that below 0 for a "
-              "mirrored object");
+              "s.yaml:9:16: objects[0].transform[0].scale: the absolute value of each factor must be 1e-9 to "
+              "1e9; negative factors mirror");
     EXPECT_EQ(with("      - rotate: {axis: [0, 0, 0], degrees: 1}\n"),
-              "s.yaml:9:24: objects[0].transform[0].rotate.axis: has no direction");
-    EXPECT_EQ(with("      - {scale: 1, translate: [0, 0, 0]}\n"),
-              "s.yaml:9:9: objects[0].transform[0]: each step of a transform is one of translate, scale and rotate");
+              "s.yaml:9:24: objects[0].transform[0].rotate.axis: must have a length between 1e-9 and 1e9");
+    EXPECT_EQ(
+        with("      - {scale: 1, translate: [0, 0, 0]}\n"),
+        "s.yaml:9:9: objects[0].transform[0]: each step of a transform must be one of translate, scale and rotate");
     EXPECT_EQ(with("      - scale: 1\n      - skale: 1\n"),
               "s.yaml:10:16: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
-    EXPECT_EQ(
-        with("      - scale: [1, 1, 2]\n"),
-        "s.yaml:9:7: objects[0].transform: scales a sphere unevenly, which would make it an ellipsoid; scale it by "
-        "one number");
+    EXPECT_EQ(with("      - scale: [1, 1, 2]\n"),
+              "s.yaml:9:7: objects[0].transform: scales a sphere non-uniformly, which is not supported; use the same "
+              "factor for all axes");
     EXPECT_EQ(with("      - translate: [1e9, 0, 0]\n      - translate: [1e9, 0, 0]\n"),
-              "s.yaml:6:13: objects[0].sphere: reaches further than 1e9 mm after its transform");
+              "s.yaml:6:13: objects[0].sphere: extends beyond 1e9 mm after its transform");
 }
 
-TEST(SceneErrors, NameTheMeshAndTheLineThatNamesIt) {
+TEST(SceneErrors, NameTheMeshAndTheSceneLine) {
     const ScratchFolder folder;
     const auto error_with = [&](const std::string &obj) -> std::string {
         write_file(folder.path() / "mesh.obj", obj);
@@ -447,21 +447,21 @@ TEST(SceneErrors, NameTheMeshAndTheLineThatNamesIt) {
     const std::string mesh = (folder.path() / "mesh.obj").string();
     EXPECT_EQ(error_with("v 0 0\n"), where + mesh + ":1: a vertex needs 3 numbers, has 2");
     EXPECT_EQ(error_with("v 1e10 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 3\n"),
-              where + "reaches further than 1e9 mm after its transform");
+              where + "extends beyond 1e9 mm after its transform");
     EXPECT_EQ(error_with("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1e10\nf 1/1 2/1 3/1\n"),
               where + "has texture coordinates beyond 1e9");
     std::filesystem::remove(mesh);
-    write_file(folder.path() / "scene.yaml", start + "objects:\n  - mesh: gone.obj\n    material: grey\n");
+    write_file(folder.path() / "scene.yaml", start + "objects:\n  - mesh: missing.obj\n    material: grey\n");
     try {
         load_scene(folder.path() / "scene.yaml");
         FAIL();
     } catch (const Error &error) {
         EXPECT_EQ(error.what(),
-                  where + (folder.path() / "gone.obj").string() + ": can't be read: No such file or directory");
+                  where + (folder.path() / "missing.obj").string() + ": can't be read: No such file or directory");
     }
 }
 
-TEST(SceneLoading, TellsTheSizeOfMeshesAndItsProgress) {
+TEST(SceneLoading, ReportsMeshSizesAndProgress) {
     LoadCallbacks callbacks;
     std::vector<std::string> info;
     std::vector<double> fractions;
@@ -475,7 +475,7 @@ TEST(SceneLoading, TellsTheSizeOfMeshesAndItsProgress) {
     EXPECT_EQ(fractions.back(), 1);
 }
 
-TEST(SceneLoading, StopsWhenItIsCancelled) {
+TEST(SceneLoading, CanBeCancelled) {
     LoadCallbacks callbacks;
     callbacks.cancelled = [] { return true; };
     EXPECT_THROW(load_with_mesh(triangle_with_normals, "", callbacks), Cancelled);
@@ -488,10 +488,10 @@ TEST(SceneLoading, SmoothComputesNormals) {
     EXPECT_EQ(geometry(load_with_mesh(triangle_with_normals, ", smooth: false")).normals.count, 0u);
 }
 
-// A mesh that isn't there, with a stand-in of these keys.
+// A missing mesh; append the keys of the stand-in.
 const std::string absent = start + "objects:\n  - mesh: absent.ply\n    material: grey\n    stand_in: ";
 
-TEST(SceneLoading, DrawsAStandInForAMeshThatIsNotThere) {
+TEST(SceneLoading, ReplacesAMissingMeshByAStandIn) {
     std::vector<std::string> info, warnings;
     LoadCallbacks callbacks;
     callbacks.info = [&](const std::string &text) { info.push_back(text); };
@@ -518,16 +518,16 @@ TEST(SceneLoading, PrefersTheMeshToItsStandIn) {
         1u);
 }
 
-TEST(SceneLoading, RefusesWrongStandIns) {
+TEST(SceneLoading, RejectsInvalidStandIns) {
     EXPECT_THAT(error_of(absent + "{faces: 99, size: 1}\n"), HasSubstr("s.yaml:8:23: objects[0].stand_in.faces"));
     EXPECT_THAT(error_of(absent + "{faces: 500}\n"), HasSubstr("size"));
     EXPECT_THAT(error_of(absent + "{faces: 500, size: [1, 0, 1]}\n"), HasSubstr("1e-6"));
     EXPECT_THAT(error_of(start + "objects:\n  - sphere: {radius: 1}\n    material: grey\n"
                                  "    stand_in: {faces: 500, size: 1}\n"),
-                HasSubstr("belongs to a mesh only"));
+                HasSubstr("is only allowed with 'mesh'"));
 }
 
-TEST(SceneDocumentation, ItsExampleLoads) {
+TEST(SceneDocumentation, ExampleLoads) {
     std::ifstream stream(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "docs/scenes.md");
     const std::string text(std::istreambuf_iterator<char>(stream), {});
     const std::size_t begin = text.find("```yaml\n");

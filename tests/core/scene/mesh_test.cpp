@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugin_under_test.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh_loader.hpp"
 #include "scene_samples.hpp"
 
 #include <glm/geometric.hpp>
@@ -42,7 +42,7 @@ std::string gzipped(const std::string &content) {
     return packed;
 }
 
-// Its loader's messages, each after a "; ".
+// `info`: the messages of the loader, each followed by "; ".
 struct Loaded {
     TriangleMesh mesh;
     std::string info;
@@ -60,7 +60,7 @@ Loaded load_text(const std::string &name, const std::string &content, const Mesh
     return loaded;
 }
 
-// The message, without the folder.
+// The error message without the folder.
 std::string error_of(const std::string &name, const std::string &content, const MeshOptions &options = {}) {
     const ScratchFolder folder;
     write_file(folder.path() / name, content);
@@ -72,7 +72,7 @@ std::string error_of(const std::string &name, const std::string &content, const 
     return "no error";
 }
 
-// What the validator says to the mesh as a scene.
+// The validator's result for a scene with this mesh.
 std::string validated(TriangleMesh mesh) {
     ArenaBuilder builder;
     builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey()));
@@ -105,7 +105,7 @@ std::string binary_triangle(bool big_endian) {
     std::string bytes = std::string("ply\nformat binary_") + (big_endian ? "big" : "little") + "_endian 1.0\n" +
                         "element vertex 3\nproperty double x\nproperty float y\nproperty short z\n"
                         "property uchar red\nelement face 1\nproperty list uchar ushort vertex_index\n"
-                        "property list uint char rubbish\nend_header\n";
+                        "property list uint char unused\nend_header\n";
     for (int i = 0; i < 3; ++i) {
         append<double>(bytes, 10.5 + i, big_endian);
         append<float>(bytes, i == 2 ? 300.25f : 0, big_endian);
@@ -134,7 +134,7 @@ TEST(Obj, CountsNegativeIndicesFromTheLastVertex) {
     EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(3, 0, 1)));
 }
 
-TEST(Obj, MakesAVertexForEachPairOfPositionAndNormal) {
+TEST(Obj, CreatesOneVertexPerPairOfPositionAndNormal) {
     const TriangleMesh mesh =
         load_text("a.obj", three_vertices + "v 1 1 0\nvn 0 0 2\nvn 0 0 -1\n"
                                             "f 1//1 2//1 3//1\nf 2//1 4//2 3//1\nf 4//2 2//1 3//2\n")
@@ -146,31 +146,31 @@ TEST(Obj, MakesAVertexForEachPairOfPositionAndNormal) {
     EXPECT_EQ(mesh.positions[4], glm::vec3(0, 1, 0));
 }
 
-TEST(Obj, KeepsTexcoordsAndGivesZeroToCornersWithout) {
+TEST(Obj, KeepsTexcoordsAndUsesZeroForCornersWithoutThem) {
     const TriangleMesh mesh =
         load_text("a.obj", three_vertices + "vt 0.25 0.5\nvt 1\nf 1 2 3\nf 1/1 2/2 3/-1\n").mesh;
     ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
-    // v counts from the texture's top in the arena, from its bottom in these files.
+    // v starts at the texture's top in the arena, at its bottom in OBJ files.
     EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0, 1));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].x], glm::vec2(0.25f, 0.5f));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 1));
 }
 
-TEST(Obj, PassesOverNormalsThatOnlySomeFacesHave) {
+TEST(Obj, IgnoresNormalsIfOnlySomeFacesHaveThem) {
     const Loaded loaded = load_text("a.obj", three_vertices + "vn 0 0 1\nf 1 2 3\nf 1//1 2//1 3//1\n");
     EXPECT_TRUE(loaded.mesh.normals.empty());
-    EXPECT_EQ(loaded.info, "a.obj: some faces have normals and some have none; all are passed over; ");
+    EXPECT_EQ(loaded.info, "a.obj: only some faces have normals; ignores all of them; ");
 }
 
-TEST(Obj, SaysThatMaterialsArePassedOver) {
+TEST(Obj, ReportsIgnoredMaterials) {
     EXPECT_EQ(load_text("a.obj", "mtllib a.mtl\n" + three_vertices + "f 1 2 3").info,
-              "a.obj: its MTL materials are passed over; the scene file gives materials; ");
+              "a.obj: ignores its MTL materials; the scene file defines the materials; ");
 }
 
-TEST(Obj, ReadsTheWritingsOfOtherPrograms) {
+TEST(Obj, ReadsSyntaxVariants) {
     for (const std::string &text :
-         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows, no line end
-          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // old Macs
+         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows, no final line end
+          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // classic Mac OS
           std::string("v 0 \\\n0 0\nv 1 0 0 # last\nv 0 1 0 1.0\nf 1 \\\n 2 3 # f 9 9 9\n"),
           std::string("\t v\t+0 0. .0 0.5 0.5 0.5\nvp 1\nv 1e0 0E5 -0\nv 1e-60 +1.0e+0 0\ng a\ns off\nf 1 2 3\\")}) {
         const TriangleMesh mesh = load_text("a.obj", text).mesh;
@@ -179,7 +179,7 @@ TEST(Obj, ReadsTheWritingsOfOtherPrograms) {
     }
 }
 
-TEST(Obj, NamesFileLineAndFault) {
+TEST(Obj, ErrorsNameFileAndLine) {
     EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, has 2");
     EXPECT_EQ(error_of("a.obj", "\n\nv 0 x 0\n"), "a.obj:3: 'x' is not a number");
     EXPECT_EQ(error_of("a.obj", "v 0 1,5 0\n"), "a.obj:1: '1,5' is not a number");
@@ -188,28 +188,28 @@ TEST(Obj, NamesFileLineAndFault) {
     EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the number '-inf'");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"), "a.obj:4: a face needs three corners, has 2");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 4\n"),
-              "a.obj:4: a face names vertex 4, but 3 stand above it");
+              "a.obj:4: a face refers to vertex 4, but 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 -4\n"),
-              "a.obj:4: a face names vertex -4, but 3 stand above it");
+              "a.obj:4: a face refers to vertex -4, but 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 0 1 2\n"),
-              "a.obj:4: a face names vertex 0, but 3 stand above it");
+              "a.obj:4: a face refers to vertex 0, but 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1/1 2/1 3/1\n"),
-              "a.obj:4: a face names texcoord 1, but 0 stand above it");
+              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "vn 0 0 1\nf 1//1 2//2 3//1\n"),
-              "a.obj:5: a face names normal 2, but 1 stand above it");
+              "a.obj:5: a face refers to normal 2, but 1 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 x\n"), "a.obj:4: 'x' is not a corner of a face");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 3/1/1/1\n"),
-              "a.obj:4: a face names texcoord 1, but 0 stand above it");
+              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 99999999999999999999\n"),
               "a.obj:4: '99999999999999999999' is not a corner of a face");
-    EXPECT_EQ(error_of("a.obj", three_vertices), "a.obj: there are no triangles in it");
+    EXPECT_EQ(error_of("a.obj", three_vertices), "a.obj: contains no triangles");
     EXPECT_EQ(error_of("a.obj", three_vertices + "l 1 2\n"),
-              "a.obj: there are no triangles in it, only points, lines or curves");
-    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: there are no triangles in it, nor vertices");
+              "a.obj: contains no triangles, only points, lines or curves");
+    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: contains no triangles, nor vertices");
 }
 
-TEST(Polygons, AreCutIntoTrianglesThatCoverThem) {
-    // A square; an arrow's head, concave; a U, whose fan would cover the gap; and the U the other way round.
+TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
+    // A square; a concave arrow head; a U, whose gap a fan would cover; and the U with opposite winding.
     EXPECT_FLOAT_EQ(area_of(load_text("a.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n").mesh), 4);
     const TriangleMesh arrow = load_text("a.obj", "v 0 0 0\nv 4 0 2\nv 0 0 4\nv 1 0 2\nf 1 2 3 4\n").mesh;
     EXPECT_FLOAT_EQ(area_of(arrow), 6);
@@ -218,7 +218,7 @@ TEST(Polygons, AreCutIntoTrianglesThatCoverThem) {
         const TriangleMesh mesh = load_text("a.obj", u + face).mesh;
         EXPECT_EQ(mesh.triangles.size(), 6u);
         EXPECT_FLOAT_EQ(area_of(mesh), 7);
-        for (const glm::uvec3 &t : mesh.triangles) { // all wound as the polygon is
+        for (const glm::uvec3 &t : mesh.triangles) { // same winding as the polygon
             const glm::vec3 &a = mesh.positions[t.x];
             const float z = glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a).z;
             EXPECT_GE(face[2] == '1' ? z : -z, 0);
@@ -226,19 +226,19 @@ TEST(Polygons, AreCutIntoTrianglesThatCoverThem) {
     }
 }
 
-TEST(Polygons, ThatCrossThemselvesGiveTrianglesAllTheSame) {
+TEST(Polygons, ThatSelfIntersectAreStillTriangulated) {
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 2 0\nf 1 2 3 4\n").mesh.triangles.size(), 2u);
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 1 1 1\nf 1 2 1 2 1 2\n").mesh.triangles.size(), 4u);
 }
 
-TEST(Polygons, MayNotBeConcaveWithThousandsOfCorners) {
+TEST(Polygons, AreRejectedIfConcaveWithMoreThan1000Corners) {
     std::string text, face = "f";
     for (int i = 0; i < 1002; ++i) {
         text += "v " + std::to_string(i) + " " + std::to_string(i % 2 ? 0 : 5000 - i) + " 0\n";
         face += " " + std::to_string(i + 1);
     }
     EXPECT_EQ(error_of("a.obj", text + face + "\n"),
-              "a.obj:1003: a concave face has 1002 corners, more than 1000; cut it into triangles");
+              "a.obj:1003: a concave face has 1002 corners, more than 1000; triangulate it");
 }
 
 TEST(Ply, ReadsAscii) {
@@ -259,7 +259,7 @@ TEST(Ply, ReadsAscii) {
     EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(0, 2, 3)));
 }
 
-TEST(Ply, ReadsBinaryOfBothByteOrders) {
+TEST(Ply, ReadsBinaryInBothByteOrders) {
     for (const bool big_endian : {false, true}) {
         const TriangleMesh mesh = load_text("a.ply", binary_triangle(big_endian)).mesh;
         EXPECT_THAT(mesh.positions,
@@ -268,121 +268,118 @@ TEST(Ply, ReadsBinaryOfBothByteOrders) {
     }
 }
 
-TEST(Ply, ReadsFilesOfOldMacs) {
+TEST(Ply, ReadsCarriageReturnLineEndings) {
     std::string text = ply_start + ply_triangle_header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     std::replace(text.begin(), text.end(), '\n', '\r');
     EXPECT_EQ(load_text("a.ply", text).mesh.triangles.size(), 1u);
 }
 
-TEST(Ply, NamesFileLineAndFaultInTheHeader) {
+TEST(Ply, HeaderErrorsNameFileAndLine) {
     EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: a PLY file begins with a line 'ply', this one does not");
-    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header has no end_header");
-    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header has no format");
+    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header lacks end_header");
+    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header lacks a format");
     EXPECT_EQ(error_of("a.ply", "ply\nformat utf8 1.0\nend_header\n"),
               "a.ply:2: the format 'utf8' is not ascii, binary_little_endian or binary_big_endian");
-    EXPECT_EQ(error_of("a.ply", "ply\nformat ascii 2.0\n"), "a.ply:2: the format's version is '2.0', not 1.0");
+    EXPECT_EQ(error_of("a.ply", "ply\nformat ascii 2.0\n"), "a.ply:2: the format version is '2.0', not 1.0");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex -1\n"),
               "a.ply:3: the element 'vertex' has the count '-1'");
-    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"),
-              "a.ply:3: a property stands before the first element");
+    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"), "a.ply:3: a property precedes the first element");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty half x\n"),
               "a.ply:4: the property type 'half' is unknown");
     EXPECT_EQ(error_of("a.ply", ply_start + "element face 1\nproperty list float int vertex_indices\n"),
-              "a.ply:4: a list's count must be of an integer type");
+              "a.ply:4: the count of a list must have an integer type");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 0\nend_header\n"),
-              "a.ply: there are no triangles in it: the header has no element 'face' with a list 'vertex_indices'");
+              "a.ply: contains no triangles: the header has no element 'face' with a list 'vertex_indices'");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty float x\nelement face 1\n"
                                             "property list uchar int vertex_index\nend_header\n1\n3 0 0 0\n"),
-              "a.ply: its vertices lack x, y or z");
+              "a.ply: the vertices lack x, y or z");
 }
 
-TEST(Ply, NamesFileLineAndFaultInTheData) {
+TEST(Ply, DataErrorsNameFileAndLine) {
     const std::string header = ply_start + ply_triangle_header; // lines 1 to 9
-    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is cut short");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n"),
-              "a.ply:11: vertex 1 has more numbers than properties");
+              "a.ply:11: vertex 1 has more values than properties");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: 'zero' is not a number");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"),
-              "a.ply:11: vertex 1 has a number 'y' that is not finite");
+              "a.ply:11: vertex 1: 'y' is not finite");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-              "a.ply:13: face 0 names vertex 3, but there are 3 above it");
+              "a.ply:13: face 0 refers to vertex 3, but 3 are defined above");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"),
-              "a.ply:13: face 0 names vertex -1, but there are 3 above it");
-    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"),
-              "a.ply:13: '1.5' is not a whole number");
-    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:13: face 0 is cut short");
+              "a.ply:13: face 0 refers to vertex -1, but 3 are defined above");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"), "a.ply:13: '1.5' is not an integer");
+    EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:13: face 0 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n\n\n"),
-              "a.ply:15: the file is cut short: it ends before face 0 of 1");
+              "a.ply:15: the file is truncated before face 0 of 1");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n4000000 0 1 2\n"),
-              "a.ply:13: face 0: its list 'vertex_indices' has the length 4000000");
+              "a.ply:13: face 0: the list 'vertex_indices' has the length 4000000");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
-              "a.ply: there are no triangles in it: its faces have fewer than three corners");
+              "a.ply: contains no triangles: its faces have fewer than three corners");
 }
 
-TEST(Ply, NamesTheByteInBinaryData) {
+TEST(Ply, BinaryDataErrorsNameTheByteOffset) {
     const std::string whole = binary_triangle(false);
     const std::size_t header = whole.find("end_header\n") + 11;
     EXPECT_EQ(error_of("a.ply", whole.substr(0, whole.size() - 1)),
-              "a.ply: byte " + std::to_string(whole.size() - 2) + ": face 0: its list 'rubbish' has the length 2");
+              "a.ply: byte " + std::to_string(whole.size() - 2) + ": face 0: the list 'unused' has the length 2");
     EXPECT_EQ(error_of("a.ply", whole.substr(0, header + 10)),
-              "a.ply: its header tells of 3 elements 'vertex', but only 10 bytes are left for them");
+              "a.ply: the header declares 3 elements 'vertex', but only 10 bytes are left for them");
     std::string wrong = whole;
     wrong[header + 3 * 15 + 1] = 77;
     EXPECT_EQ(error_of("a.ply", wrong), "a.ply: byte " + std::to_string(header + 3 * 15 + 3) +
-                                            ": face 0 names vertex 77, but there are 3 above it");
+                                            ": face 0 refers to vertex 77, but 3 are defined above");
 }
 
-TEST(Ply, RefusesCountsThatTheFileIsTooShortForBeforeItReservesMemory) {
+TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
     for (const std::string count : {"4000000000", "4611686018427387904", "9223372036854775807"})
         for (const std::string format : {"ascii", "binary_little_endian"}) {
             const std::string text = "ply\nformat " + format + " 1.0\nelement vertex " + count +
                                      "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
                                      "property list uchar int vertex_indices\nend_header\n0 0 0\n";
             EXPECT_THAT(error_of("a.ply", text),
-                        HasSubstr("a.ply: its header tells of " + count + " elements 'vertex', but only"));
+                        HasSubstr("a.ply: the header declares " + count + " elements 'vertex', but only"));
         }
 }
 
-TEST(MeshFile, IsUnpackedFromGzip) {
+TEST(MeshFile, IsUncompressedFromGzip) {
     const std::string text = three_vertices + "f 1 2 3\n";
     EXPECT_EQ(load_text("a.obj.gz", gzipped(text)).mesh.triangles.size(), 1u);
     EXPECT_EQ(load_text("A.OBJ.GZ", gzipped(text)).mesh.triangles.size(), 1u);
     EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(), 1u); // by its content
     EXPECT_EQ(load_text("a.ply.gz", gzipped(binary_triangle(true))).mesh.triangles.size(), 1u);
-    // Two members one after the other, and zeros behind, as tapes leave them (RFC 1952, 2.2).
+    // Two members followed by zero padding, as on tapes (RFC 1952, 2.2).
     const std::string parts = gzipped(text.substr(0, 9)) + gzipped(text.substr(9)) + std::string(5, '\0');
     EXPECT_EQ(load_text("a.obj.gz", parts).mesh.triangles.size(), 1u);
 }
 
-TEST(MeshFile, NamesTheByteWhereGzipIsDamaged) {
+TEST(MeshFile, GzipErrorsNameTheByteOffset) {
     std::string text = three_vertices;
     for (int i = 0; i < 5000; ++i)
         text += "v " + std::to_string(i * 7919 % 1013) + " 0 1\n";
     const std::string packed = gzipped(text + "f 1 2 3\n");
     ASSERT_GT(packed.size(), 1000u);
     EXPECT_THAT(error_of("a.obj.gz", packed.substr(0, packed.size() - 3)),
-                HasSubstr("a.obj.gz: the gzip data is cut short after byte"));
-    EXPECT_THAT(error_of("a.obj.gz", packed.substr(0, 12)), HasSubstr("the gzip data is cut short after byte"));
+                HasSubstr("a.obj.gz: the gzip data is truncated after byte"));
+    EXPECT_THAT(error_of("a.obj.gz", packed.substr(0, 12)), HasSubstr("the gzip data is truncated after byte"));
     std::string damaged = packed;
     damaged[packed.size() / 2] ^= 0x55;
-    EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("the gzip data is damaged at byte"));
+    EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("the gzip data is corrupt at byte"));
     damaged = packed;
     damaged[packed.size() - 6] ^= 1; // the checksum
     EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("incorrect data check"));
-    EXPECT_THAT(error_of("a.obj.gz", packed + "rubbish"), HasSubstr("not a gzip member"));
+    EXPECT_THAT(error_of("a.obj.gz", packed + "unused"), HasSubstr("not a gzip member"));
     EXPECT_EQ(error_of("a.obj.gz", gzipped("")), "a.obj.gz: is empty");
 }
 
-TEST(MeshFile, MayNotUnpackToMoreThanItsLimit) {
+TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
     const std::string bomb = gzipped(std::string(20 << 20, '#'));
     MeshOptions options;
     options.byte_limit = 4 << 20;
-    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: unpacks to more than 4 MiB, the most that is loaded");
-    EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options),
-              "a.obj: has 5 MiB; 4 MiB is the most that is loaded");
+    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: uncompresses to more than the limit of 4 MiB");
+    EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options), "a.obj: is 5 MiB large; the limit is 4 MiB");
 }
 
-TEST(MeshFile, OfAnotherKindIsRefusedByName) {
+TEST(MeshFile, OfAnUnsupportedFormatIsRejected) {
     EXPECT_EQ(error_of("a.stl", "solid x\n"),
               "a.stl: mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)");
     EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension can't be loaded"));
@@ -391,7 +388,7 @@ TEST(MeshFile, OfAnotherKindIsRefusedByName) {
     EXPECT_EQ(error_of("a.obj", ""), "a.obj: is empty");
 }
 
-TEST(MeshFile, ThatCantBeReadSaysWhy) {
+TEST(MeshFile, ReportsWhyItCannotBeRead) {
     const ScratchFolder folder;
     const auto error_at = [](const std::filesystem::path &path) -> std::string {
         try {
@@ -408,7 +405,7 @@ TEST(MeshFile, ThatCantBeReadSaysWhy) {
     EXPECT_THAT(error_at(folder.path() / "fifo.obj"), HasSubstr("is not a regular file"));
 }
 
-TEST(MeshFile, LoadingStopsWhenItIsCancelled) {
+TEST(MeshFile, LoadingCanBeCancelled) {
     const ScratchFolder folder;
     write_file(folder.path() / "a.obj", three_vertices + "f 1 2 3\n");
     LoadCallbacks callbacks;
@@ -416,8 +413,8 @@ TEST(MeshFile, LoadingStopsWhenItIsCancelled) {
     EXPECT_THROW(load_mesh(folder.path() / "a.obj", {}, callbacks), Cancelled);
 }
 
-TEST(Normals, AreComputedWhereSmoothAsksForThem) {
-    // Two triangles of a ridge; the edge's normals lie between theirs, by area: 1 to 3.
+TEST(Normals, AreComputedIfSmoothIsTrue) {
+    // Two triangles of a ridge; the edge's normals are weighted by area, 1 to 3.
     const std::string ridge = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -3\nf 1 3 2\nf 1 2 4\n";
     EXPECT_TRUE(load_text("a.obj", ridge).mesh.normals.empty());
     const TriangleMesh mesh = load_text("a.obj", ridge, {true}).mesh;
@@ -429,14 +426,14 @@ TEST(Normals, AreComputedWhereSmoothAsksForThem) {
     EXPECT_EQ(mesh.normals[3], glm::vec3(-1, 0, 0));
 }
 
-TEST(Normals, AreSharedAcrossSeamsOfTheTexture) {
+TEST(Normals, AreSharedAcrossTextureSeams) {
     const std::string seam = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -1\nvt 0 0\nvt 1 1\nf 1/1 3/1 2/1\nf 1/2 2/2 4/2\n";
     const TriangleMesh mesh = load_text("a.obj", seam, {true}).mesh;
     ASSERT_EQ(mesh.positions.size(), 6u);
     EXPECT_EQ(mesh.normals[mesh.triangles[0].x], mesh.normals[mesh.triangles[1].x]);
 }
 
-TEST(Normals, OfTheFileAreDroppedWhereSmoothIsFalse) {
+TEST(Normals, OfTheFileAreDroppedIfSmoothIsFalse) {
     const std::string text = three_vertices + "vn 0 0 1\nf 1//1 2//1 3//1\n";
     EXPECT_EQ(load_text("a.obj", text).mesh.normals.size(), 3u);
     EXPECT_EQ(load_text("a.obj", text, {true}).mesh.normals.size(), 3u);
@@ -450,10 +447,10 @@ TEST(Normals, OfLengthZeroAreComputed) {
             .mesh;
     EXPECT_EQ(mesh.normals[0], glm::vec3(0, 0, 1));
     EXPECT_EQ(mesh.normals[1], glm::vec3(1, 0, 0));
-    EXPECT_EQ(validated(mesh), ""); // those of the triangle without area, too
+    EXPECT_EQ(validated(mesh), ""); // including the degenerate triangle
 }
 
-TEST(Normals, OfATinySphereAreRight) { // the squares of its lengths are too small for floats
+TEST(Normals, OfATinyMeshAreCorrect) { // squared lengths underflow in floats
     TriangleMesh mesh = square();
     for (glm::vec3 &p : mesh.positions)
         p *= 1e-24f;
@@ -467,7 +464,7 @@ struct SharedMesh {
 
 class SharedMeshes : public testing::TestWithParam<SharedMesh> {};
 
-TEST_P(SharedMeshes, HaveTheirTriangles) {
+TEST_P(SharedMeshes, HaveTheExpectedTriangleCount) {
     ARHOST_REQUIRE_SHARED_DATA("meshes");
     const TriangleMesh mesh = load_mesh(shared_data(std::string("meshes/") + GetParam().file));
     EXPECT_EQ(mesh.triangles.size(), GetParam().triangles);
@@ -489,12 +486,12 @@ INSTANTIATE_TEST_SUITE_P(Real, SharedMeshes,
 struct LoaderCase {
     const char *file;
     std::size_t triangles, vertices;
-    const char *message = nullptr; // in place of a mesh
+    const char *message = nullptr; // error instead of a mesh
 };
 
 class LoaderCases : public testing::TestWithParam<LoaderCase> {};
 
-TEST_P(LoaderCases, GiveTheirMeshOrAClearMessage) {
+TEST_P(LoaderCases, YieldAMeshOrAClearError) {
     ARHOST_REQUIRE_SHARED_DATA("meshes/loader_cases");
     const std::filesystem::path file = shared_data(std::string("meshes/loader_cases/") + GetParam().file);
     try {
@@ -514,9 +511,8 @@ constexpr char no_stl[] =
     ": mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
 constexpr char no_mtl[] =
     ": mesh files '*.mtl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
-constexpr char no_faces[] =
-    ": there are no triangles in it: the header has no element 'face' with a list 'vertex_indices'";
-constexpr char only_lines[] = ": there are no triangles in it, only points, lines or curves";
+constexpr char no_faces[] = ": contains no triangles: the header has no element 'face' with a list 'vertex_indices'";
+constexpr char only_lines[] = ": contains no triangles, only points, lines or curves";
 } // namespace
 
 INSTANTIATE_TEST_SUITE_P(
@@ -536,25 +532,24 @@ INSTANTIATE_TEST_SUITE_P(
         LoaderCase{"empty_mat.obj", 256, 450}, LoaderCase{"float-color.ply", 1, 3},
         LoaderCase{"issue623.ply", 0, 0, no_faces}, LoaderCase{"multiple_spaces.obj", 1, 4},
         LoaderCase{"number_formats.obj", 0, 0, ":11: '3.1+e2' is not a number"},
-        LoaderCase{"point_cloud.obj", 0, 0, ": there are no triangles in it"},
-        LoaderCase{"points.ply", 0, 0, no_faces}, LoaderCase{"regr01.mtl", 0, 0, no_mtl},
-        LoaderCase{"regr_3429812.mtl", 0, 0, no_mtl}, LoaderCase{"regr_3429812.obj", 4, 4},
-        LoaderCase{"space_in_material_name.mtl", 0, 0, no_mtl}, LoaderCase{"space_in_material_name.obj", 64, 64},
-        LoaderCase{"sphereWithHole.stl", 0, 0, no_stl}, LoaderCase{"spider.mtl", 0, 0, no_mtl},
-        LoaderCase{"spider.obj", 1368, 974}, LoaderCase{"testline.obj", 0, 0, only_lines},
-        LoaderCase{"testmixed.obj", 12, 8}, LoaderCase{"testpoints.obj", 0, 0, only_lines},
-        LoaderCase{"triangle.stl", 0, 0, no_stl}, LoaderCase{"triangle_with_empty_solid.stl", 0, 0, no_stl},
+        LoaderCase{"point_cloud.obj", 0, 0, ": contains no triangles"}, LoaderCase{"points.ply", 0, 0, no_faces},
+        LoaderCase{"regr01.mtl", 0, 0, no_mtl}, LoaderCase{"regr_3429812.mtl", 0, 0, no_mtl},
+        LoaderCase{"regr_3429812.obj", 4, 4}, LoaderCase{"space_in_material_name.mtl", 0, 0, no_mtl},
+        LoaderCase{"space_in_material_name.obj", 64, 64}, LoaderCase{"sphereWithHole.stl", 0, 0, no_stl},
+        LoaderCase{"spider.mtl", 0, 0, no_mtl}, LoaderCase{"spider.obj", 1368, 974},
+        LoaderCase{"testline.obj", 0, 0, only_lines}, LoaderCase{"testmixed.obj", 12, 8},
+        LoaderCase{"testpoints.obj", 0, 0, only_lines}, LoaderCase{"triangle.stl", 0, 0, no_stl},
+        LoaderCase{"triangle_with_empty_solid.stl", 0, 0, no_stl},
         LoaderCase{"triangle_with_two_solids.stl", 0, 0, no_stl}));
 
-TEST(LoaderCaseTable, HoldsEveryFileOfTheFolder) {
+TEST(LoaderCaseTable, CoversEveryFileInTheFolder) {
     ARHOST_REQUIRE_SHARED_DATA("meshes/loader_cases");
     const auto files = std::filesystem::directory_iterator(shared_data("meshes/loader_cases"));
     EXPECT_EQ(std::distance(begin(files), end(files)), 43);
 }
 
-// Damaged files give a mesh that the validator accepts, or a MeshError: nothing else is thrown, and the
-// sanitizers' builds find nothing.
-TEST(MeshMutations, GiveAMeshOrAnError) {
+// Corrupt files yield a mesh that the validator accepts, or a MeshError; no other exception, no sanitizer finding.
+TEST(MeshMutations, YieldAMeshOrAnError) {
     std::vector<std::pair<std::string, std::string>> seeds = {
         {"a.obj",
          three_vertices + "vt 0 1\nvn 0 0 1\nv 1 1 0 \\\n 1\nf 1/1/1 2/1/1 4/1/1 3/1/1\nf -1//1 -2//1 -3//1\n"},
@@ -563,13 +558,13 @@ TEST(MeshMutations, GiveAMeshOrAnError) {
         {"c.ply", binary_triangle(true)},
         {"a.obj.gz", gzipped(three_vertices + "f 1 2 3\n")}};
     std::mt19937 random(7);
-    // The files lie in memory, where writing thousands of them takes no time.
+    // In memory, so that writing thousands of files is fast.
     const int memory = memfd_create("mesh", 0);
     ASSERT_GE(memory, 0);
     const ScratchFolder folder;
     for (const auto &[name, content] : seeds)
         std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(memory), folder.path() / name);
-    int loaded = 0, refused = 0;
+    int loaded = 0, rejected = 0;
     for (int round = 0; round < 4000; ++round) {
         auto [name, content] = seeds[static_cast<std::size_t>(round) % seeds.size()];
         for (unsigned edits = 1 + random() % 2; edits > 0 && !content.empty(); --edits) {
@@ -593,7 +588,7 @@ TEST(MeshMutations, GiveAMeshOrAnError) {
         ASSERT_EQ(pwrite(memory, content.data(), content.size(), 0), static_cast<ssize_t>(content.size()));
         try {
             TriangleMesh mesh = load_mesh(folder.path() / name, {random() % 2 == 0});
-            const bool in_limits = // which the scene's loader sees to
+            const bool in_limits = // checked by the scene loader
                 std::ranges::all_of(mesh.positions, [](const glm::vec3 &p) { return glm::length(p) < 1e9f; }) &&
                 std::ranges::all_of(mesh.texcoords, [](const glm::vec2 &p) { return glm::length(p) < 1e9f; });
             if (in_limits) {
@@ -601,10 +596,10 @@ TEST(MeshMutations, GiveAMeshOrAnError) {
             }
             ++loaded;
         } catch (const MeshError &) {
-            ++refused;
+            ++rejected;
         }
     }
     close(memory);
     EXPECT_GT(loaded, 200);
-    EXPECT_GT(refused, 200);
+    EXPECT_GT(rejected, 200);
 }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float half_root = 0.70710678f; // of 2: sine and cosine of 45°
 
-// A ball at the origin that one channel of its node moves.
+// A ball at the origin whose node has one channel.
 Arena ball_with(Channel channel, float duration_s = 2) {
     ArenaBuilder builder;
     builder.settings.duration_s = duration_s;
@@ -38,7 +38,7 @@ float x_at(const Arena &arena, double time_s) {
     return evaluator.at(time_s).moved[0].world_from_object[9];
 }
 
-// The bending square: its skin's joints are two nodes, the second below the first and 10 to the right.
+// The bending square: its skin has two joints; the second is a child of the first, 10 to the right.
 Arena bend(const std::vector<Channel> &channels, const glm::mat4x3 &root = glm::mat4x3(1), bool morphs = false) {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
@@ -52,9 +52,9 @@ Arena bend(const std::vector<Channel> &channels, const glm::mat4x3 &root = glm::
         joint.translation = glm::vec3(i == 0 ? 0 : 10, 0, 0);
         builder.add_node(joint);
     }
-    MotionNode weighed;
-    weighed.morph_weights = {0};
-    builder.add_node(weighed);
+    MotionNode weighted;
+    weighted.morph_weights = {0};
+    builder.add_node(weighted);
     for (const Channel &channel : channels)
         builder.add_channel(channel);
     const glm::mat4x3 ten_left(glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(-10, 0, 0));
@@ -75,7 +75,7 @@ std::vector<float> triple(const float *values, std::size_t i) {
 
 } // namespace
 
-TEST(Motion, MixesKeysLinearlyAndBeginsAgain) {
+TEST(Motion, InterpolatesLinearlyAndLoops) {
     const Arena arena =
         ball_with({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0.5f, 1.5f}, {1, 0, 0, 5, 0, 0}});
     EXPECT_EQ(x_at(arena, 0), 1) << "before the first key";
@@ -87,7 +87,7 @@ TEST(Motion, MixesKeysLinearlyAndBeginsAgain) {
     EXPECT_EQ(x_at(arena, std::nan("")), 1);
 }
 
-TEST(Motion, HoldsKeysOfStep) {
+TEST(Motion, HoldsStepKeyframes) {
     const Arena arena =
         ball_with({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_STEP, {0, 1}, {1, 0, 0, 5, 0, 0}});
     EXPECT_EQ(x_at(arena, 0.99), 1);
@@ -95,7 +95,7 @@ TEST(Motion, HoldsKeysOfStep) {
 }
 
 // glTF 2.0, appendix C.5, with t_d = 2: at the middle 1/2 v0 + 2/8 b0 + 1/2 v1 − 2/8 a1.
-TEST(Motion, FollowsCubicSplines) {
+TEST(Motion, InterpolatesCubicSplines) {
     const Arena arena = ball_with({0,
                                    ARHOST_CHANNEL_TRANSLATION,
                                    ARHOST_INTERPOLATION_CUBIC,
@@ -108,8 +108,8 @@ TEST(Motion, FollowsCubicSplines) {
     EXPECT_EQ(x_at(arena, 2), 5);
 }
 
-TEST(Motion, TurnsSphericallyTheShortWay) {
-    // 90° about z, told with the opposite sign: the way there is still 90°, not 270°.
+TEST(Motion, RotatesAlongTheShortestPath) {
+    // 90° about z with the opposite quaternion sign: the path is still 90°, not 270°.
     const Arena arena = ball_with({0,
                                    ARHOST_CHANNEL_ROTATION,
                                    ARHOST_INTERPOLATION_LINEAR,
@@ -121,14 +121,14 @@ TEST(Motion, TurnsSphericallyTheShortWay) {
                                                           FloatNear(-0.5f, 1e-6f), FloatNear(0.8660254f, 1e-6f), 0));
 }
 
-TEST(Motion, KeepsWhatVanishesInvertible) {
+TEST(Motion, KeepsAScaleOfZeroInvertible) {
     const Arena arena = ball_with({0, ARHOST_CHANNEL_SCALE, ARHOST_INTERPOLATION_LINEAR, {0, 1}, {1, 1, 1, 0, 0, 0}});
     MotionEvaluator evaluator(arena.scene());
     EXPECT_EQ(evaluator.at(1.5).moved[0].world_from_object[4], 1e-6f);
 }
 
-TEST(Motion, CarriesJointsBelowOthers) {
-    // Joint 0 turns by 90° about z, joint 1 goes with it and 2 further along its own x.
+TEST(Motion, MovesChildJoints) {
+    // Joint 0 rotates by 90° about z; joint 1 follows and moves by 2 along its own x.
     const Arena arena =
         bend({{1, ARHOST_CHANNEL_ROTATION, ARHOST_INTERPOLATION_STEP, {1}, {0, 0, half_root, half_root}},
               {2, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_STEP, {0}, {12, 0, 0}}});
@@ -144,7 +144,7 @@ TEST(Motion, CarriesJointsBelowOthers) {
     EXPECT_THAT(triple(motion.deformed[0].normals, 1), ElementsAre(near(0), near(0), near(1)));
 }
 
-TEST(Motion, WhatCanNotBePlacedIsAPointWhateverCameBefore) {
+TEST(Motion, CollapsesAnObjectBeyondTheCoordinateLimit) {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
     MotionNode parent, child;
@@ -160,11 +160,11 @@ TEST(Motion, WhatCanNotBePlacedIsAPointWhateverCameBefore) {
     MotionEvaluator fresh(arena.scene()), used(arena.scene());
     EXPECT_EQ(used.at(0).moved[0].world_from_object[0], 1);
     for (MotionEvaluator *evaluator : {&fresh, &used})
-        for (int i = 0; i < 12; ++i) // 1.8e9 mm away
+        for (int i = 0; i < 12; ++i) // at 1.8e9 mm
             EXPECT_LT(std::abs(evaluator->at(1.5).moved[0].world_from_object[i]), 1e-6f) << i;
 }
 
-TEST(Motion, MixesJointsByWeight) {
+TEST(Motion, BlendsJointsByWeight) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;
     MotionNode still, raised;
@@ -184,12 +184,12 @@ TEST(Motion, MixesJointsByWeight) {
     EXPECT_THAT(triple(evaluator.at(0).deformed[0].positions, 2), ElementsAre(10, 10, 7));
 }
 
-TEST(Motion, TurnsNormalsByTheInverseTranspose) {
-    // Slanted: z stands for z + x, so the normal of z = 5 leans back; mirrored: outside stays outside.
-    const glm::mat4x3 slanted(glm::vec3(1, 0, 1), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0));
+TEST(Motion, TransformsNormalsByTheInverseTranspose) {
+    // Sheared (z becomes z + x): the normal of z = 5 tilts back. Mirrored: the normal keeps its side.
+    const glm::mat4x3 sheared(glm::vec3(1, 0, 1), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0));
     const auto near = [](float value) { return FloatNear(value, 1e-6f); };
     {
-        const Arena arena = bend({}, slanted);
+        const Arena arena = bend({}, sheared);
         MotionEvaluator evaluator(arena.scene());
         EXPECT_THAT(triple(evaluator.at(0).deformed[0].normals, 0),
                     ElementsAre(near(-half_root), near(0), near(half_root)));
@@ -201,7 +201,7 @@ TEST(Motion, TurnsNormalsByTheInverseTranspose) {
     EXPECT_THAT(triple(evaluator.at(0).deformed[0].normals, 0), ElementsAre(near(0), near(0), near(1)));
 }
 
-TEST(Motion, AddsMorphTargetsBeforeTheSkin) {
+TEST(Motion, AppliesMorphTargetsBeforeTheSkin) {
     const Arena arena =
         bend({{3, ARHOST_CHANNEL_MORPH_WEIGHTS, ARHOST_INTERPOLATION_LINEAR, {0, 2}, {0, 3}}}, glm::mat4x3(2), true);
     MotionEvaluator evaluator(arena.scene());
@@ -210,7 +210,7 @@ TEST(Motion, AddsMorphTargetsBeforeTheSkin) {
     EXPECT_THAT(triple(evaluator.at(0).deformed[0].positions, 3), ElementsAre(-20, 20, 10));
 }
 
-TEST(Motion, MorphsWithoutASkinInTheObjectsOwnSpace) {
+TEST(Motion, MorphsUnskinnedObjectsInObjectSpace) {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
     MotionNode node;
@@ -233,7 +233,7 @@ TEST(Motion, MorphsWithoutASkinInTheObjectsOwnSpace) {
                 ElementsAre(FloatNear(half_root, 1e-6f), 0, FloatNear(half_root, 1e-6f)));
 }
 
-// Not a limit that a slow machine could break; the number is for whoever changes the loop.
+// Reports the time without a limit, which a slow machine could exceed.
 TEST(Motion, SkinsAHundredThousandVertices) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;

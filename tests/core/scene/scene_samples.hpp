@@ -41,7 +41,7 @@ inline ArenaBuilder small_scene() {
     return builder;
 }
 
-// A texture of one colour.
+// A texture with a uniform colour.
 inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, std::uint32_t height) {
     Texture texture{format, width, height, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, {}};
     if (format == ARHOST_TEXEL_RGBA32F) {
@@ -54,8 +54,8 @@ inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, st
     return texture;
 }
 
-// The square of two joints, the left side with joint 0, the right one with joint 1, and a morph target that
-// lifts it by 1.
+// The square with its left side bound to joint 0, the right side to joint 1, and a morph target that raises it
+// by 1.
 inline TriangleMesh bending_square() {
     TriangleMesh mesh = square();
     mesh.joints = {{0, 0, 0, 0}, {1, 0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0}};
@@ -65,7 +65,7 @@ inline TriangleMesh bending_square() {
     return mesh;
 }
 
-// Everything that an arena can hold. Objects: 0 'square', textured; 1 'ball', moves with node 0; 2 'bend',
+// Uses every feature of an arena. Objects: 0 'square', textured; 1 'ball', moves with node 0; 2 'bend',
 // deforms by skin 0 of the nodes 0 and 1. Textures: 0 bytes, 1 floats, of the environment. Channels: a
 // translation, a rotation and a scale of node 0, weights of node 2.
 inline ArenaBuilder full_scene() {
@@ -81,10 +81,10 @@ inline ArenaBuilder full_scene() {
     moving.animated = true;
     MotionNode child;
     child.parent = builder.add_node(moving);
-    MotionNode weighed;
-    weighed.morph_weights = {0};
+    MotionNode weighted;
+    weighted.morph_weights = {0};
     builder.add_node(child);
-    builder.add_node(weighed);
+    builder.add_node(weighted);
     builder.add_channel({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 2}, {0, 0, 0, 10, 0, 0}});
     builder.add_channel({0, ARHOST_CHANNEL_ROTATION, ARHOST_INTERPOLATION_STEP, {0, 1}, {0, 0, 0, 1, 0, 0, 1, 0}});
     builder.add_channel({0, ARHOST_CHANNEL_SCALE, ARHOST_INTERPOLATION_LINEAR, {0}, {1, 1, 1}});
@@ -99,7 +99,7 @@ inline ArenaBuilder full_scene() {
     return builder;
 }
 
-// The elements of a buffer, to be read or spoilt.
+// The mutable elements of a buffer.
 template <class T> T *elements(Arena &arena, const arhost_buffer &buffer) {
     return reinterpret_cast<T *>(arena.bytes().data() + buffer.offset);
 }

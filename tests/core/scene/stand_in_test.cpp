@@ -12,7 +12,7 @@ using namespace arhost::scene;
 
 namespace {
 
-// 6 times the volume inside; positive where the triangles are wound counter-clockwise seen from outside.
+// 6 times the enclosed volume; positive if the triangles are counter-clockwise seen from outside.
 double signed_volume(const TriangleMesh &mesh) {
     double sum = 0;
     for (const glm::uvec3 &t : mesh.triangles)
@@ -21,7 +21,7 @@ double signed_volume(const TriangleMesh &mesh) {
     return sum;
 }
 
-// How many edges no other triangle has the other way round.
+// Number of edges without exactly one opposite edge.
 int open_edges(const TriangleMesh &mesh) {
     std::map<std::pair<unsigned, unsigned>, int> edges;
     for (const glm::uvec3 &t : mesh.triangles)
@@ -37,10 +37,10 @@ int open_edges(const TriangleMesh &mesh) {
 
 } // namespace
 
-// The last five: the dissertation's table 1.
+// The last five counts: the dissertation's table 1.
 class StandIns : public testing::TestWithParam<unsigned> {};
 
-TEST_P(StandIns, HaveExactlySoManyTrianglesInTheirBox) {
+TEST_P(StandIns, HaveTheExactTriangleCountAndFillTheirBox) {
     const glm::dvec3 size(1.42, 1, 0.63);
     const TriangleMesh mesh = stand_in(GetParam(), size);
     EXPECT_EQ(mesh.triangles.size(), GetParam());
@@ -59,9 +59,9 @@ TEST_P(StandIns, HaveExactlySoManyTrianglesInTheirBox) {
 INSTANTIATE_TEST_SUITE_P(Counts, StandIns,
                          testing::Values(100, 101, 999, 4968, 126'048, 448'880, 871'306, 1'087'451));
 
-TEST(StandInMeshes, AreClosed) {
+TEST(StandInMeshes, AreClosedForEvenCounts) {
     for (const unsigned faces : {100, 998, 4968})
         EXPECT_EQ(open_edges(stand_in(faces, glm::dvec3(1))), 0) << faces;
-    // The odd one: the long edge and its halves.
+    // Odd count: the split edge and its two halves.
     EXPECT_EQ(open_edges(stand_in(999, glm::dvec3(1))), 3);
 }

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A mesh file's content in memory, and the reading of numbers out of it. Private to core/scene.
+// A file's content in memory, and functions that parse numbers in it. Private to core/scene.
 #pragma once
 
-#include "scene/mesh.hpp"
+#include "scene/callbacks.hpp"
 
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
 
 namespace arhost::scene {
 
-// Bytes that grow without being zeroed or copied first.
+// Growable buffer that leaves new bytes uninitialized.
 class Bytes {
 public:
     void resize(std::size_t size);
@@ -30,47 +32,25 @@ private:
     std::size_t size_ = 0;
 };
 
-// Tells that the work goes on, and asks whether it should.
-class Watch {
+// A file's content, uncompressed.
+class MeshFile {
 public:
-    Watch(const LoadCallbacks &callbacks, std::string what) : callbacks_(callbacks), what_(std::move(what)) {}
-    void report(double fraction) const {
-        if (callbacks_.progress)
-            callbacks_.progress(fraction, what_);
-        if (callbacks_.cancelled && callbacks_.cancelled())
-            throw Cancelled();
-    }
-    void info(const std::string &text) const {
-        if (callbacks_.info)
-            callbacks_.info(text);
-    }
-    void reads(const std::filesystem::path &file) const {
-        if (callbacks_.reads)
-            callbacks_.reads(file);
-    }
-
-private:
-    const LoadCallbacks &callbacks_;
-    std::string what_;
-};
-
-// A file's content, unpacked.
-class MeshText {
-public:
-    static MeshText read(const std::filesystem::path &file, std::uint64_t byte_limit, const Watch &watch);
+    // Throws MeshError.
+    static MeshFile read(const std::filesystem::path &file, std::uint64_t byte_limit, const Reporter &reporter);
 
     const char *begin() const { return bytes_.get()->data(); }
     const char *end() const { return bytes_.get()->data() + bytes_.get()->size(); }
     std::string_view view() const { return {begin(), bytes_->size()}; }
     const std::string &name() const { return name_; }
-    void lone_carriage_returns_to_newlines();
+    void normalize_line_ends(); // CR-only files (classic Mac OS) to LF
 
-    [[noreturn]] void fail(const std::string &message) const;                      // about the file
-    [[noreturn]] void fail_line(const char *at, const std::string &message) const; // about the line at `at`
-    [[noreturn]] void fail_byte(const char *at, const std::string &message) const; // about a binary file
+    // Throw MeshError: about the file, the line at `at`, or the byte offset of `at`.
+    [[noreturn]] void fail(const std::string &message) const;
+    [[noreturn]] void fail_line(const char *at, const std::string &message) const;
+    [[noreturn]] void fail_byte(const char *at, const std::string &message) const;
 
 private:
-    MeshText(std::string name, Bytes bytes)
+    MeshFile(std::string name, Bytes bytes)
         : name_(std::move(name)), bytes_(std::make_unique<Bytes>(std::move(bytes))) {}
     std::string name_;
     std::unique_ptr<Bytes> bytes_;
@@ -85,22 +65,22 @@ inline void skip_blanks(const char *&p, const char *end) {
         ++p;
 }
 
-// Past the end of the line.
+// Moves p past the end of the line.
 inline void skip_line(const char *&p, const char *end) {
     const void *newline = p < end ? std::char_traits<char>::find(p, end - p, '\n') : nullptr;
     p = newline ? static_cast<const char *>(newline) + 1 : end;
 }
 
-// Up to the next blank or line end, shortened and without control characters, for messages.
+// The token at p for error messages: shortened, control characters replaced.
 std::string token_at(const char *p, const char *end);
 
-// Reads the number at p and moves p behind it; false where there is none.
+// Parses the number at p and moves p past it; false if there is no number.
 inline bool read_number(const char *&p, const char *end, float &value) {
     const char *begin = p < end && *p == '+' ? p + 1 : p;
     const auto [stop, error] = std::from_chars(begin, end, value);
     if (error == std::errc::invalid_argument)
         return false;
-    if (error == std::errc::result_out_of_range) // too small for a float counts as 0, too large as infinite
+    if (error == std::errc::result_out_of_range) // underflow gives 0, overflow infinity
         value = std::strtof(std::string(begin, stop).c_str(), nullptr);
     p = stop;
     return true;
@@ -113,11 +93,5 @@ inline bool read_integer(const char *&p, const char *end, std::int64_t &value) {
     p = stop;
     return true;
 }
-
-// Makes normals as MeshOptions::smooth says, each of unit length.
-void settle_normals(TriangleMesh &mesh, std::optional<bool> smooth);
-
-TriangleMesh parse_obj(MeshText &text, const Watch &watch);
-TriangleMesh parse_ply(MeshText &text, const Watch &watch);
 
 } // namespace arhost::scene

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Wavefront OBJ files: v, vn, vt and f. Ignores vertex colours, groups, smoothing groups, materials, points,
+// lines and curves.
+#pragma once
+
+#include "scene/callbacks.hpp"
+#include "scene/mesh.hpp"
+#include "scene/mesh_file.hpp"
+
+namespace arhost::scene {
+
+// Texcoords as in the file: v = 0 at the texture's bottom. Throws MeshError.
+TriangleMesh parse_obj(MeshFile &file, const Reporter &reporter);
+
+} // namespace arhost::scene

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// PLY files (Turk 1994), ascii and binary in both byte orders: the elements `vertex` and `face`. Ignores all
+// other elements and properties.
+#pragma once
+
+#include "scene/callbacks.hpp"
+#include "scene/mesh.hpp"
+#include "scene/mesh_file.hpp"
+
+namespace arhost::scene {
+
+// Texcoords as in the file: v = 0 at the texture's bottom. Throws MeshError.
+TriangleMesh parse_ply(MeshFile &file, const Reporter &reporter);
+
+} // namespace arhost::scene
