@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
-#include "base/usage.hpp"
 #include "base/whole_file.hpp"
 #include "base/write_all.hpp"
 #include "ray_tracer.hpp"
 #include "scene/loader.hpp"
 
-#include <CLI/CLI.hpp>
 #include <glm/trigonometric.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -108,58 +107,52 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // a full disk, and who reads no more, are errors
     std::signal(SIGXFSZ, SIG_IGN);
-    CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
+    base::CommandLine app(
+        "Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
     std::string scene, output, label, ray_tracer = "rt_embree";
     View view;
     std::optional<int> samples, light_samples;
     std::vector<std::string> settings;
     double time_s = 0;
     bool transparent = false;
-    app.add_option("scene", scene, "The scene file")->required();
-    app.add_option("--eye", view.eye, "Where the camera is")
-        ->delimiter(',')
-        ->type_name("X,Y,Z")
-        ->capture_default_str();
-    app.add_option("--look-at", view.look_at, "What is in the picture's middle")
-        ->delimiter(',')
-        ->type_name("X,Y,Z")
-        ->capture_default_str();
-    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
-        ->delimiter(',')
-        ->type_name("X,Y,Z");
-    app.add_option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
-        ->check(CLI::Range(1.0, 170.0))
-        ->capture_default_str();
-    app.add_option("--size", view.size, "Of the picture, px")
-        ->delimiter('x')
-        ->type_name("WIDTHxHEIGHT")
-        ->check(CLI::Range(1, 16384))
-        ->default_str(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
-    app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
-        ->check([](const std::string &text) {
+    app.option("scene", scene, "The scene file").required();
+    app.option("--eye", view.eye, "Where the camera is").separator(',').type_name("X,Y,Z").show_default();
+    app.option("--look-at", view.look_at, "What is in the picture's middle")
+        .separator(',')
+        .type_name("X,Y,Z")
+        .show_default();
+    app.option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
+        .separator(',')
+        .type_name("X,Y,Z");
+    app.option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
+        .range(1.0, 170.0)
+        .show_default();
+    app.option("--size", view.size, "Of the picture, px")
+        .separator('x')
+        .type_name("WIDTHxHEIGHT")
+        .range(1, 16384)
+        .default_text(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
+    app.option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
+        .check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
             return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
         })
-        ->capture_default_str();
-    app.add_option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
-        ->type_name("NAME|PATH")
-        ->capture_default_str();
-    app.add_option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
-        ->type_name("KEY=VALUE")
-        ->allow_extra_args(false);
-    app.add_option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
-        ->check(CLI::Range(1, 256));
-    app.add_option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
-        ->check(CLI::Range(1, 256));
-    app.add_option("--label", label, "A line of text to write into the picture");
-    app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
-    app.add_option("--output,-o", output, "The file to write")->required();
-    app.failure_message(base::usage_failure);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 && base::stdout_is_written() ? EXIT_SUCCESS : bad_usage;
-    }
+        .show_default();
+    app.option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
+        .type_name("NAME|PATH")
+        .show_default();
+    app.option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
+        .type_name("KEY=VALUE")
+        .one_value_each();
+    app.option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
+        .range(1, 256);
+    app.option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
+        .range(1, 256);
+    app.option("--label", label, "A line of text to write into the picture");
+    app.flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
+    app.option("--output,-o", output, "The file to write").required();
+    if (const auto status = app.parse(argc, argv))
+        return base::stdout_is_written() ? *status : bad_usage;
     try {
         const std::string kind = std::filesystem::path(output).extension();
         if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
