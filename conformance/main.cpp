@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
+#include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
-#include "base/whole_file.hpp"
 #include "conformance/report.hpp"
 
 #include <fmt/format.h>
@@ -357,7 +357,7 @@ int main(int argc, char **argv) {
     app.option("--run", child_test, "").hidden(); // for this program itself: be the process of that test
     app.option("--scratch", settings.subject.scratch, "").hidden();
     if (const auto status = app.parse(argc, argv))
-        return base::stdout_is_written() ? *status : usage_or_suite_failed;
+        return base::flush_stdout() ? *status : usage_or_suite_failed;
     base::UniqueFd signals;
     try {
         if (only_list) {
@@ -380,7 +380,7 @@ int main(int argc, char **argv) {
         expect_files_of_their_own({json, junit, html}, settings.subject);
         signals = take_signals(); // not where a test is run, which is ended as any program
         settings.signals = signals.get();
-        base::WholeFile json_file(json, settings.signals), junit_file(junit, settings.signals),
+        base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
         const Report report = run(settings, pattern, quiet);
         print(as_summary(report), settings.signals);

@@ -48,8 +48,7 @@ public:
     CommandLine raw_subcommand(const std::string &name, const std::string &description);
 
     // `names`: "FILE" (positional) or "-v,--verbose".
-    template <class Value>
-    Option option(const std::string &names, Value &value, const std::string &description = "");
+    template <class Value> Option option(const std::string &names, Value &value, const std::string &description = "");
     Option flag(const std::string &names, bool &value, const std::string &description);
 
     // The exit status if the program ends here: 0 after --help or --version, 2 after invalid arguments.

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/commands.hpp"
 
+#include "base/atomic_file.hpp"
 #include "base/text.hpp"
-#include "base/whole_file.hpp"
+#include "camera/coordinates.hpp"
+#include "host/console.hpp"
+#include "host/pipeline.hpp"
 #include "host/probe.hpp"
 #include "run_config/schema.hpp"
 
@@ -180,7 +183,7 @@ bool write_whole(const fs::path &file, const char *key, Console &console, const 
     try {
         std::error_code ignored; // the file tells
         fs::create_directories(file.parent_path(), ignored);
-        base::WholeFile(file).write(text);
+        base::AtomicFile(file).write(text);
         return true;
     } catch (const std::runtime_error &error) {
         console.log(ARHOST_SEVERITY_ERROR, key, error.what());

@@ -3,9 +3,9 @@
 // What `arhost` can be told to do; each returns the exit status (docs/config.md lists them).
 #pragma once
 
-#include "camera/coordinates.hpp"
-#include "host/console.hpp"
+#include "supervise/launcher.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>

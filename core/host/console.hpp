@@ -5,13 +5,19 @@
 // a terminal that is halted (Ctrl-S) does not halt the video; what it has no room for is lost.
 #pragma once
 
-#include "host/pipeline.hpp"
+#include <arhost/arhost.h>
 
 #include <spdlog/async.h>
 
+#include <chrono>
+#include <cstdint>
 #include <memory>
+#include <string>
 
 namespace arhost::host {
+
+struct Progress;
+struct Statistics;
 
 class Console {
 public:

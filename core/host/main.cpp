@@ -6,6 +6,7 @@
 #include "base/write_all.hpp"
 #include "host/commands.hpp"
 #include "host/new_plugin.hpp"
+#include "yaml/yaml.hpp"
 
 #include <csignal>
 #include <cstdio>
@@ -34,8 +35,8 @@ int refuse(const std::string &why, int exit_status) {
 }
 
 int told(int status) {
-    return arhost::base::stdout_is_written() ? status
-                                             : refuse("standard output can't be written", arhost::host::run_failed);
+    return arhost::base::flush_stdout() ? status
+                                        : refuse("standard output can't be written", arhost::host::run_failed);
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <glob.h>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace arhost::sandbox {

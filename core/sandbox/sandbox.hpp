@@ -4,7 +4,7 @@
 // Layer lies on layer: what one can't do on a machine, another does in part. None needs rights or set-up.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include <array>
 #include <cstdint>

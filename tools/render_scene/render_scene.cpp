@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+#include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
-#include "base/whole_file.hpp"
 #include "base/write_all.hpp"
 #include "ray_tracer.hpp"
 #include "scene/loader.hpp"
@@ -152,12 +152,12 @@ int main(int argc, char **argv) {
     app.flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
     app.option("--output,-o", output, "The file to write").required();
     if (const auto status = app.parse(argc, argv))
-        return base::stdout_is_written() ? *status : bad_usage;
+        return base::flush_stdout() ? *status : bad_usage;
     try {
         const std::string kind = std::filesystem::path(output).extension();
         if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
             throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
-        base::WholeFile file(output);
+        base::AtomicFile file(output);
         const cv::Mat rgba =
             render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)), output);
         cv::Mat picture;
