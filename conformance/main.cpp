@@ -41,7 +41,7 @@ std::string wrong_with_name(const std::string &text) {
     return text.empty() ? "the name is empty" : "";
 }
 std::string wrong_with_variable(const std::string &text) {
-    return sandbox::is_variable(text)
+    return sandbox::is_variable_name(text)
                ? ""
                : "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with";
 }
@@ -125,9 +125,9 @@ struct PolicyOptions {
             policy.readable.push_back(file);
         for (const auto &[key, value] : subject.settings)
             if (key == "path" && !value.empty())
-                sandbox::let_read_files(policy, fs::absolute(value));
+                sandbox::allow_read_files(policy, fs::absolute(value));
             else if (!value.empty())
-                sandbox::let_read(policy, fs::absolute(value));
+                sandbox::allow_read(policy, fs::absolute(value));
         return policy;
     }
 };

@@ -15,12 +15,12 @@ bool are_digits(std::string_view text) {
     return text.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-// A name with one number in it: frame-%04d.png.
+// A file name with one number: frame-%04d.png.
 struct Pattern {
     std::string before, after;
-    std::size_t digits = 0; // at least; 0: no number has been met
+    std::size_t digits = 0; // minimum; 0: no number yet
 
-    bool names(std::string_view file) const {
+    bool matches(std::string_view file) const {
         if (file.size() < before.size() + digits + after.size() || !file.starts_with(before) ||
             !file.ends_with(after))
             return false;
@@ -29,9 +29,9 @@ struct Pattern {
     }
 };
 
-// None where it is none that a plugin takes: with no number, with two, or with a '%' that is neither that nor %%.
+// Nothing unless there is exactly one number and every other '%' is a '%%', as plugins require.
 std::optional<Pattern> pattern_of(const std::string &name) {
-    constexpr std::size_t longest_width = 4;
+    constexpr std::size_t max_width_digits = 4;
     Pattern pattern;
     for (std::size_t i = 0; i < name.size(); ++i) {
         std::string &part = pattern.digits ? pattern.after : pattern.before;
@@ -45,7 +45,7 @@ std::optional<Pattern> pattern_of(const std::string &name) {
             part += '%';
             continue;
         }
-        if (i == std::string::npos || name[i] != 'd' || pattern.digits || i - width > longest_width ||
+        if (i == std::string::npos || name[i] != 'd' || pattern.digits || i - width > max_width_digits ||
             (i > width && name[width] != '0'))
             return std::nullopt;
         std::from_chars(name.data() + width, name.data() + i, pattern.digits);
@@ -54,11 +54,11 @@ std::optional<Pattern> pattern_of(const std::string &name) {
     return pattern.digits ? std::optional(pattern) : std::nullopt;
 }
 
-// Whether two names can stand for one file. Patterns that differ by zeros alone (f0%d, f%d) can, as taken here.
-bool can_meet(const std::string &a, const std::string &b) {
+// Whether two names or patterns can produce the same file name. Conservative: true for f0%d and f%d.
+bool can_collide(const std::string &a, const std::string &b) {
     const auto p = pattern_of(a), q = pattern_of(b);
     if (!p || !q)
-        return p ? p->names(b) : q ? q->names(a) : a == b;
+        return p ? p->matches(b) : q ? q->matches(a) : a == b;
     const auto [begin, longer_begin] =
         std::minmax(p->before, q->before, [](auto &x, auto &y) { return x.size() < y.size(); });
     const auto [end, longer_end] =
@@ -71,16 +71,16 @@ bool can_meet(const std::string &a, const std::string &b) {
 std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
     if (const auto pattern = pattern_of(file_or_pattern.filename())) {
-        std::error_code ignored; // a folder that can't be listed: who is to use it says so
+        std::error_code ignored; // an unreadable folder is reported by its user
         for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
              entry.increment(ignored))
-            if (pattern->names(entry->path().filename().string()))
+            if (pattern->matches(entry->path().filename().string()))
                 files.push_back(base::identity_of(entry->path()));
     }
     return files;
 }
 
-// Name or pattern, behind links.
+// Name or pattern, with links resolved.
 fs::path written_by(const yaml::Node &output) {
     const fs::path path = output.output_path();
     return pattern_of(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
@@ -118,7 +118,7 @@ void FilesInUse::write(const yaml::Node &output) {
     const fs::path path = written_by(output);
     for (const yaml::Node &other : outputs_)
         if (const fs::path theirs = written_by(other);
-            path.parent_path() == theirs.parent_path() && can_meet(path.filename(), theirs.filename()))
+            path.parent_path() == theirs.parent_path() && can_collide(path.filename(), theirs.filename()))
             output.fail("another output, '" + other.text() + "', can write a file of the same name as '" +
                         output.text() + "'; choose another path");
     for (const FileIdentity &file : files)

@@ -132,7 +132,7 @@ const std::string &level() {
     return text;
 }
 bool has(const std::string &layer) {
-    return level().substr(0, level().find("LACKING")).find(layer) != std::string::npos;
+    return level().substr(0, level().find("MISSING")).find(layer) != std::string::npos;
 }
 
 // The plugin can try, has tried, and all of it was stopped; it goes on working.
@@ -436,7 +436,7 @@ TEST(Sandbox, WhatLiesInWaitForTheHostIsNotOpened) {
 TEST(Sandbox, StrictRunsOnlyWhereAllLayersAre) {
     HostileRun run("none", "", "sandbox: strict\n");
     const int status = run.attack();
-    if (has("LACKING") || level().find("LACKING") != std::string::npos) {
+    if (has("MISSING") || level().find("MISSING") != std::string::npos) {
         EXPECT_EQ(status, 2);
         EXPECT_THAT(run.output(), HasSubstr("'sandbox: strict' asks for all of it"));
     } else {
@@ -456,7 +456,7 @@ TEST(Sandbox, WhatAPluginNeedsMustBeAllowed) {
     ArhostRun run(yaml);
     EXPECT_EQ(run.run(), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:2"));
-    EXPECT_THAT(run.output(), HasSubstr("'source_v4l2' needs 'video', which the sandbox keeps from it: add 'allow: "
+    EXPECT_THAT(run.output(), HasSubstr("'source_v4l2' needs 'video', which the sandbox blocks: add 'allow: "
                                         "[video]' to source"));
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "source.allow=[video]"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
