@@ -371,6 +371,6 @@ TEST(FullDisk, BehindStandardOutputIsAnError) {
          {std::vector<std::string>{"schema"}, {"plugins"}, {"check", "run.yaml"}}) {
         run.start(arguments, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
         EXPECT_EQ(run.wait(), 1);
-        EXPECT_THAT(run.output(), HasSubstr("standard output can't be written"));
+        EXPECT_THAT(run.output(), HasSubstr("can't write to standard output"));
     }
 }

@@ -331,7 +331,7 @@ TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "rt_embre"}), "did you mean 'rt_embree'"},
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "sink_null"}), "is a sink, not a raytracer"},
         {replay("t.txt", {"--scene", "scene.yaml", "--width", "64"}), "--width and --height go together"},
-        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}), "tells its own image size"},
+        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}), "contains an image size"},
         {replay("plain.txt", {"--scene", "scene.yaml", "--width", "0", "--height", "48"}), "--width"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "x"}), "--output x: end the name in"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "x.xyz"}), "x.xyz"},

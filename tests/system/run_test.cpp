@@ -208,7 +208,7 @@ TEST(Run, ASecondCtrlCALittleLaterEndsItAtOnce) {
     ::kill(run.pid(), SIGINT);
     std::this_thread::sleep_for(std::chrono::milliseconds(3000));
     ASSERT_TRUE(run.running()) << "it was to wait for the output";
-    EXPECT_THAT(run.output(), HasSubstr("finished first; a second signal ends the run at once"));
+    EXPECT_THAT(run.output(), HasSubstr("files are finished; a second signal ends the run at once"));
     ::kill(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(std::chrono::seconds(5)), 130) << run.output();
 }
@@ -398,7 +398,7 @@ TEST(CommandLine, ListsTheDevicesOfEveryPluginThatTells) {
     };
     EXPECT_EQ(below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(below("lister_none"), what + "no device that it could run on\n");
+    EXPECT_EQ(below("lister_none"), what + "no device that it can run on\n");
     EXPECT_EQ(below("lister_fail"), what + "its devices can't be listed: the driver is of another age\n");
     EXPECT_EQ(below("lister_broken"),
               what + "its devices can't be listed: it told of a device that has no name, or is too short\n");
@@ -422,7 +422,7 @@ TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml: fine"));
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml: OK"));
     EXPECT_FALSE(run.exists("counted.txt"));
 }
 
