@@ -6,6 +6,7 @@
 #include "host/commands.hpp"
 #include "inprocess/thread_starter.hpp"
 #include "worker/session.hpp"
+#include "yaml/yaml.hpp"
 
 #include <csignal>
 #include <cstdio>

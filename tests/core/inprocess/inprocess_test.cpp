@@ -47,7 +47,7 @@ TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run_in_process(run), 2);
     EXPECT_THAT(run.read("output.txt"), HasSubstr("run.yaml:5:"));
-    EXPECT_THAT(run.read("output.txt"), HasSubstr("refused, as the option 'refuse' asks"));
+    EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'refuse' requests"));
 }
 
 // Threads can't be killed, but a worker that waits for its next frame ends by itself.
