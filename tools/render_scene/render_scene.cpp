@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+// render-scene: renders a scene file from a given viewpoint with any ray tracer plugin, without video, tracker or marker.
 #include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
@@ -54,7 +54,7 @@ arhost_camera camera_of(const View &view) {
     return camera;
 }
 
-// Straight alpha over a checkerboard of two greys, as painting programs show what is transparent.
+// Composites straight alpha over a grey checkerboard.
 cv::Mat over_checkerboard(const cv::Mat &rgba) {
     cv::Mat picture(rgba.size(), CV_8UC3);
     for (int y = 0; y < rgba.rows; ++y)
@@ -85,7 +85,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);
 }
 
-// The plugin's options: those that have a name of their own here, and above them what `--set` says.
+// Plugin options: those with their own command-line option, then those of `--set`.
 arhost::yaml::Node options_of(const std::optional<int> &samples, const std::optional<int> &light_samples,
                               const std::vector<std::string> &settings) {
     arhost::yaml::Node options = arhost::yaml::Node::parse("{}", "render-scene");
@@ -105,7 +105,7 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a full disk, and who reads no more, are errors
+    std::signal(SIGPIPE, SIG_IGN); // a full disk and a closed pipe are error values
     std::signal(SIGXFSZ, SIG_IGN);
     base::CommandLine app(
         "Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
@@ -116,40 +116,40 @@ int main(int argc, char **argv) {
     double time_s = 0;
     bool transparent = false;
     app.option("scene", scene, "The scene file").required();
-    app.option("--eye", view.eye, "Where the camera is").separator(',').type_name("X,Y,Z").show_default();
-    app.option("--look-at", view.look_at, "What is in the picture's middle")
+    app.option("--eye", view.eye, "Position of the camera").separator(',').type_name("X,Y,Z").show_default();
+    app.option("--look-at", view.look_at, "Point at the centre of the image")
         .separator(',')
         .type_name("X,Y,Z")
         .show_default();
-    app.option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
+    app.option("--up", view.up, "Up direction (default: the scene's)")
         .separator(',')
         .type_name("X,Y,Z");
-    app.option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
+    app.option("--fov", view.field_of_view, "Vertical field of view, in degrees")
         .range(1.0, 170.0)
         .show_default();
-    app.option("--size", view.size, "Of the picture, px")
+    app.option("--size", view.size, "Image size, in px")
         .separator('x')
         .type_name("WIDTHxHEIGHT")
         .range(1, 16384)
         .default_text(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
-    app.option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
+    app.option("--time", time_s, "Time in s; animations repeat")
         .check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
             return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
         })
         .show_default();
-    app.option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
+    app.option("--raytracer", ray_tracer, "Ray tracer plugin, as in a configuration")
         .type_name("NAME|PATH")
         .show_default();
-    app.option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
+    app.option("--set", settings, "Plugin option (repeatable); arhost plugins --options lists them")
         .type_name("KEY=VALUE")
         .one_value_each();
-    app.option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
+    app.option("--samples", samples, "Plugin option 'samples' per pixel (default 16, if supported)")
         .range(1, 256);
-    app.option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
+    app.option("--light-samples", light_samples, "Plugin option 'light_samples': shadow rays per sample")
         .range(1, 256);
-    app.option("--label", label, "A line of text to write into the picture");
-    app.flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
+    app.option("--label", label, "Text to draw into the image");
+    app.flag("--transparent", transparent, "Keep alpha (PNG) instead of the checkerboard");
     app.option("--output,-o", output, "The file to write").required();
     if (const auto status = app.parse(argc, argv))
         return base::flush_stdout() ? *status : bad_usage;
