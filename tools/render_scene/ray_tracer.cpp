@@ -76,7 +76,8 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
         requested.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
-    const std::vector<ipc::OptionValue> values = run_config::resolve_options(plugin, options, std::nullopt, requested);
+    const std::vector<ipc::OptionValue> values =
+        run_config::resolve_options(plugin, options, std::nullopt, requested);
     std::vector<arhost_option> passed;
     passed.reserve(values.size());
     for (const ipc::OptionValue &v : values)

@@ -13,8 +13,8 @@
 
 class RayTracer {
 public:
-    // `name`: plugin name or path, as in a configuration. `options`: map of plugin options; missing ones get the plugin's
-    // default, except `samples`: 16 if supported. Throws std::runtime_error.
+    // `name`: plugin name or path, as in a configuration. `options`: map of plugin options; missing ones get the
+    // plugin's default, except `samples`: 16 if supported. Throws std::runtime_error.
     RayTracer(const std::string &name, arhost::yaml::Node options);
     ~RayTracer() { plugin_->destroy(instance_); }
     RayTracer(const RayTracer &) = delete;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// render-scene: renders a scene file from a given viewpoint with any ray tracer plugin, without video, tracker or marker.
+// render-scene: renders a scene file from a given viewpoint with any ray tracer plugin, without video, tracker or
+// marker.
 #include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
@@ -121,12 +122,8 @@ int main(int argc, char **argv) {
         .separator(',')
         .type_name("X,Y,Z")
         .show_default();
-    app.option("--up", view.up, "Up direction (default: the scene's)")
-        .separator(',')
-        .type_name("X,Y,Z");
-    app.option("--fov", view.field_of_view, "Vertical field of view, in degrees")
-        .range(1.0, 170.0)
-        .show_default();
+    app.option("--up", view.up, "Up direction (default: the scene's)").separator(',').type_name("X,Y,Z");
+    app.option("--fov", view.field_of_view, "Vertical field of view, in degrees").range(1.0, 170.0).show_default();
     app.option("--size", view.size, "Image size, in px")
         .separator('x')
         .type_name("WIDTHxHEIGHT")
@@ -144,8 +141,7 @@ int main(int argc, char **argv) {
     app.option("--set", settings, "Plugin option (repeatable); arhost plugins --options lists them")
         .type_name("KEY=VALUE")
         .one_value_each();
-    app.option("--samples", samples, "Plugin option 'samples' per pixel (default 16, if supported)")
-        .range(1, 256);
+    app.option("--samples", samples, "Plugin option 'samples' per pixel (default 16, if supported)").range(1, 256);
     app.option("--light-samples", light_samples, "Plugin option 'light_samples': shadow rays per sample")
         .range(1, 256);
     app.option("--label", label, "Text to draw into the image");
