@@ -14,8 +14,7 @@ Layer drop_capabilities() {
     const unsigned kept = CAP_DAC_OVERRIDE, mask = ::geteuid() == 0 ? 1u << kept : 0;
     for (unsigned capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability)
         if (capability != kept || !mask)
-            ::prctl(PR_CAPBSET_DROP, capability, 0, 0,
-                    0); // may fail without CAP_SETPCAP; capset below drops the rest
+            ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail; capset below drops the rest
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     __user_cap_data_struct data[2] = {};
     if (::syscall(SYS_capget, &header, data) != 0)

@@ -43,8 +43,7 @@ Layer set_limits(const Policy &policy) {
     if (has_memory_limit(policy))
         lower(layer, "memory", RLIMIT_DATA, policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory());
     if (policy.writable.empty() && !may_share_memory(policy))
-        lower(layer, "files", RLIMIT_FSIZE,
-              0); // even without other layers, it cannot fill a file system such as /tmp
+        lower(layer, "files", RLIMIT_FSIZE, 0); // protects /tmp even without other layers
     // Half of the usual 1024: descriptors in unread messages count against one limit for all processes of a user, and
     // a plugin must not exhaust it for the host and the scene loader.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);

@@ -94,7 +94,7 @@ void deny_reaching_others(Filter &filter, bool has_children) {
     if (!has_children) {
         for (const char *call : {"kill", "tgkill", "rt_sigqueueinfo", "rt_tgsigqueueinfo"})
             filter.deny(call, {differs(0, self)});
-        for (const char *call : {"setpgid", "setsid"}) // joining another group would expose it to group signals
+        for (const char *call : {"setpgid", "setsid"}) // group signals must reach this worker only
             filter.deny(call);
     } else {
         filter.deny("kill", {equals(0, 0xffffffff)}); // -1: all processes. Landlock restricts single ones

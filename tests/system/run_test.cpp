@@ -336,8 +336,7 @@ TEST(Run, RedrawsProgressOnATerminal) {
     ASSERT_EQ(::unlockpt(terminal), 0);
     const std::string name = ::ptsname(terminal);
     const int kept_open = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // otherwise an early read may fail
-    run.start({"--config", "run.yaml", "--set",
-               "outputs[0].path=out/counted.txt"}, // avoids the warning about writable folders
+    run.start({"--config", "run.yaml", "--set", "outputs[0].path=out/counted.txt"}, // avoids a warning
               [&] { ::dup2(::open(name.c_str(), O_RDWR | O_NOCTTY), STDERR_FILENO); });
     ::fcntl(terminal, F_SETFL, O_NONBLOCK);
     std::string shown;

@@ -59,8 +59,7 @@ TEST_F(WriteAll, IsInterruptedByASignalWhileAPipeIsFull) {
     int waiting = 0; // bytes in the pipe
     while (waiting < 4096 * 16)
         ASSERT_EQ(::ioctl(to_read.get(), FIONREAD, &waiting), 0);
-    std::this_thread::sleep_for(
-        std::chrono::milliseconds(50)); // usually enough for it to block; the signal ends it either way
+    std::this_thread::sleep_for(std::chrono::milliseconds(50)); // usually enough for the write to block
     ::kill(::getpid(), SIGUSR1);
 }
 

@@ -92,7 +92,7 @@ TEST_F(Probe, TakesNoMoreThanAMessageHolds) {
 }
 
 TEST_F(Probe, TellsWhyDevicesCantBeListed) {
-    EXPECT_EQ(reason("lister_fail"), "the driver is of another age");
+    EXPECT_EQ(reason("lister_fail"), "the driver is too old");
     EXPECT_EQ(reason("lister_broken"), "it told of a device that has no name, or is too short");
     EXPECT_THAT(reason("lister_crash"), testing::ContainsRegex("killed by signal 11 .* while it listed its devices"));
     EXPECT_THAT(reason("lister_hang", std::chrono::seconds(1)),
