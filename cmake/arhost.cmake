@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# How every target of the project is compiled, and the two kinds of target that folders add.
+# Compile options for all targets, and functions that add libraries, plugins and tests.
 
-# One cache for all clones: paths within this one are seen as relative to it.
+# All clones share one cache: paths are relative to the clone.
 find_program(CCACHE ccache)
 if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
@@ -14,27 +14,26 @@ find_package(Threads REQUIRED)
 
 add_compile_options(-Wall -Wextra -Wpedantic -Werror)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # GCC 12 sees overlapping copies in std::string's operator+ where there are none (its bug 105651).
+  # GCC 12 falsely reports overlapping copies in std::string's operator+ (GCC bug 105651).
   add_compile_options(-Wno-restrict)
 endif()
-# The same source gives the same pixels and poses on every machine and at every call site.
+# Reproducible pixels and poses on every machine and at every call site.
 add_compile_options(-ffp-contract=off)
 if(ARHOST_SANITIZE)
   add_compile_options(-fsanitize=${ARHOST_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
 endif()
-# For tests and the suite: without the checks of each pointer in their own expressions, a third of the time that GCC
-# takes for them.
+# For tests and the conformance suite: omits pointer checks, which reduces their compile time to a third.
 set(ARHOST_UNCHECKED_POINTERS)
 if(ARHOST_SANITIZE MATCHES undefined)
   set(ARHOST_UNCHECKED_POINTERS -fno-sanitize=null,alignment,vptr,object-size)
 endif()
 
-# As in an installed arhost, so that programs find each other in the same way.
+# Same layout as an installed arhost, so that programs find each other.
 set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost/plugins)
 add_custom_target(plugins COMMENT "All plugins")
 
-# arhost_add_library(name SOURCES … [LIBRARIES …]): a room of core/, included as <room/header.h>.
+# arhost_add_library(name SOURCES … [LIBRARIES …]): a module of core/, included as "module/header.hpp".
 function(arhost_add_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
@@ -42,12 +41,12 @@ function(arhost_add_library name)
   target_link_libraries(${name} PUBLIC ${ARG_LIBRARIES})
 endfunction()
 
-# arhost_add_plugin(name SOURCES … [LIBRARIES …]): the SDK's own way to build a plugin. It sees the C ABI and the
-# shading headers of core/, and nothing else of it.
+# arhost_add_plugin(name SOURCES … [LIBRARIES …]): the same function as in the SDK. A plugin sees only the C ABI and
+# the shading headers of core/.
 include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…]): a GoogleTest
-# program, each of its tests a test of ctest, run in a scratch folder of its own.
+# program; each of its tests is a CTest test.
 function(arhost_add_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -62,11 +61,10 @@ function(arhost_add_test name)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
   if(ARHOST_SANITIZE AND "slow" IN_LIST ARG_LABELS)
-    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run there, so not even compiled
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run under sanitizers
     return()
   endif()
-  # LeakSanitizer may crash on its way through the thread-locals of libraries that were opened late, as the module for
-  # images opens them: it goes without them.
+  # LeakSanitizer may crash while scanning thread-locals of libraries loaded with dlopen, such as the image module's.
   set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT}

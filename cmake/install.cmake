@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` puts where, and the Debian package. Everything is found relative to the programs, so the
-# tree can be moved; `lib` has no architecture in its name for the same reason.
+# Install rules and the Debian package. All files are located relative to the programs, so the installation can be moved;
+# therefore `lib` has no architecture suffix.
 install(TARGETS arhost arhost-inprocess EXPORT arhost RUNTIME DESTINATION bin)
 install(TARGETS arhost-conform arhost-launcher arhost-worker render-scene RUNTIME DESTINATION bin)
 set_target_properties(arhost-inprocess PROPERTIES EXPORT_NAME inprocess)
 install(TARGETS arhost-images LIBRARY DESTINATION lib/arhost)
-# The plugins install themselves: arhost_add_plugin.
+# Plugins: see arhost_add_plugin.
 
 # The SDK
 install(DIRECTORY core/abi/include/ core/shading/include/ DESTINATION include)
@@ -15,7 +15,7 @@ include(CMakePackageConfigHelpers)
 set(plugin_directory lib/arhost/plugins)
 configure_package_config_file(cmake/arhostConfig.cmake.in arhostConfig.cmake INSTALL_DESTINATION lib/cmake/arhost
                               PATH_VARS plugin_directory)
-# Before 1.0 every minor version may break what was.
+# Before 1.0, minor versions may be incompatible.
 write_basic_package_version_file(arhostConfigVersion.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 configure_file(cmake/arhost.pc.in arhost.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/arhostConfig.cmake ${PROJECT_BINARY_DIR}/arhostConfigVersion.cmake
@@ -23,7 +23,7 @@ install(FILES ${PROJECT_BINARY_DIR}/arhostConfig.cmake ${PROJECT_BINARY_DIR}/arh
 install(FILES ${PROJECT_BINARY_DIR}/arhost.pc DESTINATION lib/pkgconfig)
 install(DIRECTORY sdk/ DESTINATION share/arhost PATTERN target EXCLUDE PATTERN Cargo.lock EXCLUDE)
 
-# What it is used with
+# Examples and documentation
 install(DIRECTORY config DESTINATION share/arhost)
 install(FILES docs/arhost.schema.json DESTINATION share/arhost)
 file(GLOB documents CONFIGURE_DEPENDS docs/*.md)

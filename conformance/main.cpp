@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
+#include "base/atomic_file.hpp"
+#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
-#include "base/usage.hpp"
-#include "base/whole_file.hpp"
 #include "conformance/report.hpp"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -37,12 +36,12 @@ template <class Number> bool parse_number(std::string_view text, Number &number)
     return error == std::errc() && end == text.data() + text.size();
 }
 
-// For CLI::Option::check: what is wrong with a text, or "".
+// For base::Option::check: what is wrong with a text, or "".
 std::string wrong_with_name(const std::string &text) {
     return text.empty() ? "the name is empty" : "";
 }
 std::string wrong_with_variable(const std::string &text) {
-    return sandbox::is_variable(text)
+    return sandbox::is_variable_name(text)
                ? ""
                : "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with";
 }
@@ -84,24 +83,24 @@ struct PolicyOptions {
     std::vector<std::string> allow, reads, environment;
     std::string sandbox{sandbox::modes.front()};
 
-    void add_to(CLI::App &app) {
+    void add_to(base::CommandLine &app) {
         const auto add = [&](const char *name, std::vector<std::string> &values, const char *what) {
-            return app.add_option(name, values, what)->allow_extra_args(false);
+            return app.option(name, values, what).one_value_each();
         };
         const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
         add("--allow", allow, "What the sandbox gives it, as a configuration's 'allow' (docs/security.md)")
-            ->type_name("WHAT")
-            ->delimiter(',')
-            ->check(CLI::IsMember(known));
+            .type_name("WHAT")
+            .separator(',')
+            .one_of(known);
         add("--reads", reads, "A further file or folder that it may read (again for more)")
-            ->type_name("PATH")
-            ->check(CLI::ExistingPath);
+            .type_name("PATH")
+            .existing_path();
         add("--environment", environment, "A further variable that it gets (again for more)")
-            ->type_name("NAME")
-            ->check(wrong_with_variable);
-        app.add_option("--sandbox", sandbox, "permissive, strict or none, as the configuration's 'sandbox'")
-            ->type_name("MODE")
-            ->check(CLI::IsMember(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end())));
+            .type_name("NAME")
+            .check(wrong_with_variable);
+        app.option("--sandbox", sandbox, "permissive, strict or none, as the configuration's 'sandbox'")
+            .type_name("MODE")
+            .one_of(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end()));
     }
     std::vector<std::string> texts() const {
         std::vector<std::string> all;
@@ -126,9 +125,9 @@ struct PolicyOptions {
             policy.readable.push_back(file);
         for (const auto &[key, value] : subject.settings)
             if (key == "path" && !value.empty())
-                sandbox::let_read_files(policy, fs::absolute(value));
+                sandbox::allow_read_files(policy, fs::absolute(value));
             else if (!value.empty())
-                sandbox::let_read(policy, fs::absolute(value));
+                sandbox::allow_read(policy, fs::absolute(value));
         return policy;
     }
 };
@@ -315,54 +314,50 @@ int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // as where a plugin runs: a full disk, and who reads no more, are errors
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGCHLD, SIG_DFL); // whoever started this may ignore it, and then no child can be waited for
-    CLI::App app("Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
-                 "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell;\n"
-                 "128 and a signal's number: interrupted.",
-                 "arhost conform");
-    app.get_formatter()->column_width(34);
-    app.failure_message(base::usage_failure);
+    base::CommandLine app(
+        "Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
+        "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell;\n"
+        "128 and a signal's number: interrupted.",
+        "arhost conform");
     RunSettings settings;
     std::vector<std::string> option_texts, print_texts;
     std::string plugin, pattern = "*", json, junit, html, child_test;
     std::string reference = default_reference();
     bool only_list = false, quiet = false;
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
-    app.add_option("PLUGIN", plugin, "The plugin's shared object");
-    app.add_flag("--list", only_list, "Print the tests' names and what each promises");
-    app.add_option("--only", pattern, "Only tests whose name matches, as 'raytracer.*'")->type_name("PATTERN");
-    app.add_option("--set", option_texts, "An option of the plugin (again for more)")
-        ->type_name("KEY=VALUE")
-        ->allow_extra_args(false);
-    app.add_option("--print", print_texts,
-                   "The PNG of a marker that the tracker finds (again for more), instead of tag36h11's")
-        ->type_name("ID=FILE")
-        ->allow_extra_args(false);
+    app.option("PLUGIN", plugin, "The plugin's shared object");
+    app.flag("--list", only_list, "Print the tests' names and what each promises");
+    app.option("--only", pattern, "Only tests whose name matches, as 'raytracer.*'").type_name("PATTERN");
+    app.option("--set", option_texts, "An option of the plugin (again for more)")
+        .type_name("KEY=VALUE")
+        .one_value_each();
+    app.option("--print", print_texts,
+               "The PNG of a marker that the tracker finds (again for more), instead of tag36h11's")
+        .type_name("ID=FILE")
+        .one_value_each();
     PolicyOptions policy_options;
     policy_options.add_to(app);
-    app.add_option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")
-        ->type_name("N")
-        ->check(wrong_with_seed);
-    app.add_option("--jobs", settings.jobs, "Tests at a time")->type_name("N")->check(CLI::Range(1, 256));
-    app.add_option("--timeout-factor", settings.subject.timeout_factor, "Times each deadline, on slow machines (1)")
-        ->type_name("FACTOR")
-        ->check(invalid_timeout_factor);
-    app.add_option("--reference", reference, "The ray tracer that images are compared with")
-        ->type_name("FILE")
-        ->check(wrong_with_name);
-    app.add_flag("-q,--quiet", quiet, "Print neither what passes nor what is skipped");
+    app.option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")
+        .type_name("N")
+        .check(wrong_with_seed);
+    app.option("--jobs", settings.jobs, "Tests at a time").type_name("N").range(1, 256);
+    app.option("--timeout-factor", settings.subject.timeout_factor, "Times each deadline, on slow machines (1)")
+        .type_name("FACTOR")
+        .check(invalid_timeout_factor);
+    app.option("--reference", reference, "The ray tracer that images are compared with")
+        .type_name("FILE")
+        .check(wrong_with_name);
+    app.flag("-q,--quiet", quiet, "Print neither what passes nor what is skipped");
     const auto add_file = [&](const char *name, std::string &file, const char *what) {
-        app.add_option(name, file, what)->type_name("FILE")->check(wrong_with_name);
+        app.option(name, file, what).type_name("FILE").check(wrong_with_name);
     };
     add_file("--json", json, "Write the results as JSON");
     add_file("--junit", junit, "Write them as JUnit XML");
     add_file("--html", html, "Write them as one page, with images");
-    app.add_option("--run", child_test, "")->group(""); // for this program itself: be the process of that test
-    app.add_option("--scratch", settings.subject.scratch, "")->group("");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 && base::stdout_is_written() ? 0 : usage_or_suite_failed;
-    }
+    app.option("--run", child_test, "").hidden(); // for this program itself: be the process of that test
+    app.option("--scratch", settings.subject.scratch, "").hidden();
+    if (const auto status = app.parse(argc, argv))
+        return base::flush_stdout() ? *status : usage_or_suite_failed;
     base::UniqueFd signals;
     try {
         if (only_list) {
@@ -385,7 +380,7 @@ int main(int argc, char **argv) {
         expect_files_of_their_own({json, junit, html}, settings.subject);
         signals = take_signals(); // not where a test is run, which is ended as any program
         settings.signals = signals.get();
-        base::WholeFile json_file(json, settings.signals), junit_file(junit, settings.signals),
+        base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
         const Report report = run(settings, pattern, quiet);
         print(as_summary(report), settings.signals);

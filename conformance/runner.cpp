@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/runner.hpp"
 
+#include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "base/text.hpp"
 #include "ipc/memory.hpp"
@@ -18,8 +19,6 @@
 #include <poll.h>
 #include <set>
 #include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <utility>
@@ -96,37 +95,15 @@ struct Pipe {
 };
 
 // In the child, after fork.
-[[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
-    ::setpgid(0, 0);
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) // it died before the line above
-        ::_exit(127);
-    sigset_t none;
-    ::sigemptyset(&none);
-    ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    const rlimit no_core{0, 0};
-    ::setrlimit(RLIMIT_CORE, &no_core);
-    // First out of the way of 0 to 4, then into place; dup2 clears close-on-exec. Nothing else of whoever started
-    // this comes along: no terminal, and no descriptor that a plugin could write to.
-    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    const std::pair<int, int> places[] = {{nothing, STDIN_FILENO},
-                                          {output, STDOUT_FILENO},
-                                          {output, STDERR_FILENO},
-                                          {pipe, result_fd},
-                                          {page, call_page_fd}};
-    std::array<int, std::size(places)> high;
-    std::ranges::transform(places, high.begin(),
-                           [](auto place) { return ::fcntl(place.first, F_DUPFD_CLOEXEC, 10); });
-    for (std::size_t i = 0; i < high.size(); ++i)
-        if (high[i] < 0 || ::dup2(high[i], places[i].second) < 0)
-            ::_exit(127);
-    ::syscall(SYS_close_range, call_page_fd + 1u, ~0u, 0u);
+[[noreturn]] void exec_test(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
+    const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    static_assert(result_fd == 3 && call_page_fd == 4);
     std::vector<char *> argv;
     argv.reserve(arguments.size() + 1);
     for (const std::string &argument : arguments)
         argv.push_back(const_cast<char *>(argument.c_str()));
     argv.push_back(nullptr);
-    ::execv("/proc/self/exe", argv.data());
+    base::exec_child("/proc/self/exe", argv.data(), std::array{null, output, output, pipe, page}, parent);
     ::_exit(127);
 }
 
@@ -189,7 +166,7 @@ public:
         const pid_t parent = ::getpid();
         pid_ = ::fork();
         if (pid_ == 0)
-            become(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
+            exec_test(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
         if (pid_ < 0)
             base::throw_errno("fork");
         result_.to_write.reset();

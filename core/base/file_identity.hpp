@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which file a path leads to, as workers tell it to the host, which looks at no path that a worker names.
+// Identity of a file as workers report it: the host does not access paths that a worker names.
 #pragma once
 
 #include <filesystem>
@@ -8,15 +8,15 @@
 
 namespace arhost::base {
 
-// Two paths lead to one file where either is the same.
+// Two paths name the same file if either member is equal.
 struct FileIdentity {
-    std::string path; // real
-    std::string node; // "device:inode"; the path again where no file is there
+    std::string path; // real path
+    std::string node; // "device:inode", or the path if the file does not exist
 };
 
 FileIdentity identity_of(const std::filesystem::path &file);
 
-// The same for all paths to a file, links included; absolute.
+// Absolute and free of links, dangling ones included.
 std::filesystem::path real_path(const std::filesystem::path &file);
 
 } // namespace arhost::base

@@ -17,11 +17,11 @@ std::set<pid_t> children() {
 int kill_orphans(const std::set<pid_t> &kept) {
     int count = 0;
     for (const pid_t child : children()) {
-        siginfo_t info{}; // a number of another pid namespace's /proc is no child of ours
+        siginfo_t info{}; // a pid from another namespace's /proc is not our child
         if (!kept.contains(child) &&
             ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0) {
             ::kill(child, SIGKILL);
-            ::waitpid(child, nullptr, WNOHANG); // or with a later call
+            ::waitpid(child, nullptr, WNOHANG); // or in a later call
             ++count;
         }
     }

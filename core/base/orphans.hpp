@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Processes that a plugin has started and left behind.
+// Processes that a plugin started and that outlived its worker.
 #pragma once
 
 #include <set>
@@ -8,14 +8,13 @@
 
 namespace arhost::base {
 
-// Of this thread.
-std::set<pid_t> children();
+std::set<pid_t> children(); // of this thread
 
-// Kills every child of this thread that is not to be kept, and tells how many there were. To a subreaper
-// (PR_SET_CHILD_SUBREAPER) comes what a worker leaves behind, and what that has left behind with the next call.
+// Kills every child of this thread except `kept`; returns their number. A subreaper (PR_SET_CHILD_SUBREAPER) inherits
+// a worker's orphans; grandchildren become its children only when their parent is dead, so with a later call.
 int kill_orphans(const std::set<pid_t> &kept);
 
-// Until there are none, or for half a second: one may hang in the kernel.
+// Repeats until there are none, for at most half a second: a process may hang in the kernel.
 void end_orphans(const std::set<pid_t> &kept);
 
 } // namespace arhost::base

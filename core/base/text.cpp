@@ -6,8 +6,8 @@
 namespace arhost::base {
 namespace {
 
-// `c`: one character in UTF-8, whose order is that of its bytes.
-bool is_harmful(std::string_view c) {
+// `c`: one UTF-8 character; bytewise order is code point order.
+bool is_unsafe(std::string_view c) {
     const auto within = [&](std::string_view first, std::string_view last) { return first <= c && c <= last; };
     return c < " " || within("\x7f", "\u009f") || c == "\u061c" || within("\u200e", "\u200f") ||
            within("\u2028", "\u202e") || within("\u2066", "\u2069") || within("\ufffe", "\uffff");
@@ -31,7 +31,7 @@ std::string printable(std::string_view text, std::size_t max_size) {
         const auto first = static_cast<unsigned char>(valid[at]);
         length = first < 0x80 ? 1 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
         const std::string_view c = std::string_view(valid).substr(at, length);
-        const std::string_view shown = is_harmful(c) ? " " : c;
+        const std::string_view shown = is_unsafe(c) ? " " : c;
         if (line.size() + shown.size() > max_size)
             return line + "…";
         line += shown;

@@ -15,8 +15,8 @@
 namespace arhost::base {
 
 void write_all(int fd, std::string_view bytes, int signals) {
-    // A terminal that poll calls ready may take less than is written, and then waits. Opened anew it need not, and
-    // for others who have it open nothing changes.
+    // A write to a terminal may block although poll reports it ready. Reopened, it can be non-blocking without
+    // changing the flags of other processes that share the descriptor.
     const UniqueFd terminal(::isatty(fd) ? ::open(("/proc/self/fd/" + std::to_string(fd)).c_str(),
                                                   O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)
                                          : -1);
@@ -27,10 +27,10 @@ void write_all(int fd, std::string_view bytes, int signals) {
         if (::poll(fds, 2, -1) < 0 && errno != EINTR)
             throw_errno("poll");
         if (const int signal = take_signal(signals))
-            throw Interrupted(signal, "interrupted while it wrote");
+            throw Interrupted(signal, "interrupted while writing");
         if (fds[0].revents == 0)
             continue;
-        // No more than what a pipe that poll calls ready takes at once.
+        // A pipe that poll reports ready takes PIPE_BUF bytes without blocking.
         const ssize_t count = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
         if (count < 0 && errno != EINTR && errno != EAGAIN)
             throw_errno("write");
@@ -38,7 +38,7 @@ void write_all(int fd, std::string_view bytes, int signals) {
     }
 }
 
-bool stdout_is_written() {
+bool flush_stdout() {
     return std::fflush(stdout) == 0 && !std::ferror(stdout);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writing to where it can be held up for ever: a pipe that nobody reads, a terminal that is halted.
+// Writes that may block forever (an unread pipe, a stopped terminal) and can be interrupted.
 #pragma once
 
 #include <stdexcept>
@@ -9,19 +9,19 @@
 
 namespace arhost::base {
 
-// A signal has come.
+// A signal arrived.
 struct Interrupted : std::runtime_error {
     Interrupted(int signal, const std::string &what) : std::runtime_error(what), signal(signal) {}
     int signal;
 };
 
-// `signals`: a signalfd, what comes there ends it; -1: nothing does. Throws Interrupted, and std::system_error.
+// `signals`: a signalfd that interrupts the write; -1: none. Throws Interrupted or std::system_error.
 void write_all(int fd, std::string_view bytes, int signals = -1);
 
-// Of what went there by stdio and streams: a full disk is told no sooner. True: all of it was taken.
-bool stdout_is_written();
+// False if stdio output to stdout was lost, for example because the disk is full.
+bool flush_stdout();
 
-// Takes what has come there, and does not wait; 0: nothing has.
+// The next pending signal, or 0; does not wait.
 int take_signal(int signals);
 
 } // namespace arhost::base

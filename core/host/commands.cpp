@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/commands.hpp"
 
+#include "base/atomic_file.hpp"
 #include "base/text.hpp"
-#include "base/whole_file.hpp"
+#include "camera/coordinates.hpp"
+#include "host/console.hpp"
+#include "host/pipeline.hpp"
 #include "host/probe.hpp"
 #include "run_config/schema.hpp"
 
@@ -31,11 +34,11 @@ supervise::Context make_context(ipc::Reactor &reactor, supervise::Starter &launc
             }};
 }
 
-// The options of the dissertation's figure 7 stand above the file's `coordinates:`.
+// The options of the dissertation's figure 7; they override the file's `coordinates:`.
 std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
-    const auto given = [](const double(&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
-    if (!arguments.ar && !arguments.rt && !arguments.g1 && !arguments.g2 && !given(arguments.axis1) &&
-        !given(arguments.axis2))
+    const auto is_set = [](const double(&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
+    if (!arguments.ar && !arguments.rt && !arguments.g1 && !arguments.g2 && !is_set(arguments.axis1) &&
+        !is_set(arguments.axis2))
         return std::nullopt;
     camera::Coordinates coordinates;
     coordinates.ar = arguments.ar.value_or(coordinates.ar);
@@ -45,9 +48,9 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
         coordinates.rotations.push_back({*arguments.g1, axis(arguments.axis1)});
     if (arguments.g2)
         coordinates.rotations.push_back({*arguments.g2, axis(arguments.axis2)});
-    if (!arguments.g1 && given(arguments.axis1))
+    if (!arguments.g1 && is_set(arguments.axis1))
         throw yaml::Error("--x1, --y1 and --z1 need --g1, the angle in degrees");
-    if (!arguments.g2 && given(arguments.axis2))
+    if (!arguments.g2 && is_set(arguments.axis2))
         throw yaml::Error("--x2, --y2 and --z2 need --g2, the angle in degrees");
     if (arguments.g2 && !arguments.g1)
         throw yaml::Error("--g2 needs --g1: the first rotation comes first");
@@ -94,7 +97,7 @@ run_config::Configuration read_configuration(const Arguments &arguments) {
     return parse_configuration(root, arguments);
 }
 
-// The sink that writes files of such a name.
+// The sink for a file name extension.
 std::string sink_for(const fs::path &file) {
     const std::string extension = file.extension().string();
     for (const char *picture : {".png", ".jpg", ".jpeg"})
@@ -104,25 +107,26 @@ std::string sink_for(const fs::path &file) {
         return "sink_poses";
     if (extension.empty())
         throw yaml::Error("--output " + file.string() +
-                          ": end the name in .mp4 or .mkv for a film, .png or .jpg for images, .jsonl for poses");
-    return "sink_video"; // which knows what it can write
+                          ": add an extension: .mp4 or .mkv for video, .png or .jpg for images, .jsonl for poses");
+    return "sink_video"; // rejects extensions that it does not support
 }
 
-// What is replayed is the trajectory in `arguments.file`'s chain or in the simplest one. That file's
-// outputs are not touched: they may be what the recorded run has left.
+// The trajectory in the pipeline of `arguments.file`, or in a default pipeline. The file's outputs are ignored, as
+// they may be those of the recorded run.
 run_config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
-    constexpr const char *simplest = "version: 1\nraytracer: {plugin: rt_embree}\n";
-    constexpr const char *simplest_chain =
+    constexpr const char *default_raytracer = "version: 1\nraytracer: {plugin: rt_embree}\n";
+    constexpr const char *default_pipeline =
         "version: 1\n"
         "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
         "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
         "80}]}\n"
         "raytracer: {plugin: rt_embree}\n";
-    yaml::Node root = !arguments.file.empty()
-                          ? yaml::Node::load(arguments.file)
-                          : yaml::Node::parse(replay.with_pipeline ? simplest_chain : simplest, "arhost replay");
+    yaml::Node root =
+        !arguments.file.empty()
+            ? yaml::Node::load(arguments.file)
+            : yaml::Node::parse(replay.with_pipeline ? default_pipeline : default_raytracer, "arhost replay");
     if (arguments.file.empty() && replay.scene.empty())
-        throw yaml::Error("--scene is missing: the scene to trace, as in --scene config/scenes/optix-cs.yaml");
+        throw yaml::Error("--scene is missing: the scene to render, as in --scene config/scenes/optix-cs.yaml");
     root.override_text("trajectory", replay.trajectory, "--trajectory");
     root.override_value("outputs", "[]", "arhost replay");
     if (!replay.scene.empty())
@@ -130,7 +134,7 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
     if (!replay.raytracer.empty())
         root.override_text("raytracer.plugin", replay.raytracer, "--raytracer");
     if (replay.width.has_value() != replay.height.has_value())
-        throw yaml::Error("--width and --height go together; give both or none");
+        throw yaml::Error("--width and --height must be given together");
     if (replay.width)
         root.override_value("camera",
                             "{width: " + std::to_string(*replay.width) +
@@ -148,7 +152,7 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
         root.override_text("timeline", replay.timeline, "--timeline");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
-        throw yaml::Error("--width, --height: " + replay.trajectory + " tells its own image size; leave them out");
+        throw yaml::Error("--width, --height: " + replay.trajectory + " contains an image size; remove them");
     if (replay.with_pipeline && !(configuration.source && configuration.tracker))
         throw yaml::Error("--with-pipeline needs a 'source' and a 'tracker'; " + arguments.file + " lacks them");
     if (!replay.with_pipeline) {
@@ -176,11 +180,11 @@ double cpu_seconds_of_host() {
     return supervise::cpu_seconds(usage);
 }
 
-bool write_whole(const fs::path &file, const char *key, Console &console, const std::string &text) {
+bool write_file(const fs::path &file, const char *key, Console &console, const std::string &text) {
     try {
-        std::error_code ignored; // the file tells
+        std::error_code ignored; // reported by AtomicFile
         fs::create_directories(file.parent_path(), ignored);
-        base::WholeFile(file).write(text);
+        base::AtomicFile(file).write(text);
         return true;
     } catch (const std::runtime_error &error) {
         console.log(ARHOST_SEVERITY_ERROR, key, error.what());
@@ -208,7 +212,7 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     ::sigaddset(&signals, SIGINT);
     ::sigaddset(&signals, SIGTERM);
     ::sigaddset(&signals, SIGHUP);
-    ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread, which must not take them
+    ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread starts, which must not receive them
     const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
     Console console(verbose);
@@ -223,47 +227,47 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     const auto watch = reactor.watch(signal_fd.get(), [&] {
         signalfd_siginfo info;
         while (::read(signal_fd.get(), &info, sizeof info) > 0) {
-            // A second signal ends the run at once, but not one that came with the first: timeout(1) sends two.
+            // A second signal ends the run at once, unless it follows within a second: timeout(1) sends two.
             const auto now = std::chrono::steady_clock::now();
             if (stopped_by_signal && now - first_signal < std::chrono::seconds(1))
                 continue;
             if (!stopped_by_signal) {
                 first_signal = now;
                 console.log(ARHOST_SEVERITY_INFO, "arhost",
-                            "stopping: the frames under way and the files are finished first; a second signal "
-                            "ends the run at once");
+                            "stopping after the current frames and files are finished; a second signal ends "
+                            "the run at once");
             }
             stopped_by_signal = true;
             pipeline.interrupt();
         }
     });
 
-    const bool whole = pipeline.run();
-    if (!whole)
+    const bool completed = pipeline.run();
+    if (!completed)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
     tell_of_promises(statistics.promises, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
-        written = write_whole(*configuration.stats, "stats", console,
-                              report(statistics, pipeline.components(), cpu_seconds_of_host())
-                                      .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                                  "\n");
+        written = write_file(*configuration.stats, "stats", console,
+                             report(statistics, pipeline.components(), cpu_seconds_of_host())
+                                     .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                                 "\n");
     if (configuration.timeline && statistics.frames_in > 0)
-        written &= write_whole(*configuration.timeline, "timeline", console, timeline_csv(statistics));
-    // From here on signals end the process at once, should the terminal be halted while the last lines wait.
+        written &= write_file(*configuration.timeline, "timeline", console, timeline_csv(statistics));
+    // From here on, signals end the process at once: a stopped terminal may block the last log lines.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {
     }
     ::sigprocmask(SIG_UNBLOCK, &signals, nullptr);
     if (!written)
         return run_failed;
-    if (!whole)
+    if (!completed)
         return pipeline.failed_by_configuration() ? bad_configuration : run_failed;
     return stopped_by_signal ? interrupted : success;
 }
 
-// What `arhost plugins --devices` prints below a plugin; nothing where it tells of no devices.
+// The lines that `arhost plugins --devices` prints for a plugin; none if it does not support listing devices.
 std::vector<std::string> lines_of(const DevicesResult &result) {
     if (const auto *reason = std::get_if<std::string>(&result))
         return {"its devices can't be listed: " + *reason};
@@ -271,7 +275,7 @@ std::vector<std::string> lines_of(const DevicesResult &result) {
     if (!list)
         return {};
     if (list->devices.empty())
-        return {"no device that it could run on"};
+        return {"no device that it can run on"};
     std::vector<std::string> lines;
     for (const ipc::DeviceDescription &device : list->devices) {
         lines.push_back(fmt::format("device {}: {} ({}{}{}){}", device.index, device.name,
@@ -294,7 +298,7 @@ fs::path own_prefix() {
 fs::path own_folder() {
     fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
     if (!base::is_utf8(folder.native())) // workers get paths as UTF-8
-        throw std::runtime_error("arhost lies in a folder whose path is no UTF-8: " + folder.string());
+        throw std::runtime_error("arhost is in a folder whose path is not UTF-8: " + folder.string());
     return folder;
 }
 
@@ -341,7 +345,7 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
         if (!outcome->empty())
             throw yaml::Error(*outcome);
     }
-    std::printf("%s: fine\n", base::printable(arguments.file).c_str());
+    std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;
 }
 

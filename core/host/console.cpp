@@ -2,6 +2,7 @@
 #include "host/console.hpp"
 
 #include "base/text.hpp"
+#include "host/pipeline.hpp"
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -13,7 +14,7 @@
 namespace arhost::host {
 namespace {
 
-constexpr std::size_t lines_in_wait = 1024;
+constexpr std::size_t max_queued_lines = 1024;
 
 template <class Sink>
 std::shared_ptr<spdlog::logger> make_logger(const std::shared_ptr<spdlog::details::thread_pool> &thread) {
@@ -25,7 +26,7 @@ std::shared_ptr<spdlog::logger> make_logger(const std::shared_ptr<spdlog::detail
 
 Console::Console(bool verbose)
     : terminal_(::isatty(STDERR_FILENO) != 0),
-      thread_(std::make_shared<spdlog::details::thread_pool>(lines_in_wait, 1)),
+      thread_(std::make_shared<spdlog::details::thread_pool>(max_queued_lines, 1)),
       log_(make_logger<spdlog::sinks::stderr_color_sink_st>(thread_)),
       line_(make_logger<spdlog::sinks::stderr_sink_st>(thread_)) {
     log_->set_pattern("%^%l%$: %v");
@@ -37,8 +38,8 @@ Console::Console(bool verbose)
 Console::~Console() {
     clear_line();
     if (const std::size_t lost = thread_->overrun_counter())
-        log_->warn("{} lines were lost, since nobody took them from stderr", lost);
-    thread_.reset(); // writes what waits and joins: nothing of the loggers is in use when they go
+        log_->warn("{} lines were dropped because stderr was not read", lost);
+    thread_.reset(); // flushes and joins, so that the loggers are no longer in use
 }
 
 void Console::clear_line() {
@@ -63,10 +64,10 @@ void Console::log(arhost_severity severity, const std::string &component, const 
 
 void Console::show(const Progress &progress, const Statistics &statistics) {
     const auto now = std::chrono::steady_clock::now();
-    const auto patience = terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(5000);
+    const auto interval = terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(5000);
     if (last_shown_ == std::chrono::steady_clock::time_point{})
         last_shown_ = now;
-    if (now - last_shown_ < patience && !progress.finishing)
+    if (now - last_shown_ < interval && !progress.finishing)
         return;
     const double seconds = std::chrono::duration<double>(now - last_shown_).count();
     const double fps = seconds > 0 ? static_cast<double>(progress.frame - last_frame_) / seconds : 0;
@@ -82,7 +83,7 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
     if (terminal_) {
         winsize size{};
         if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)
-            line.resize(size.ws_col - 1u); // a longer one would be two, of which only the last can be drawn anew
+            line.resize(size.ws_col - 1u); // a wrapped line could not be redrawn
         line_->info("\r\033[K{}", line);
         line_shown_ = true;
     } else {

@@ -19,13 +19,13 @@ namespace arhost::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Words = std::map<std::string, std::string>; // "@NAME@" → what stands for it
+using Words = std::map<std::string, std::string>; // "@NAME@" → its replacement
 
-// What a kind is called elsewhere.
+// Names related to a plugin kind.
 struct Kind {
-    const char *section; // of a configuration
-    const char *python;  // the plugin that runs a class of this kind
-    const char *count;   // of the statistics: frames that have come through it
+    const char *section; // in a configuration
+    const char *python;  // the plugin that runs Python classes of this kind
+    const char *count;   // in the statistics: frames that passed through it
 };
 const std::map<std::string, Kind> kinds = {{"raytracer", {"raytracer", "rt_python", "augmented"}},
                                            {"tracker", {"tracker", "tracker_python", "tracked"}},
@@ -43,24 +43,25 @@ void check_name(const std::string &name, const std::string &language, const fs::
     const auto fits = [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; };
     if (name.empty() || name.size() > 64 || !std::islower(static_cast<unsigned char>(name[0])) ||
         !std::all_of(name.begin(), name.end(), fits))
-        refuse(name, "must be 1 to 64 small letters, digits and underscores, the first a letter, as in 'my_tracer'");
-    // Targets and libraries of CMake's, crates of Rust's, folders of all builds.
+        refuse(
+            name,
+            "must be 1 to 64 lower-case letters, digits and underscores, starting with a letter, as in 'my_tracer'");
+    // CMake targets and libraries, Rust crates, build folders.
     for (const char *taken :
          {"all",   "alloc",  "arhost",  "arhost_sys",     "build",      "clean",         "core",
           "crate", "depend", "deps",    "edit_cache",     "help",       "install",       "list_install_components",
           "m",     "out",    "package", "package_source", "preinstall", "rebuild_cache", "self",
           "std",   "super",  "test"})
         if (name == taken)
-            refuse_taken(name, "has a meaning of its own in a build tool or a language");
-    // A script's folder comes before Python's own modules, whose names are single words but for these.
+            refuse_taken(name, "is reserved by a build tool or a language");
+    // A script's folder precedes the standard library, whose modules have no underscore except for the second list.
     if (language == "python" && name.find('_') == std::string::npos)
-        refuse_taken(name,
-                     "has no underscore, which every name in Python needs: it might hide a module of Python's own");
+        refuse_taken(name, "has no underscore, which is required in Python: it might hide a standard module");
     for (const char *module : {"py_compile", "pydoc_data", "sre_compile", "sre_constants", "sre_parse"})
         if (language == "python" && name == module)
-            refuse_taken(name, "is that of a module of Python's");
+            refuse_taken(name, "is a standard Python module");
     if (fs::exists(prefix / "lib/arhost/plugins" / (name + ".so")))
-        refuse_taken(name, "is that of a plugin that comes with arhost");
+        refuse_taken(name, "is the name of a built-in plugin");
 }
 
 std::string camel_case(const std::string &name) {
@@ -95,11 +96,11 @@ std::string filled_in(std::string text, const Words &words) {
 }
 
 bool has_word(const std::string &text, const std::string &word) {
-    const auto is_of_word = [&](std::size_t at) {
+    const auto is_word_char = [&](std::size_t at) {
         return at < text.size() && (std::isalnum(static_cast<unsigned char>(text[at])) || text[at] == '_');
     };
     for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; ++at)
-        if ((at == 0 || !is_of_word(at - 1)) && !is_of_word(at + word.size()))
+        if ((at == 0 || !is_word_char(at - 1)) && !is_word_char(at + word.size()))
             return true;
     return false;
 }
@@ -109,9 +110,9 @@ void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
     text << std::ifstream(from, std::ios::binary).rdbuf();
     const std::string &name = words.at("@NAME@"), &type = words.at("@CLASS@");
     if (text.str().find("@CLASS@") != std::string::npos && has_word(text.str(), type))
-        refuse_taken(name, "makes a class '" + type + "', a word that the skeleton uses for something else");
+        refuse_taken(name, "results in the class name '" + type + "', which the skeleton uses already");
     if (fs::exists(to))
-        refuse_taken(name, "is that of another file of the skeleton");
+        refuse_taken(name, "is the name of another file of the skeleton");
     fs::create_directories(to.parent_path());
     std::ofstream file(to, std::ios::binary);
     file << filled_in(text.str(), words) << std::flush;
@@ -119,7 +120,7 @@ void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
         throw std::runtime_error("can't write " + to.string());
 }
 
-// The files below `from`, but not those in its folders named after kinds.
+// Copies recursively, except for top-level folders named after plugin kinds.
 void copy_folder(const fs::path &from, const fs::path &to, const Words &words) {
     for (auto it = fs::recursive_directory_iterator(from); it != fs::recursive_directory_iterator(); ++it) {
         const bool is_kind = it.depth() == 0 && kinds.contains(it->path().filename().string());
@@ -136,33 +137,31 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
     check_name(plugin.name, plugin.language, prefix);
     const fs::path folder = plugin.into / plugin.name;
     if (fs::symlink_status(folder).type() != fs::file_type::not_found)
-        throw std::runtime_error(folder.string() +
-                                 " is there already, and is left as it is; choose another name or --into");
+        throw std::runtime_error(folder.string() + " already exists; choose another name or --into");
     if (!base::is_utf8(fs::absolute(folder).native()))
-        throw std::runtime_error(folder.string() +
-                                 ": the path is no UTF-8; arhost would not take the plugin from there");
+        throw std::runtime_error(folder.string() + ": the path is not UTF-8, which arhost requires");
     const fs::path templates = prefix / "share/arhost/templates";
     if (!fs::is_directory(templates))
-        throw std::runtime_error("the SDK's templates are missing: " + templates.string() + "; install arhost again");
+        throw std::runtime_error("the SDK's templates are missing: " + templates.string() + "; reinstall arhost");
 
     const Words words = words_for(plugin, prefix);
     fs::create_directories(plugin.into);
     std::string pattern = folder.string() + ".XXXXXX";
     if (!::mkdtemp(pattern.data()))
-        throw std::runtime_error("can't make a folder in " + plugin.into.string() + ": " + std::strerror(errno));
-    const fs::path workshop = pattern;
+        throw std::runtime_error("can't create a folder in " + plugin.into.string() + ": " + std::strerror(errno));
+    const fs::path temporary = pattern;
     try {
         for (const fs::path &part :
              {fs::path(plugin.kind), fs::path(plugin.language), fs::path(plugin.language) / plugin.kind})
-            copy_folder(templates / part, workshop / plugin.name, words);
-        fs::rename(workshop / plugin.name, folder);
-        fs::remove_all(workshop);
+            copy_folder(templates / part, temporary / plugin.name, words);
+        fs::rename(temporary / plugin.name, folder);
+        fs::remove_all(temporary);
     } catch (...) {
         std::error_code ignored;
-        fs::remove_all(workshop, ignored);
+        fs::remove_all(temporary, ignored);
         throw;
     }
-    std::printf("%s: a %s in %s that works. README.md in there tells how to build it, run it and go on.\n",
+    std::printf("%s: a working %s in %s. Its README.md explains how to build, run and extend it.\n",
                 base::printable(folder.string()).c_str(), plugin.kind.c_str(), plugin.language.c_str());
     return success;
 }

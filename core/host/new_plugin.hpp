@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `arhost new-plugin`: a working plugin to begin with, out of the SDK's templates (sdk/templates/).
+// `arhost new-plugin`: creates a working plugin from the SDK's templates (sdk/templates/).
 #pragma once
 
 #include <filesystem>
@@ -13,12 +13,12 @@ inline const std::vector<std::string> plugin_kinds = {"raytracer", "tracker", "s
 inline const std::vector<std::string> plugin_languages = {"c", "cpp", "rust", "python"};
 
 struct NewPlugin {
-    std::string kind, name, language; // of the lists above; the name is checked
-    std::filesystem::path into = "."; // the folder `name` is made in there
+    std::string kind, name, language; // kind and language from the lists above
+    std::filesystem::path into = "."; // parent of the new folder
 };
 
-// Makes the folder, whole or not at all. `prefix` is where arhost is installed. Returns the exit status; throws
-// std::runtime_error with what to mend.
+// Creates the folder atomically. `prefix`: where arhost is installed. Returns the exit status; throws
+// std::runtime_error.
 int new_plugin(const NewPlugin &plugin, const std::filesystem::path &prefix);
 
 } // namespace arhost::host

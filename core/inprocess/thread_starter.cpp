@@ -13,7 +13,7 @@
 namespace arhost::inprocess {
 namespace {
 
-constexpr pid_t first_pid = 1 << 22; // above the highest that Linux gives to a process, so that no kill(2) hits one
+constexpr pid_t first_pid = 1 << 22; // above the maximum pid of Linux, so that kill(2) hits no process
 
 double cpu_seconds_of_thread() {
     timespec time{};
@@ -34,13 +34,13 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
     std::tie(spawned.channel, theirs) = ipc::Channel::make_pair();
     ipc::DoorbellPair doorbell = ipc::make_doorbell();
     spawned.doorbell = std::move(doorbell.host);
-    // What it prints goes where this process prints; the pipe is one that has ended already.
+    // The worker shares this process's stdout and stderr; its output pipe is closed at once.
     int pipe_ends[2];
     if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
         base::throw_errno("pipe for a worker's output");
     spawned.output.reset(pipe_ends[0]);
     ::close(pipe_ends[1]);
-    // Readable from its end on, as a pidfd is. Signals can't be sent to it.
+    // Readable once the worker has ended, like a pidfd. Signals can't be sent to it.
     spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
     base::UniqueFd death(base::checked(::dup(spawned.pidfd.get()), "dup"));
 
@@ -50,7 +50,7 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
                            link = worker::Link(std::move(theirs), std::move(doorbell.worker))]() mutable {
         const int status = worker::work(link);
         const std::lock_guard ending(mutex_);
-        exits_.push_back({pid, status << 8, cpu_seconds_of_thread()}); // as of wait(2)
+        exits_.push_back({pid, status << 8, cpu_seconds_of_thread()}); // as returned by wait(2)
         ended_.notify_all();
         ::eventfd_write(death.get(), 1);
     });

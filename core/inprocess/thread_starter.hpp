@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Starts workers as threads of this process. To the host they look like processes, but for one thing: nothing ends
-// them but themselves.
+// Starts workers as threads of this process. To the host they look like processes, except that they can't be killed.
 #pragma once
 
 #include "supervise/launcher.hpp"
@@ -16,11 +15,11 @@ namespace arhost::inprocess {
 class ThreadStarter final : public supervise::Starter {
 public:
     ThreadStarter() = default;
-    ~ThreadStarter() override; // waits for all
+    ~ThreadStarter() override; // joins all threads
     ThreadStarter(const ThreadStarter &) = delete;
     ThreadStarter &operator=(const ThreadStarter &) = delete;
 
-    // The program is not looked at.
+    // `program` is ignored.
     supervise::Spawned spawn(const std::filesystem::path &program, const supervise::LogFunction &log) override;
     supervise::Exit wait_exit(pid_t pid) override;
 

@@ -11,8 +11,9 @@ namespace {
 namespace fs = std::filesystem;
 using base::real_path;
 
-// Outputs are written beside their place and then renamed, so their folder it is; a link's target's too.
-void let_write(sandbox::Policy &policy, const fs::path &file) {
+// Grants the output's folder, as outputs are written to a temporary file there and renamed; for a link, also the
+// folder of its target.
+void allow_write(sandbox::Policy &policy, const fs::path &file) {
     policy.writable.push_back(file.parent_path());
     if (const fs::path folder = real_path(file).parent_path(); folder != policy.writable.back())
         policy.writable.push_back(folder);
@@ -24,7 +25,7 @@ void add_reads(sandbox::Policy &policy, const yaml::Node &paths) {
         policy.readable.push_back(path.input_path());
         if (!fs::exists(policy.readable.back(), ignored))
             path.fail("there is no file or folder '" + policy.readable.back().string() +
-                      "', or it can't be reached; mend the path, or leave it out");
+                      "', or it can't be accessed; correct the path or remove it");
     }
 }
 
@@ -34,15 +35,15 @@ void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
         policy.writable.push_back(folder.output_path());
         if (!fs::is_directory(policy.writable.back(), ignored))
             folder.fail("there is no folder '" + policy.writable.back().string() +
-                        "', or it can't be reached; name a folder, and make it first (mkdir -p)");
+                        "', or it can't be accessed; name an existing folder (mkdir -p creates one)");
     }
 }
 
 void add_environment(sandbox::Policy &policy, const yaml::Node &variables) {
     for (const yaml::Node &variable : variables.items()) {
         const std::string name = variable.text();
-        if (!sandbox::is_variable(name))
-            variable.fail("must be a variable's name alone; its value is the one that arhost is started with");
+        if (!sandbox::is_variable_name(name))
+            variable.fail("must be a variable's name only; its value is taken from arhost's environment");
         policy.environment.insert(name);
     }
 }
@@ -66,24 +67,23 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
     if (const auto environment = node.find("environment"))
         add_environment(policy, *environment);
     if (const auto path = path_of(node); path && is_output)
-        let_write(policy, path->output_path());
+        allow_write(policy, path->output_path());
     else if (path)
-        sandbox::let_read_files(policy, path->input_path());
+        sandbox::allow_read_files(policy, path->input_path());
     if (const auto options = node.find("options"); options && options->is_map())
         for (const auto &[key, value] : options->entries())
             if (value.is_scalar() && key != "path")
-                sandbox::let_read(policy, value.input_path());
+                sandbox::allow_read(policy, value.input_path());
     return policy;
 }
 
 std::string warning_of_output(const yaml::Node &path, const std::string &plugin) {
     const fs::path file = path.output_path(), folder = real_path(file).parent_path();
     const char *home = std::getenv("HOME");
-    for (const fs::path &precious : {real_path(home ? home : "/"), real_path(".")})
-        if (sandbox::holds(folder, precious))
+    for (const fs::path &wide : {real_path(home ? home : "/"), real_path(".")})
+        if (sandbox::contains(folder, wide))
             return path.where() + ": " + path.path() + ": '" + plugin + "' can write all of '" + folder.string() +
-                   "' and what is below; give it a folder of its own, as in 'path: output/" +
-                   file.filename().string() + "'";
+                   "' and below; give it its own folder, as in 'path: output/" + file.filename().string() + "'";
     return "";
 }
 

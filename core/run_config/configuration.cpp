@@ -14,7 +14,7 @@
 namespace arhost::run_config {
 namespace {
 
-// The table's default of a key that holds a whole number.
+// The default of an integer key.
 std::int64_t default_of(std::string_view path) {
     const std::string_view text = key_at(path).default_value;
     std::int64_t value = 0;
@@ -29,7 +29,7 @@ std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, st
     return found ? found->integer(minimum, maximum) : default_of(path);
 }
 
-constexpr std::int64_t longest_ms = 3'600'000;
+constexpr std::int64_t max_ms = 3'600'000;
 
 supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     supervise::RestartLimits limits;
@@ -40,14 +40,13 @@ supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
         static_cast<std::uint32_t>(integer_or_default(*node, "restart.proven_after_frames", 1, 1'000'000));
     limits.quarantine_after =
         static_cast<std::uint32_t>(integer_or_default(*node, "restart.quarantine_after", 1, 1'000'000));
-    limits.first_delay =
-        std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, longest_ms));
+    limits.first_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, max_ms));
     limits.longest_delay =
-        std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, longest_ms));
+        std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, max_ms));
     return limits;
 }
 
-// What all components share.
+// Settings that all components share.
 struct Shared {
     PluginPath plugin_path;
     supervise::RestartLimits restart;
@@ -56,7 +55,7 @@ struct Shared {
 
 ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
     if (const auto conform = node.find("conform"); conform && schema_path == "outputs[]")
-        conform->fail("an output gives nothing back that could be looked at in a run; try its plugin by "
+        conform->fail("an output returns nothing that could be checked at run time; check its plugin with "
                       "'arhost conform PLUGIN.so' (docs/conformance.md)");
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
@@ -64,15 +63,15 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         false};
     if (const auto fallback = node.find("fallback"))
         component.plugins.push_back(shared.plugin_path.resolve(*fallback));
-    // "options:" with nothing behind it is an empty map.
+    // "options:" without a value is an empty map.
     if (component.options && component.options->is_null())
         component.options.reset();
     component.limits.frame =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, longest_ms));
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, max_ms));
     component.limits.start =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, longest_ms));
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, max_ms));
     component.limits.stop =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, longest_ms));
+        std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, max_ms));
     component.limits.restart = shared.restart;
     component.policy = access_of(node, schema_path == "outputs[]");
     component.policy.mode = shared.sandbox;
@@ -80,7 +79,7 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     if (component.policy.memory_bytes && component.policy.allows("gpu"))
         node.require("memory_mb")
-            .fail("can't be kept with 'allow: [gpu]', as drivers map what they like; leave one of the two out");
+            .fail("can't be enforced with 'allow: [gpu]', as GPU drivers map large regions; remove one of the two");
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
     return component;
@@ -121,7 +120,7 @@ FilesInUse files_read_by(const Configuration &configuration) {
     if (configuration.source) {
         read_all_of(*configuration.source);
         if (const auto path = path_of(configuration.source->node))
-            files.read_numbered(path->input_path()); // whose pattern stands for more than the folder above
+            files.read_numbered(path->input_path()); // a pattern: its files, besides the readable folder
     }
     if (configuration.tracker)
         read_all_of(*configuration.tracker);
@@ -144,15 +143,15 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
     for (const std::string &need : plugin.needs)
         if (component.policy.mode != sandbox::Mode::none && !component.policy.allows(need))
             component.node.require(configured ? "plugin" : "fallback")
-                .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox keeps from it: add 'allow: [" +
-                      need + "]' to " + component.node.path() + " (docs/security.md)");
+                .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox blocks: add 'allow: [" + need +
+                      "]' to " + component.node.path() + " (docs/security.md)");
     return resolve_options(plugin, configured ? component.options : std::nullopt, component.path, component.node);
 }
 
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins) {
     root.allow_keys(keys_of(""));
     if (const yaml::Node version = root.require("version"); version.integer() != 1)
-        version.fail("must be 1: this arhost reads no other version");
+        version.fail("must be 1, the only supported version");
 
     std::vector<std::filesystem::path> folders;
     if (const auto node = root.find("plugin_path"))
@@ -171,14 +170,15 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
         if (const auto fps = node->find("fps")) {
             configuration.source->fps = fps->real(0, 10'000);
-            if (configuration.source->fps > 0 && configuration.source->fps < 1e-6) // a period is in ns, 64 bits
-                fps->fail("must be 0, for the source's own, or 1e-06 to 10000, is " + fps->text());
+            if (configuration.source->fps > 0 &&
+                configuration.source->fps < 1e-6) // the period in ns must fit in 64 bits
+                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, is " + fps->text());
         }
     }
     if (const auto mode = root.find("mode"))
         configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
     if (configuration.mode == Mode::live && !configuration.source)
-        root.require("mode").fail("live needs a 'source' that sets the pace; without one a trajectory is traced "
+        root.require("mode").fail("live needs a 'source' that sets the pace; without one, a trajectory is traced "
                                   "in lockstep");
     configuration.frames =
         static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
@@ -198,14 +198,14 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("tracker")) {
         configuration.tracker = parse_tracker(*node, shared);
         if (!configuration.source)
-            node->fail("a tracker needs a 'source' that gives it frames");
+            node->fail("a tracker needs a 'source' of frames");
     }
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
         configuration.raytracer =
             RaytracerConfiguration{parse_component(*node, "raytracer", shared), scene.input_path(), scene};
         if (!configuration.tracker && !configuration.trajectory)
-            node->fail("a ray tracer needs a 'tracker' or a 'trajectory' that tells where the camera is");
+            node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
         if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
             scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
     }
@@ -222,30 +222,29 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             configuration.files.write(*path);
             const std::filesystem::path &plugin = output.plugins.front();
             if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
-                continue; // arhost's own are trusted that far
+                continue; // built-in plugins are trusted here
             if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
                 configuration.warnings.push_back(warning);
         }
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =
-            std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, longest_ms));
+            std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, max_ms));
     }
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = base::real_path(node->text()); // of a link, which is not to be replaced, where it leads to
+            *file = base::real_path(node->text()); // a link stays; its target is replaced
             std::error_code error;
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;
             if (type != regular && type != not_found && type != character)
-                node->fail("'" + node->text() + "' is no regular file, or can't be reached; choose another path");
-            if (type != character) // /dev/null takes both
+                node->fail("'" + node->text() + "' is not a regular file, or can't be accessed; choose another path");
+            if (type != character) // /dev/null may be used for both
                 configuration.files.write(*node);
         }
     if (!configuration.source && !configuration.raytracer)
-        trajectory_node->fail("a trajectory needs a 'source', which it gives cameras to, or a 'raytracer', which "
-                              "traces it alone");
+        trajectory_node->fail("a trajectory needs a 'source' of frames or a 'raytracer' to trace it");
     return configuration;
 }
 

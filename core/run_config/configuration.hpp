@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A configuration, read and checked as far as it can be without its plugins (docs/config.md).
+// Configuration files: parsing, and all checks that need no plugin (docs/config.md).
 #pragma once
 
 #include "camera/coordinates.hpp"
@@ -23,14 +23,14 @@ namespace arhost::run_config {
 
 enum class Mode { lockstep, live };
 
-// What every component has.
+// Settings that every component has.
 struct ComponentConfiguration {
-    yaml::Node node;                            // its map, for errors
-    std::vector<std::filesystem::path> plugins; // the shared object, then its fallback
+    yaml::Node node;                            // its YAML map, for error messages
+    std::vector<std::filesystem::path> plugins; // shared objects: the plugin, then its fallback
     std::optional<yaml::Node> path, options;
     supervise::Limits limits;
-    sandbox::Policy policy; // what its worker may touch (docs/security.md)
-    bool conform = false;   // its promises are looked at on real frames (docs/conformance.md)
+    sandbox::Policy policy; // docs/security.md
+    bool conform = false;   // check results at run time (docs/conformance.md)
 };
 
 struct SourceConfiguration : ComponentConfiguration {
@@ -52,9 +52,9 @@ struct Configuration {
     Mode mode = Mode::lockstep;
     sandbox::Mode sandbox = sandbox::Mode::permissive;
     std::uint64_t frames = 0;                       // 0: all
-    std::optional<SourceConfiguration> source{};    // none: black frames for a trajectory
-    std::optional<camera::Trajectory> trajectory{}; // where cameras come from in place of the tracker
-    std::optional<arhost_intrinsics> camera{};      // always set where there is a trajectory
+    std::optional<SourceConfiguration> source{};    // none: black frames, with a trajectory
+    std::optional<camera::Trajectory> trajectory{}; // poses that replace the tracker's
+    std::optional<arhost_intrinsics> camera{};      // always set with a trajectory
     std::optional<yaml::Node> camera_node{};
     std::optional<TrackerConfiguration> tracker{};
     std::optional<RaytracerConfiguration> raytracer{};
@@ -63,16 +63,16 @@ struct Configuration {
     std::chrono::milliseconds max_latency{500};
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
-    FilesInUse files{};                                       // but for those that the scene names
+    FilesInUse files{};                                       // excluding those that the scene refers to
 };
 
-// The options to create a component's plugin with. Throws yaml::Error where the plugin is of another kind,
-// needs what the configuration does not allow, or the configured options do not fit it. `candidate` 0 is the plugin,
-// 1 its fallback, which takes its own defaults.
+// The options to create a component's plugin with. `candidate`: 0 is the plugin, 1 its fallback, which gets its own
+// defaults. Throws yaml::Error if the plugin has the wrong kind, needs a permission that is not allowed, or does not
+// accept the options.
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
                                           const ComponentConfiguration &component, std::size_t candidate);
 
-// Reads the whole; throws yaml::Error at the first fault. `built_in_plugins` is where arhost's own are.
+// Throws yaml::Error at the first error. `built_in_plugins`: folder of the built-in plugins.
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins);
 
 } // namespace arhost::run_config

@@ -24,7 +24,7 @@ std::optional<NumberedName> numbered_name(const std::string &name) try {
 }
 
 // Whether two names can refer to one file. Two numbered names can if they differ by digits alone (f0%d, f%d).
-bool can_meet(const std::string &a, const std::string &b) {
+bool can_collide(const std::string &a, const std::string &b) {
     const auto p = numbered_name(a), q = numbered_name(b);
     if (!p || !q)
         return p ? p->number(b).has_value() : q ? q->number(a).has_value() : a == b;
@@ -39,7 +39,7 @@ bool can_meet(const std::string &a, const std::string &b) {
 std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
     if (const auto pattern = numbered_name(file_or_pattern.filename())) {
-        std::error_code ignored; // a folder that can't be listed: who is to use it says so
+        std::error_code ignored; // an unreadable folder is reported by its user
         for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
              entry.increment(ignored))
             if (pattern->number(entry->path().filename().string()))
@@ -48,7 +48,7 @@ std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     return files;
 }
 
-// Name or pattern, behind links.
+// Name or pattern, with links resolved.
 fs::path written_by(const yaml::Node &output) {
     const fs::path path = output.output_path();
     return numbered_name(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
@@ -86,7 +86,7 @@ void FilesInUse::write(const yaml::Node &output) {
     const fs::path path = written_by(output);
     for (const yaml::Node &other : outputs_)
         if (const fs::path theirs = written_by(other);
-            path.parent_path() == theirs.parent_path() && can_meet(path.filename(), theirs.filename()))
+            path.parent_path() == theirs.parent_path() && can_collide(path.filename(), theirs.filename()))
             output.fail("another output, '" + other.text() + "', can write a file of the same name as '" +
                         output.text() + "'; choose another path");
     for (const FileIdentity &file : files)

@@ -12,29 +12,30 @@
 
 namespace arhost::run_config {
 
-// That no file is written which the run reads, or writes elsewhere, whatever names it has: links of both kinds lead
-// to it, and of a printf pattern (frame-%04d.png) each file that is there. All throw yaml::Error about the output.
+// Ensures that an output overwrites no file that the run reads or that another output writes, also via symbolic or
+// hard links. A printf pattern (frame-%04d.png) stands for each matching file that exists. All functions throw
+// yaml::Error about the output.
 class FilesInUse {
 public:
-    // Absolute; a folder too, which no output replaces.
+    // Absolute path of a file or folder.
     void read(const std::filesystem::path &file);
     void read_numbered(const std::filesystem::path &file_or_pattern);
-    // What `output` names, file or pattern.
+    // `output`: file or pattern.
     void write(const yaml::Node &output);
 
-    // Of a file that a worker tells of, once all that is written is known. Compares alone: the worker may lie.
+    // For a file that a worker reports, after all calls of write(). Compares only, as the worker is not trusted.
     void check_read(const base::FileIdentity &file) const;
 
 private:
     struct Use {
         std::string path;
-        std::optional<yaml::Node> output; // that writes it; none: it is read
+        std::optional<yaml::Node> output; // the writer; nothing: the file is read
     };
     const Use *find(const base::FileIdentity &file) const;
     void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output);
 
     std::vector<yaml::Node> outputs_;
-    std::map<std::string, Use> uses_; // by real path, and by device and inode
+    std::map<std::string, Use> uses_; // keys: real path, and device:inode
 };
 
 } // namespace arhost::run_config

@@ -39,7 +39,7 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
     return value;
 }
 
-// A default that the plugin declares badly is the plugin's fault, and is reported as such.
+// An invalid default is reported as the plugin's error.
 ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, 0, 0.0, ""};
@@ -63,14 +63,14 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
 
     std::vector<ipc::OptionValue> values;
     for (const ipc::OptionDeclaration &declared : plugin.options) {
-        std::optional<yaml::Node> given = options ? options->find(declared.key) : std::nullopt;
+        std::optional<yaml::Node> value = options ? options->find(declared.key) : std::nullopt;
         if (declared.key == "path" && path) {
-            if (given)
-                given->fail("the path stands beside 'plugin' already; keep one of them");
-            given = path;
+            if (value)
+                value->fail("the path is already given next to 'plugin'; keep one of them");
+            value = path;
         }
-        if (given)
-            values.push_back(value_of(declared, *given));
+        if (value)
+            values.push_back(value_of(declared, *value));
         else if (declared.default_value)
             values.push_back(default_of(declared, plugin.id));
         else

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin's options: what the configuration gives against what the plugin's descriptor declares.
+// Checks configured options against the options that a plugin declares.
 #pragma once
 
 #include "ipc/json_abi.hpp"
@@ -11,9 +11,9 @@
 
 namespace arhost::run_config {
 
-// A value for every declared option, in the descriptor's order. `options` is the YAML map, or nothing;
-// `path` is the component's own `path:` key, which stands for the option of that name. Throws yaml::Error
-// for unknown keys, wrong types and ranges, missing required options; `owner` is named in the latter.
+// A value for every declared option, in the descriptor's order. `options`: the YAML map, if any. `path`: the
+// component's `path:` key, a shorthand for the option of that name. Throws yaml::Error for unknown keys, wrong types,
+// values out of range, and missing required options; the latter error names `owner`.
 std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
                                               const std::optional<yaml::Node> &options,
                                               const std::optional<yaml::Node> &path, const yaml::Node &owner);

@@ -42,7 +42,7 @@ fs::path PluginPath::resolve(const yaml::Node &node) const {
     for (const fs::path &folder : folders_)
         folders += (folders.empty() ? "" : ", ") + folder.string();
     node.fail("there is no plugin '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
-              " (looked in " + folders + "; 'arhost plugins' lists all)");
+              " (searched " + folders + "; 'arhost plugins' lists all)");
 }
 
 std::vector<fs::path> PluginPath::all() const {

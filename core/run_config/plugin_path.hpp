@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where plugins are looked for.
+// Search path for plugins.
 #pragma once
 
 #include "yaml/yaml.hpp"
@@ -13,15 +13,14 @@ namespace arhost::run_config {
 
 class PluginPath {
 public:
-    // In this order: `extra`, the folders of the environment variable ARHOST_PLUGIN_PATH (colons between
-    // them), and `built_in`.
+    // Search order: `extra`, the colon-separated environment variable ARHOST_PLUGIN_PATH, `built_in`.
     PluginPath(std::vector<std::filesystem::path> extra, std::filesystem::path built_in);
 
-    // The shared object that `node` names: a plugin's name, or a path (it has a "/" or ends in ".so")
-    // relative to the configuration's folder. Fails on the node where there is none.
+    // The shared object for a plugin name, or for a path (with a "/" or ending in ".so") relative to the
+    // configuration file. Throws yaml::Error if it does not exist.
     std::filesystem::path resolve(const yaml::Node &node) const;
 
-    // Every plugin file there is; of two with one name the first found.
+    // All plugin files; for duplicate names, the first in search order.
     std::vector<std::filesystem::path> all() const;
 
 private:

@@ -10,58 +10,75 @@ namespace {
 
 using enum Type;
 
-const std::vector<Key> &table() {
-    static const std::vector<Key> keys = {
-        {"version", integer, true, "", "The version of this format: 1."},
+// Adds a component: its `own` keys and those that every component has. `example`: a plugin of its kind.
+void add_component(std::vector<Key> &keys, const Key &component, const std::string &example,
+                   const std::vector<Key> &own) {
+    const std::string path = component.path + (component.type == list ? "[]" : "");
+    keys.push_back(component);
+    keys.push_back({path + ".plugin", text, true, "", "Plugin name (`" + example + "`), or path to a `.so`."});
+    for (Key key : own) {
+        key.path = path + "." + key.path;
+        keys.push_back(key);
+    }
+    const std::vector<Key> common = {
+        {"options", free_map, false, "", "The plugin's own options; `arhost plugins --options` lists them."},
+        {"allow", list, false, "nothing",
+         "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
+        {"reads", list, false, "", "Additional files and folders that it may read."},
+        {"writes", list, false, "", "Additional folders that it may write to."},
+        {"environment", list, false, "", "Additional environment variables that it receives (docs/security.md)."},
+        {"memory_mb", integer, false, "0",
+         "Limit of its private memory, in MiB; 0: three quarters of the machine's memory."},
+        {"deadline_ms", integer, false, "5000", "Timeout for one frame, in ms."},
+        {"start_deadline_ms", integer, false, "10000", "Timeout without progress during start, in ms."},
+        {"stop_deadline_ms", integer, false, "30000", "Timeout without progress during shutdown, in ms."}};
+    for (Key key : common) {
+        key.path = path + "." + key.path;
+        keys.push_back(key);
+    }
+}
+
+std::vector<Key> make_table() {
+    const Key conform = {"conform", boolean, false, "false",
+                         "Check each result and report contract violations (docs/conformance.md)."};
+    const Key fallback = {"fallback", text, false, "", "Plugin that takes over after this one is given up."};
+    std::vector<Key> keys = {
+        {"version", integer, true, "", "Version of this format: 1."},
         {"mode",
          text,
          false,
          "lockstep",
-         "`lockstep`: every frame, in order, the same result each time. `live`: the newest frame wins.",
+         "`lockstep`: every frame in order, with reproducible results. `live`: always the newest frame.",
          {"lockstep", "live"}},
         {"sandbox",
          text,
          false,
          "permissive",
-         "`permissive`: as far as the machine can. `strict`: all of it, or no run. `none`: for debuggers.",
+         "`permissive`: every layer that the machine supports. `strict`: all layers, or no run. `none`: for "
+         "debuggers.",
          {"permissive", "strict", "none"}},
-        {"frames", integer, false, "0", "Stop after so many frames; 0: at the source's end."},
-        {"plugin_path", list, false, "", "Further folders to look for plugins in, before the built-in one."},
-
-        {"source", map, false, "",
-         "Where frames come from. Only a `trajectory` does without: it is traced over black."},
-        {"source.plugin", text, true, "", "A plugin's name (`source_synthetic`), or a path to a `.so`."},
-        {"source.path", input_path, false, "",
-         "The file, or files by a printf pattern, for plugins that read files."},
-        {"source.fps", real, false, "0", "Frames a second; 0: the source's own."},
-        {"source.options", free_map, false, "", "The plugin's own options: `arhost plugins --options`."},
-        {"source.allow", list, false, "nothing",
-         "What the sandbox gives it: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-        {"source.reads", list, false, "", "Further files and folders that it may read."},
-        {"source.writes", list, false, "", "Folders that it may write to."},
-        {"source.environment", list, false, "",
-         "Variables of the environment that it gets besides the usual ones (docs/security.md)."},
-        {"source.memory_mb", integer, false, "0",
-         "Most memory of its own, in MiB; 0: three quarters of the machine's."},
-        {"source.conform", boolean, false, "false",
-         "Reports frames that break a promise of the ABI (docs/conformance.md)."},
-        {"source.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
-        {"source.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
-        {"source.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
-
-        {"trajectory", input_path, false, "", "Cameras from this file, not from the tracker (docs/trajectories.md)."},
-
-        {"camera", map, false, "the trajectory's, or the source's own", "The camera's intrinsics (docs/camera.md)."},
-        {"camera.file", input_path, false, "", "A calibration, as OpenCV writes it (YAML)."},
-        {"camera.width", integer, false, "", "Image width that the intrinsics belong to, in px."},
+        {"frames", integer, false, "0", "Stop after this many frames; 0: at the end of the source."},
+        {"plugin_path", list, false, "", "Folders to search for plugins before the built-in one."},
+    };
+    add_component(keys,
+                  {"source", map, false, "", "Where frames come from. Optional with a `trajectory`: black frames."},
+                  "source_synthetic",
+                  {{"path", input_path, false, "", "Input file or printf pattern, for plugins that read files."},
+                   {"fps", real, false, "0", "Frames per second; 0: the source's own rate."},
+                   conform});
+    const std::vector<Key> camera = {
+        {"trajectory", input_path, false, "",
+         "File with camera poses to use instead of the tracker's (docs/trajectories.md)."},
+        {"camera", map, false, "from the trajectory or the source", "Camera intrinsics (docs/camera.md)."},
+        {"camera.file", input_path, false, "", "Calibration file in OpenCV's YAML format."},
+        {"camera.width", integer, false, "", "Image width that the intrinsics refer to, in px."},
         {"camera.height", integer, false, "", "Image height, in px."},
-        {"camera.fx", real, false, "", "Focal length in px."},
-        {"camera.fy", real, false, "fx", "Focal length in px."},
-        {"camera.vertical_fov_degrees", real, false, "",
-         "In place of fx and fy, where the camera is not calibrated."},
-        {"camera.cx", real, false, "(width − 1) / 2", "Principal point in px; pixel centres are at integers."},
-        {"camera.cy", real, false, "(height − 1) / 2", "Principal point in px."},
-        {"camera.distortion", map, false, "none", "The lens."},
+        {"camera.fx", real, false, "", "Horizontal focal length, in px."},
+        {"camera.fy", real, false, "fx", "Vertical focal length, in px."},
+        {"camera.vertical_fov_degrees", real, false, "", "Replaces fx and fy for an uncalibrated camera."},
+        {"camera.cx", real, false, "(width − 1) / 2", "Principal point, in px; pixel centres are at integers."},
+        {"camera.cy", real, false, "(height − 1) / 2", "Principal point, in px."},
+        {"camera.distortion", map, false, "none", "Lens distortion."},
         {"camera.distortion.model",
          text,
          true,
@@ -69,90 +86,53 @@ const std::vector<Key> &table() {
          "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
          {"none", "brown", "fisheye"}},
         {"camera.distortion.coefficients", reals, false, "",
-         "As OpenCV orders them: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."},
-
-        {"tracker", map, false, "no tracking", "What finds the markers."},
-        {"tracker.plugin", text, true, "", "A plugin's name (`tracker_aruco`), or a path to a `.so`."},
-        {"tracker.options", free_map, false, "", "The plugin's own options."},
-        {"tracker.markers", list, true, "", "The markers; the first of them that is in view anchors the scene."},
-        {"tracker.markers[].id", integer, true, "", "The marker's number in its dictionary."},
-        {"tracker.markers[].side_mm", real, true, "", "Side of its black square, in mm."},
-        {"tracker.hold_frames", integer, false, "0",
-         "For so many frames after the markers are lost the last pose is held."},
-        {"tracker.fallback", text, false, "", "The plugin to go on with when this one is given up."},
-        {"tracker.allow", list, false, "nothing",
-         "What the sandbox gives it: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-        {"tracker.reads", list, false, "", "Further files and folders that it may read."},
-        {"tracker.writes", list, false, "", "Folders that it may write to."},
-        {"tracker.environment", list, false, "",
-         "Variables of the environment that it gets besides the usual ones (docs/security.md)."},
-        {"tracker.memory_mb", integer, false, "0",
-         "Most memory of its own, in MiB; 0: three quarters of the machine's."},
-        {"tracker.conform", boolean, false, "false",
-         "Reports results that break a promise of the ABI (docs/conformance.md)."},
-        {"tracker.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
-        {"tracker.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
-        {"tracker.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
-
-        {"raytracer", map, false, "no overlay", "What draws the virtual objects."},
-        {"raytracer.plugin", text, true, "", "A plugin's name (`rt_embree`), or a path to a `.so`."},
-        {"raytracer.scene", input_path, true, "", "The scene file (docs/scenes.md)."},
-        {"raytracer.options", free_map, false, "", "The plugin's own options."},
-        {"raytracer.fallback", text, false, "", "The plugin to go on with when this one is given up."},
-        {"raytracer.allow", list, false, "nothing",
-         "What the sandbox gives it: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-        {"raytracer.reads", list, false, "", "Further files and folders that it may read."},
-        {"raytracer.writes", list, false, "", "Folders that it may write to."},
-        {"raytracer.environment", list, false, "",
-         "Variables of the environment that it gets besides the usual ones (docs/security.md)."},
-        {"raytracer.memory_mb", integer, false, "0",
-         "Most memory of its own, in MiB; 0: three quarters of the machine's."},
-        {"raytracer.conform", boolean, false, "false",
-         "Reports images that break a promise of the ABI (docs/conformance.md)."},
-        {"raytracer.deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
-        {"raytracer.start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
-        {"raytracer.stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
-
+         "In OpenCV's order: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."}};
+    keys.insert(keys.end(), camera.begin(), camera.end());
+    add_component(
+        keys, {"tracker", map, false, "no tracking", "Finds the markers."}, "tracker_aruco",
+        {{"markers", list, true, "", "The markers; the first visible one anchors the scene."},
+         {"markers[].id", integer, true, "", "ID of the marker in its dictionary."},
+         {"markers[].side_mm", real, true, "", "Side of the black square, in mm."},
+         {"hold_frames", integer, false, "0", "Frames for which the last pose is kept after the markers are lost."},
+         fallback,
+         conform});
+    add_component(keys, {"raytracer", map, false, "no overlay", "Renders the virtual objects."}, "rt_embree",
+                  {{"scene", input_path, true, "", "Scene file (docs/scenes.md)."}, fallback, conform});
+    const std::vector<Key> coordinates = {
         {"coordinates", map, false, "from the scene's axes",
-         "From the marker's axes to the scene's (docs/camera.md)."},
+         "Transform from the marker's axes to the scene's (docs/camera.md)."},
         {"coordinates.ar", integer, false, "1",
          "Profile of the tracker's axes: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other."},
         {"coordinates.rt", integer, false, "1", "Profile of the scene's axes."},
-        {"coordinates.rotations", list, false, "", "One or two rotations, used where the profiles differ."},
+        {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
         {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
-        {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."},
-
-        {"outputs", list, false, "", "Where augmented frames go."},
-        {"outputs[].plugin", text, true, "", "A plugin's name (`sink_video`), or a path to a `.so`."},
-        {"outputs[].path", output_path, false, "", "The file, for plugins that write files."},
-        {"outputs[].options", free_map, false, "", "The plugin's own options."},
-        {"outputs[].allow", list, false, "nothing",
-         "What the sandbox gives it: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-        {"outputs[].reads", list, false, "", "Further files and folders that it may read."},
-        {"outputs[].writes", list, false, "", "Folders that it may write to, besides that of `path`."},
-        {"outputs[].environment", list, false, "",
-         "Variables of the environment that it gets besides the usual ones (docs/security.md)."},
-        {"outputs[].memory_mb", integer, false, "0",
-         "Most memory of its own, in MiB; 0: three quarters of the machine's."},
-        {"outputs[].deadline_ms", integer, false, "5000", "A frame that takes longer is a hang, in ms."},
-        {"outputs[].start_deadline_ms", integer, false, "10000", "Longest start without a word of progress, in ms."},
-        {"outputs[].stop_deadline_ms", integer, false, "30000", "Longest end without a word of progress, in ms."},
-
-        {"live", map, false, "", "Settings of mode live."},
+        {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}};
+    keys.insert(keys.end(), coordinates.begin(), coordinates.end());
+    add_component(keys, {"outputs", list, false, "", "Where augmented frames go."}, "sink_video",
+                  {{"path", output_path, false, "",
+                    "Output file, for plugins that write files; its folder becomes writable."}});
+    const std::vector<Key> rest = {
+        {"live", map, false, "", "Settings of mode `live`."},
         {"live.max_latency_ms", integer, false, "500",
-         "When tracking and tracing take longer than this, in ms, the plain video goes on meanwhile."},
+         "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
 
-        {"restart", map, false, "", "How components that die are started again."},
+        {"restart", map, false, "", "How failed components are restarted."},
         {"restart.proven_after_frames", integer, false, "10",
-         "A component that has made so many frames restarts at once, however often it dies."},
-        {"restart.quarantine_after", integer, false, "5", "Before that, so many failures end it."},
+         "A component that has delivered this many frames is restarted without delay or limit."},
+        {"restart.quarantine_after", integer, false, "5", "Consecutive failures before giving up."},
         {"restart.first_delay_ms", integer, false, "250",
-         "Wait after the first failure, in ms; it doubles each time."},
-        {"restart.longest_delay_ms", integer, false, "10000", "Longest wait, in ms."},
+         "Delay after the first failure, in ms; it doubles with each failure."},
+        {"restart.longest_delay_ms", integer, false, "10000", "Longest delay, in ms."},
 
-        {"stats", output_path, false, "", "Where the statistics are written at the end (JSON)."},
-        {"timeline", output_path, false, "", "Where the times of each frame are written at the end (CSV)."},
+        {"stats", output_path, false, "", "File for the statistics of the run (JSON)."},
+        {"timeline", output_path, false, "", "File for the times of each frame (CSV)."},
     };
+    keys.insert(keys.end(), rest.begin(), rest.end());
+    return keys;
+}
+
+const std::vector<Key> &table() {
+    static const std::vector<Key> keys = make_table();
     return keys;
 }
 
@@ -205,7 +185,7 @@ Json json_schema_of(const Key &key) {
         break;
     case list: {
         json["type"] = "array";
-        const std::string element = std::string(key.path) + "[]";
+        const std::string element = key.path + "[]";
         json["items"] = keys_of(element).empty() ? Json{{"type", "string"}} : json_schema_of_map(element);
         break;
     }
@@ -275,8 +255,7 @@ std::string schema_as_markdown() {
         const std::string standard = key.required                ? "**required**"
                                      : key.default_value.empty() ? "—"
                                                                  : std::string(key.default_value);
-        text += "| `" + std::string(key.path) + "` | " + type_name(key.type) + " | " + standard + " | " +
-                std::string(key.meaning) + " |\n";
+        text += "| `" + key.path + "` | " + type_name(key.type) + " | " + standard + " | " + key.meaning + " |\n";
     }
     return text;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every key of a configuration, once: what the parser allows, what docs/config.md lists and what the
-// JSON Schema for editors says all come from this table.
+// The table of all configuration keys: source of the parser's allowed keys, of the table in docs/config.md, and of
+// the JSON Schema for editors.
 #pragma once
 
 #include <span>
@@ -14,17 +14,17 @@ namespace arhost::run_config {
 enum class Type { map, list, text, input_path, output_path, integer, real, boolean, reals, free_map };
 
 struct Key {
-    std::string_view path; // "tracker.markers[].id": "[]" stands for each element of a list
+    std::string path; // "tracker.markers[].id": "[]" stands for each element of a list
     Type type;
-    bool required;                  // where the map that holds it is there
-    std::string_view default_value; // "" where there is none
-    std::string_view meaning;       // one sentence, with the unit
+    bool required;                  // if its parent map is present
+    std::string_view default_value; // "": none
+    std::string meaning;            // one sentence, with the unit
     std::vector<std::string_view> choices{};
 };
 
 std::span<const Key> schema();
 
-// The keys that the map at `path` may have ("" for the whole; "outputs[]" for an output).
+// The keys of the map at `path`; "" is the root, "outputs[]" one output.
 std::vector<std::string_view> keys_of(std::string_view path);
 const Key &key_at(std::string_view path);
 

@@ -8,13 +8,13 @@
 
 namespace arhost::sandbox {
 
-// All but the one that lets root write files of others, as in a container whose volumes belong to its user's
-// account: which files those are is for Landlock and the mounts to say. Others than root keep none.
+// Root keeps CAP_DAC_OVERRIDE, to write files of other users as in a container with mounted volumes; Landlock and the
+// mounts restrict which files. Other users keep no capability.
 Layer drop_capabilities() {
     const unsigned kept = CAP_DAC_OVERRIDE, mask = ::geteuid() == 0 ? 1u << kept : 0;
     for (unsigned capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability)
         if (capability != kept || !mask)
-            ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail without rights; those are lost below
+            ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail; capset below drops the rest
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     __user_cap_data_struct data[2] = {};
     if (::syscall(SYS_capget, &header, data) != 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Variables of the environment: tokens and keys are kept there, and libraries and drivers read many others.
+// Environment variables: some hold secrets (tokens, keys), others are needed by libraries and drivers.
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// What is read by what plugins are linked with, and is no secret; with wildcards only where none has such a name.
+// Read by common libraries and not secret. A wildcard is used only if no secret matches it.
 constexpr const char *kept[] = {
     // the user and the system
     "HOME", "LANG", "LANGUAGE", "LC_*", "LD_*", "LOGNAME", "PATH", "SHELL", "TERM", "TMPDIR", "TZ", "TZDIR", "USER",
@@ -18,14 +18,14 @@ constexpr const char *kept[] = {
     "SSL_CERT_DIR", "SSL_CERT_FILE",
     // windows
     "DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY", "XLOCALEDIR", "GDK_*", "QT_*", "SDL_*",
-    // GPUs, and what stands in for them
+    // GPUs and software renderers
     "VK_*", "MESA_*", "LIBGL_*", "GALLIUM_*", "GALLIVM_*", "LP_*", "EGL_*", "GBM_*", "DRI_*", "__EGL_*", "__GL*",
     "__NV_*", "__VK_*", "RADV_*", "ACO_*", "AMD_DEBUG", "ANV_*", "INTEL_DEBUG", "ZINK_*", "LIBVA_*", "VDPAU_*",
     "CUDA_*", "NVIDIA_DRIVER_CAPABILITIES", "NVIDIA_VISIBLE_DEVICES", "OPTIX_*", "OCL_*", "ROCR_VISIBLE_DEVICES",
     "HIP_VISIBLE_DEVICES", "HSA_*",
     // computing
     "OMP_*", "GOMP_*", "KMP_*", "MKL_*", "OPENBLAS_*", "TBB_*", "EMBREE_*", "OPENCV_*", "HWY_*",
-    // languages and their tools
+    // language runtimes and tools
     "PYTHON*", "VIRTUAL_ENV", "CONDA_PREFIX", "RUST_BACKTRACE", "RUST_LOG", "ASAN_*", "LSAN_*", "MSAN_*", "TSAN_*",
     "UBSAN_*", "LLVM_PROFILE_FILE", "GCOV_*",
     // arhost's own
@@ -40,7 +40,7 @@ bool is_kept(const Policy &policy, std::string_view entry) {
 
 } // namespace
 
-bool is_variable(std::string_view name) {
+bool is_variable_name(std::string_view name) {
     return !name.empty() &&
            std::none_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '=' || c == 0x7f; });
 }
@@ -51,7 +51,7 @@ void drop_environment(const Policy &policy) {
         if (is_kept(policy, *entry))
             *next++ = *entry;
         else
-            ::explicit_bzero(*entry, std::strlen(*entry)); // this very memory is what /proc/self/environ shows
+            ::explicit_bzero(*entry, std::strlen(*entry)); // /proc/self/environ shows this memory
     if (next)
         *next = nullptr;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landlock: which files may be opened how, and in newer kernels also TCP, signals and abstract sockets. By
-// system calls, and with constants of its own: Debian 12's headers know the first two versions only.
+// Landlock: restricts file access, and in newer kernels TCP, signals and abstract sockets. Uses raw system calls and
+// its own constants, as Debian 12's headers have only versions 1 and 2.
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
@@ -27,18 +27,18 @@ constexpr unsigned create_version = 1, rule_path_beneath = 1;
 namespace access {
 constexpr std::uint64_t execute = 1 << 0, write_file = 1 << 1, read_file = 1 << 2, read_folder = 1 << 3,
                         remove_folder = 1 << 4, remove_file = 1 << 5, make_folder = 1 << 7, make_file = 1 << 8,
-                        rename_elsewhere = 1 << 13, truncate = 1 << 14, ioctl_device = 1 << 15;
-// What concerns a file itself; rules for files take no other.
+                        refer = 1 << 13, truncate = 1 << 14, ioctl_device = 1 << 15;
+// The only accesses valid in rules for files.
 constexpr std::uint64_t of_files = execute | write_file | read_file | truncate | ioctl_device;
 constexpr std::uint64_t read = read_file | read_folder;
-// No links, pipes or sockets: the host or another program may open what lies there by its name.
+// Excludes making links, pipes and sockets, which could trap other programs that open files there.
 constexpr std::uint64_t write =
-    read | write_file | truncate | remove_folder | remove_file | make_folder | make_file | rename_elsewhere;
+    read | write_file | truncate | remove_folder | remove_file | make_folder | make_file | refer;
 constexpr std::uint64_t device = read | write_file | truncate | ioctl_device;
 } // namespace access
 
-// All accesses that a version knows, and so can deny.
-std::uint64_t known_to(long version) {
+// All file accesses that a Landlock version can restrict.
+std::uint64_t handled_by(long version) {
     const int bits = version >= 5 ? 16 : version >= 3 ? 15 : version >= 2 ? 14 : 13;
     return (std::uint64_t(1) << bits) - 1;
 }
@@ -56,7 +56,7 @@ public:
     Ruleset &operator=(const Ruleset &) = delete;
 
     explicit operator bool() const { return fd_ >= 0; }
-    // What is not there is left out.
+    // Ignores missing paths.
     void allow(const fs::path &path, std::uint64_t access) {
         const int fd = ::open(path.c_str(), O_PATH | O_CLOEXEC);
         struct stat status {};
@@ -80,10 +80,10 @@ Layer enter_landlock(const Policy &policy) {
     Layer layer{"landlock", "", ""};
     const long version = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, create_version);
     if (version < 1) {
-        layer.lacks = error_text("not in this kernel, or not switched on");
+        layer.missing = error_text("not in this kernel, or disabled");
         return layer;
     }
-    RulesetAttributes attributes{known_to(version), 0, 0};
+    RulesetAttributes attributes{handled_by(version), 0, 0};
     std::size_t size = sizeof(attributes.handled_files);
     if (version >= 4) {
         attributes.handled_network = policy.allows("network") ? 0 : 3; // TCP: bind, connect
@@ -96,7 +96,7 @@ Layer enter_landlock(const Policy &policy) {
     }
     Ruleset rules(attributes, size);
     if (!rules) {
-        layer.lacks = error_text("no ruleset");
+        layer.missing = error_text("creating the ruleset");
         return layer;
     }
     const std::uint64_t execute = may_start_processes(policy) ? access::execute : 0;
@@ -108,18 +108,18 @@ Layer enter_landlock(const Policy &policy) {
     for (const fs::path &path : policy.writable)
         rules.allow(path, access::write | execute);
     if (policy.allows("video"))
-        rules.allow("/dev", access::read_folder); // which cameras there are
+        rules.allow("/dev", access::read_folder); // to enumerate cameras
     if (!rules.enforce()) {
-        layer.lacks = error_text("not enforced");
+        layer.missing = error_text("not enforced");
         return layer;
     }
-    layer.reached = "version " + std::to_string(version) + ", files";
+    layer.active = "version " + std::to_string(version) + ", files";
     if (attributes.handled_network)
-        layer.reached += ", TCP";
+        layer.active += ", TCP";
     if (attributes.scoped)
-        layer.reached += ", signals";
-    else if (may_start_processes(policy)) // others are kept from signals by the filter of system calls
-        layer.lacks = "signals to processes that are not its own, which need version 6";
+        layer.active += ", signals";
+    else if (may_start_processes(policy)) // otherwise seccomp blocks signals
+        layer.missing = "blocking signals to other processes (needs version 6)";
     return layer;
 }
 

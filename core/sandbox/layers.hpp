@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The layers, in the order in which sandbox::enter applies them: each only takes away, and so may take away
-// what the ones before it needed.
+// The layers, in the order in which sandbox::enter applies them. Order matters: a layer may remove rights that an
+// earlier one needs.
 #pragma once
 
 #include "sandbox/sandbox.hpp"
@@ -34,30 +34,29 @@ inline void add_to(std::string &list, const std::string &what) {
     list += (list.empty() ? "" : ", ") + what;
 }
 
-// The leak checker is a process beside its own, and stack traces are another program's work.
+// Sanitizers start processes for leak checks and stack traces.
 inline bool may_start_processes(const Policy &policy) {
     return under_sanitizer || policy.allows("processes");
 }
 
-// Memory that no limit on a process counts: memfds, shared anonymous mappings.
+// Memory that RLIMIT_DATA does not count: memfds, shared anonymous mappings.
 inline bool may_share_memory(const Policy &policy) {
     return policy.makes_shared_memory || policy.allows("gpu") || policy.allows("display") ||
            policy.allows("processes");
 }
 inline bool has_memory_limit(const Policy &policy) {
-    return !under_sanitizer && !policy.allows("gpu"); // a driver maps what it likes
+    return !under_sanitizer && !policy.allows("gpu"); // GPU drivers map large regions
 }
 
-// Where the machine runs out of memory all the same, the kernel ends a worker and never the host.
-void drop_environment(const Policy &policy); // any machine can
-Layer go_first_out_of_memory();              // before the namespaces, which make /proc read-only
+void drop_environment(const Policy &policy); // cannot fail
+Layer raise_oom_score();                     // the OOM killer takes workers first; needs /proc writable
 Layer enter_namespaces(const Policy &policy);
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();
-Layer enter_landlock(const Policy &policy); // needs no_new_privs, as the next
+Layer enter_landlock(const Policy &policy); // needs no_new_privs, as does the next
 Layer filter_system_calls(const Policy &policy);
 
-// What `allow` stands for, as paths; those with a wildcard filled in, and only those that are there.
+// The paths that a policy grants, with wildcards expanded; missing ones are omitted.
 struct Paths {
     std::vector<std::filesystem::path> readable, devices; // devices: read, write, ioctl
 };

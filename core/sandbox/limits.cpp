@@ -9,16 +9,16 @@
 namespace arhost::sandbox {
 namespace {
 
-// Lowers soft and hard limit; what is lower already stays.
-void lower(Layer &layer, const char *name, __rlimit_resource resource, rlim_t most) {
+// Lowers soft and hard limit to at most `maximum`.
+void lower(Layer &layer, const char *name, __rlimit_resource resource, rlim_t maximum) {
     rlimit limit{};
     ::getrlimit(resource, &limit);
-    limit.rlim_max = std::min(limit.rlim_max, most);
+    limit.rlim_max = std::min(limit.rlim_max, maximum);
     limit.rlim_cur = std::min(limit.rlim_cur, limit.rlim_max);
     if (::setrlimit(resource, &limit) == 0)
-        add_to(layer.reached, name);
+        add_to(layer.active, name);
     else
-        add_to(layer.lacks, error_text(name));
+        add_to(layer.missing, error_text(name));
 }
 
 std::uint64_t three_quarters_of_memory() {
@@ -29,30 +29,29 @@ std::uint64_t three_quarters_of_memory() {
 
 } // namespace
 
-Layer go_first_out_of_memory() {
+Layer raise_oom_score() {
     std::ofstream file("/proc/self/oom_score_adj");
     file << 1000 << std::flush;
     if (!file)
         return {"out of memory", "", error_text("oom_score_adj")};
-    return {"out of memory", "first to go", ""};
+    return {"out of memory", "killed first", ""};
 }
 
 Layer set_limits(const Policy &policy) {
     Layer layer{"limits", "", ""};
-    // Private writable memory, stacks of threads included; not what is reserved only (RLIMIT_AS would count it).
+    // Private writable memory including thread stacks. RLIMIT_AS would also count reserved address space.
     if (has_memory_limit(policy))
         lower(layer, "memory", RLIMIT_DATA, policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory());
     if (policy.writable.empty() && !may_share_memory(policy))
-        lower(layer, "files", RLIMIT_FSIZE, 0); // a full file system in /tmp, say, where no other layer is
-    // Half of the usual 1024: descriptors that are under way in messages count for all processes of a user
-    // together, and who has to send some, as host and scene loader do, must be able to whatever a plugin has
-    // under way.
+        lower(layer, "files", RLIMIT_FSIZE, 0); // protects /tmp even without other layers
+    // Half of the usual 1024: descriptors in unread messages count against one limit for all processes of a user, and
+    // a plugin must not exhaust it for the host and the scene loader.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
-    lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread keeps a processor from all others
+    lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);
-    lower(layer, "threads", RLIMIT_NPROC, 8192); // in its user namespace; none for root
+    lower(layer, "threads", RLIMIT_NPROC, 8192); // per user namespace; not enforced for root
     return layer;
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Namespaces: a view of the machine without network, in which all but a few folders is read-only, and only a few
-// devices can be opened. That also stops what Landlock knows nothing of: owners, modes, times and attributes of
-// files.
+// Namespaces: no network, a read-only file system except for a few folders, and few devices. This also blocks what
+// Landlock does not handle: changes to owners, modes, times and attributes of files.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -18,7 +17,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// False where it can't be had, or not with this user in it.
+// False if the namespace is unavailable or the user cannot be mapped.
 bool enter_user_namespace() {
     const uid_t user = ::geteuid();
     const gid_t group = ::getegid();
@@ -27,13 +26,13 @@ bool enter_user_namespace() {
     const auto write = [](const char *file, const std::string &text) {
         return static_cast<bool>(std::ofstream(file) << text << std::flush);
     };
-    return write("/proc/self/setgroups", "deny") && // without that no group may be mapped
+    return write("/proc/self/setgroups", "deny") && // required before mapping a group
            write("/proc/self/uid_map", std::to_string(user) + " " + std::to_string(user) + " 1") &&
            write("/proc/self/gid_map", std::to_string(group) + " " + std::to_string(group) + " 1");
 }
 
-// Some systems let a process into a user namespace and then map no user, and there is no way back: a child tries.
-bool may_enter_user_namespace() {
+// Tried in a child: some systems allow the namespace but not the mapping, and a process cannot leave it again.
+bool can_enter_user_namespace() {
     const pid_t child = ::fork();
     if (child == 0)
         ::_exit(enter_user_namespace() ? 0 : 1);
@@ -49,31 +48,31 @@ int set_attributes(const std::filesystem::path &path, unsigned flags, std::uint6
         ::syscall(SYS_mount_setattr, AT_FDCWD, path.c_str(), flags, &attributes, sizeof attributes));
 }
 
-bool mount_anew(const std::filesystem::path &path) {
+bool bind_mount(const std::filesystem::path &path) {
     return ::mount(path.c_str(), path.c_str(), nullptr, MS_BIND | MS_REC, nullptr) == 0;
 }
 
-// False with errno where it can't be had.
-bool narrow_mounts(const Policy &policy) {
-    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // what is mounted later is not seen in it
+// False with errno if it fails.
+bool restrict_mounts(const Policy &policy) {
+    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation to or from outside
         return false;
-    // Mounts of their own for what stays as it is; what is on a read-only mount already is left out.
+    // Separate mounts for folders and devices that keep their flags; read-only file systems are skipped.
     std::vector<std::filesystem::path> writable;
     for (const std::filesystem::path &folder : policy.writable) {
         struct statvfs found {};
-        if (::statvfs(folder.c_str(), &found) == 0 && !(found.f_flag & ST_RDONLY) && mount_anew(folder))
+        if (::statvfs(folder.c_str(), &found) == 0 && !(found.f_flag & ST_RDONLY) && bind_mount(folder))
             writable.push_back(folder);
     }
     std::vector<std::filesystem::path> devices = paths_of(policy).devices;
     devices.emplace_back("/dev/zero");
-    std::erase_if(devices, [](const std::filesystem::path &device) { return !mount_anew(device); });
+    std::erase_if(devices, [](const std::filesystem::path &device) { return !bind_mount(device); });
     if (set_attributes("/", AT_RECURSIVE, MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID | MOUNT_ATTR_NODEV, 0) != 0)
         return false;
     for (const std::filesystem::path &folder : writable)
         (void)set_attributes(folder, 0, 0, MOUNT_ATTR_RDONLY);
     for (const std::filesystem::path &device : devices)
         (void)set_attributes(device, 0, 0, MOUNT_ATTR_NODEV);
-    std::error_code error; // the working directory still is the old mount's
+    std::error_code error; // the working directory still refers to the old mount
     if (const auto here = std::filesystem::current_path(error); !error)
         (void)!::chdir(here.c_str());
     return true;
@@ -83,23 +82,22 @@ bool narrow_mounts(const Policy &policy) {
 
 Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
-    const auto reached = [&](const char *what) { add_to(layer.reached, what); };
-    const auto lacks = [&](const char *what) { add_to(layer.lacks, error_text(what)); };
-    // Root needs no user namespace, and in one it would lose its rights over other users' files. In one all may
-    // unshare.
+    const auto active = [&](const char *what) { add_to(layer.active, what); };
+    const auto missing = [&](const char *what) { add_to(layer.missing, error_text(what)); };
+    // Root can unshare without a user namespace, in which it would lose access to other users' files.
     const bool is_root = ::geteuid() == 0;
     if (!is_root) {
-        if (!may_enter_user_namespace() || !enter_user_namespace()) {
-            lacks("user");
+        if (!can_enter_user_namespace() || !enter_user_namespace()) {
+            missing("user");
             return layer;
         }
-        reached("user");
+        active("user");
     }
-    ::unshare(CLONE_NEWNS) == 0 && narrow_mounts(policy) ? reached("mount") : lacks("mount");
+    ::unshare(CLONE_NEWNS) == 0 && restrict_mounts(policy) ? active("mount") : missing("mount");
     if (!policy.allows("network"))
-        ::unshare(CLONE_NEWNET) == 0 ? reached("net") : lacks("net");
-    if (!policy.allows("display")) // X takes pictures through shared memory
-        ::unshare(CLONE_NEWIPC) == 0 ? reached("ipc") : lacks("ipc");
+        ::unshare(CLONE_NEWNET) == 0 ? active("net") : missing("net");
+    if (!policy.allows("display")) // X11 uses System V shared memory
+        ::unshare(CLONE_NEWIPC) == 0 ? active("ipc") : missing("ipc");
     return layer;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <glob.h>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace arhost::sandbox {
@@ -13,7 +14,7 @@ namespace fs = std::filesystem;
 
 using PathList = std::initializer_list<const char *>;
 
-// What every library expects to be there. Other processes' /proc, /home, /tmp and /run are not among it.
+// What libraries commonly need. Excludes /home, /tmp, /run and other processes' /proc.
 constexpr PathList system_readable = {"/usr",
                                       "/lib",
                                       "/lib32",
@@ -36,7 +37,7 @@ constexpr PathList system_readable = {"/usr",
                                       "/etc/drirc",
                                       "/etc/python3",
                                       "/etc/mime.types",
-                                      "/dev/zero", // to write to it makes shared memory, which no limit counts
+                                      "/dev/zero", // read-only: mapping it writable makes uncounted shared memory
                                       "/proc/self",
                                       "/proc/cpuinfo",
                                       "/proc/meminfo",
@@ -59,7 +60,7 @@ struct Allowance {
     std::string_view name;
     PathList readable, devices;
 };
-constexpr Allowance meanings[] = {
+constexpr Allowance granted[] = {
     {"video",
      {"/sys/class/video4linux", "/sys/devices", "/sys/dev/char"},
      {"/dev/video*", "/dev/media*", "/dev/v4l-subdev*"}},
@@ -82,7 +83,7 @@ void append(std::vector<fs::path> &paths, PathList patterns) {
     }
 }
 
-// The folders of a variable such as LD_LIBRARY_PATH.
+// The folders in a colon-separated variable.
 void append_folders(std::vector<fs::path> &paths, const char *variable) {
     const char *value = std::getenv(variable);
     std::istringstream list(value ? value : "");
@@ -98,10 +99,10 @@ Paths paths_of(const Policy &policy) {
     append(paths.readable, system_readable);
     append(paths.devices, system_devices);
     append_folders(paths.readable, "LD_LIBRARY_PATH");
-    for (const Allowance &meaning : meanings)
-        if (policy.allows(meaning.name)) {
-            append(paths.readable, meaning.readable);
-            append(paths.devices, meaning.devices);
+    for (const Allowance &allowance : granted)
+        if (policy.allows(allowance.name)) {
+            append(paths.readable, allowance.readable);
+            append(paths.devices, allowance.devices);
         }
     if (policy.allows("display")) {
         if (const char *authority = std::getenv("XAUTHORITY"))
@@ -113,29 +114,29 @@ Paths paths_of(const Policy &policy) {
     return paths;
 }
 
-bool holds(const fs::path &folder, const fs::path &path) {
+bool contains(const fs::path &folder, const fs::path &path) {
     return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
 }
 
-bool let_read(Policy &policy, const fs::path &file) {
+bool allow_read(Policy &policy, const fs::path &file) {
     std::error_code ignored;
     const auto type = fs::status(file, ignored).type();
     if (type != fs::file_type::regular && type != fs::file_type::directory && type != fs::file_type::fifo)
         return false;
     const char *home = std::getenv("HOME");
     const fs::path real = fs::weakly_canonical(file, ignored);
-    if (home && holds(real, fs::weakly_canonical(home, ignored)))
+    if (home && contains(real, fs::weakly_canonical(home, ignored)))
         return false;
-    for (const char *kernels : {"/dev", "/proc", "/sys"})
-        if (holds(real, kernels) || (holds(kernels, real) && !holds("/dev/shm", real)))
+    for (const char *system : {"/dev", "/proc", "/sys"})
+        if (contains(real, system) || (contains(system, real) && !contains("/dev/shm", real)))
             return false;
     policy.readable.push_back(file);
     return true;
 }
 
-void let_read_files(Policy &policy, const fs::path &file_or_pattern) {
-    if (!let_read(policy, file_or_pattern) && file_or_pattern.filename().string().find('%') != std::string::npos)
-        let_read(policy, file_or_pattern.parent_path());
+void allow_read_files(Policy &policy, const fs::path &file_or_pattern) {
+    if (!allow_read(policy, file_or_pattern) && file_or_pattern.filename().string().find('%') != std::string::npos)
+        allow_read(policy, file_or_pattern.parent_path());
 }
 
 Mode mode_of(std::string_view text) {

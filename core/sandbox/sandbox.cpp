@@ -9,14 +9,14 @@
 namespace arhost::sandbox {
 namespace {
 
-Layer give_up_new_privileges() {
+Layer set_no_new_privileges() {
     if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0)
         return {"no_new_privs", "", error_text("prctl")};
     return {"no_new_privs", "yes", ""};
 }
 
-// A GPU's driver keeps the shaders that it has compiled: where each plugin has a place of its own.
-void give_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
+// Gives each plugin its own folder for the GPU driver's shader cache.
+void add_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
     const char *caches = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
     if (policy.mode == Mode::none || !policy.allows("gpu") || (!caches && !home))
         return;
@@ -30,21 +30,21 @@ void give_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
 
 } // namespace
 
-bool whole(const Level &level) {
-    return std::all_of(level.begin(), level.end(), [](const Layer &layer) { return layer.lacks.empty(); });
+bool complete(const Level &level) {
+    return std::all_of(level.begin(), level.end(), [](const Layer &layer) { return layer.missing.empty(); });
 }
 
 std::string to_text(const Level &level) {
-    std::string has, lacks;
+    std::string active, missing;
     for (const Layer &layer : level) {
-        if (!layer.reached.empty())
-            has += (has.empty() ? "" : "; ") + layer.name + ": " + layer.reached;
-        if (!layer.lacks.empty())
-            lacks += (lacks.empty() ? "" : "; ") + layer.name + ": " + layer.lacks;
+        if (!layer.active.empty())
+            active += (active.empty() ? "" : "; ") + layer.name + ": " + layer.active;
+        if (!layer.missing.empty())
+            missing += (missing.empty() ? "" : "; ") + layer.name + ": " + layer.missing;
     }
     if (level.empty())
         return "none";
-    return has + (lacks.empty() ? "" : "; LACKING " + lacks);
+    return active + (missing.empty() ? "" : "; MISSING " + missing);
 }
 
 Level enter(const Policy &policy) {
@@ -52,20 +52,20 @@ Level enter(const Policy &policy) {
     if (policy.mode == Mode::none)
         return level;
     for (const std::filesystem::path &folder : policy.writable) {
-        std::error_code ignored; // who wants to write there says what is wrong with it
+        std::error_code ignored; // reported by whoever writes there
         std::filesystem::create_directories(folder, ignored);
     }
     drop_environment(policy);
-    level.push_back(go_first_out_of_memory());
+    level.push_back(raise_oom_score());
     level.push_back(enter_namespaces(policy));
     level.push_back(set_limits(policy));
     level.push_back(drop_capabilities());
-    level.push_back(give_up_new_privileges());
+    level.push_back(set_no_new_privileges());
     level.push_back(enter_landlock(policy));
     level.push_back(filter_system_calls(policy));
-    if (policy.mode == Mode::strict && !whole(level))
+    if (policy.mode == Mode::strict && !complete(level))
         throw std::runtime_error("sandbox: " + to_text(level) +
-                                 "; 'sandbox: strict' asks for all of it: mend that, or set 'permissive'");
+                                 "; 'sandbox: strict' requires all layers: fix this or set 'permissive'");
     return level;
 }
 
@@ -73,7 +73,7 @@ Level enter_for(const std::filesystem::path &plugin, Policy policy) {
     std::error_code ignored;
     policy.readable.push_back(plugin.parent_path());
     policy.readable.push_back(std::filesystem::weakly_canonical(plugin, ignored).parent_path());
-    give_shader_cache(policy, plugin);
+    add_shader_cache(policy, plugin);
     return enter(policy);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A list of system calls that no plugin needs, refused with EPERM (libseccomp). A list of what is allowed
-// would break with each new driver or libc; what is dangerous and new is named here instead.
+// seccomp filter: denies system calls that no plugin needs with EPERM (libseccomp). A deny list, as an allow list
+// would break with new drivers and C libraries.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -18,29 +18,28 @@
 namespace arhost::sandbox {
 namespace {
 
-// Newer than Debian 12's libseccomp, which knows them by number only; the same on every architecture.
+// Calls newer than Debian 12's libseccomp, by number; the numbers are the same on every architecture.
 constexpr std::pair<const char *, int> newer_calls[] = {
     {"fchmodat2", 452}, {"setxattrat", 463}, {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
 
-// An empty place: this architecture has no such call.
-constexpr const char *never[] = {
-    // into other processes
+constexpr const char *denied[] = {
+    // access to other processes
     "ptrace", "process_vm_readv", "process_vm_writev", "process_madvise", "process_mrelease", "kcmp", "pidfd_open",
     "pidfd_getfd", "pidfd_send_signal", "tkill", "move_pages", "migrate_pages", "perf_event_open", "lookup_dcookie",
-    // into the kernel
+    // access to the kernel
     "bpf", "userfaultfd", "io_uring_setup", "io_uring_enter", "io_uring_register", "kexec_load", "kexec_file_load",
     "init_module", "finit_module", "delete_module", "iopl", "ioperm", "modify_ldt", "syslog", "nfsservctl",
-    // keys, which namespaces do not hide
+    // keyrings, which namespaces do not isolate
     "keyctl", "add_key", "request_key",
-    // out of the view of files
+    // changes to the view of the file system
     "mount", "umount", "umount2", "pivot_root", "chroot", "mount_setattr", "move_mount", "open_tree",
     "open_tree_attr", "fsopen", "fsconfig", "fsmount", "fspick", "unshare", "setns", "open_by_handle_at",
     "name_to_handle_at", "fanotify_init", "quotactl", "quotactl_fd", "swapon", "swapoff", "acct", "mknod", "mknodat",
-    // what Landlock lets pass: files' owners, modes, attributes
+    // not handled by Landlock: owners, modes, attributes
     "chmod", "fchmod", "fchmodat", "fchmodat2", "chown", "fchown", "lchown", "fchownat", "setxattr", "fsetxattr",
     "lsetxattr", "setxattrat", "removexattr", "fremovexattr", "lremovexattr", "removexattrat", "file_setattr",
-    "utime", "utimes", "futimesat", "truncate", // ftruncate is of what could be opened for writing
-    // the whole machine
+    "utime", "utimes", "futimesat", "truncate", // ftruncate needs a writable descriptor
+    // machine-wide settings and IPC
     "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
     "stime", "sethostname", "setdomainname", "vhangup", "mq_open", "msgget", "semget"};
 
@@ -49,10 +48,10 @@ public:
     Filter() : context_(seccomp_init(SCMP_ACT_ALLOW)) {
         if (!context_)
             return;
-        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // a binary tree: cost log n
-        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1); // of threads as well, should there be any
+        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // binary search
+        (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1);    // all threads
     }
-    bool made() const { return context_ && !failed_; }
+    bool valid() const { return context_ && !failed_; }
 
     void deny(const char *name, std::initializer_list<scmp_arg_cmp> when = {}, int error = EPERM) {
         int call = seccomp_syscall_resolve_name(name);
@@ -75,7 +74,7 @@ private:
     bool failed_ = false;
 };
 
-// The kernel takes these arguments as 32 bits; the filter sees 64, and the upper ones must not matter.
+// The kernel uses the lower 32 bits of these arguments; the filter must ignore the upper ones.
 scmp_arg_cmp equals(unsigned argument, std::uint64_t value) {
     return {argument, SCMP_CMP_MASKED_EQ, 0xffffffffu, value & 0xffffffffu};
 }
@@ -89,18 +88,18 @@ scmp_arg_cmp from(unsigned argument, std::uint64_t value) {
     return {argument, SCMP_CMP_GE, value, 0};
 }
 
-// To this process alone, and not to a thread's or a group's number, which could be another's.
+// Allows calls that target this process only; thread and group IDs could belong to others.
 void deny_reaching_others(Filter &filter, bool has_children) {
     const auto self = static_cast<std::uint64_t>(::getpid());
     if (!has_children) {
         for (const char *call : {"kill", "tgkill", "rt_sigqueueinfo", "rt_tgsigqueueinfo"})
             filter.deny(call, {differs(0, self)});
-        for (const char *call : {"setpgid", "setsid"}) // into the group that a signal to a group then meets
+        for (const char *call : {"setpgid", "setsid"}) // group signals must reach this worker only
             filter.deny(call);
     } else {
-        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: everybody. Single others are Landlock's part
+        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: all processes. Landlock restricts single ones
     }
-    // 0 is the caller. Their limits, priority and processors are all open to whoever has the same user.
+    // 0 is the caller. Other processes of the same user could otherwise be changed.
     for (const char *call :
          {"prlimit64", "sched_setaffinity", "sched_setscheduler", "sched_setparam", "sched_setattr"})
         filter.deny(call, {differs(0, 0)});
@@ -108,7 +107,7 @@ void deny_reaching_others(Filter &filter, bool has_children) {
     filter.deny("setpriority", {differs(1, 0)});
     filter.deny("ioprio_set", {differs(0, 1 /* IOPRIO_WHO_PROCESS */)});
     filter.deny("ioprio_set", {differs(1, 0)});
-    // A descriptor's owner gets any signal that F_SETSIG names; a lease halts who opens the file.
+    // F_SETOWN with F_SETSIG sends arbitrary signals; a lease blocks other openers of the file.
     for (const int command : {F_SETOWN, F_SETOWN_EX, F_SETSIG, F_SETLEASE, F_NOTIFY})
         filter.deny("fcntl", {equals(1, static_cast<unsigned>(command))});
     for (const unsigned long request :
@@ -116,18 +115,18 @@ void deny_reaching_others(Filter &filter, bool has_children) {
         filter.deny("ioctl", {equals(1, request)});
     for (const unsigned long request : {0x40086602ul /* FS_IOC_SETFLAGS */, 0x401c5820ul /* FS_IOC_FSSETXATTR */})
         filter.deny("ioctl", {equals(1, request)});
-    // The process that searches for leaks asks for its end with the worker's: left behind, it waits for ever for a
-    // lock of a thread that is gone, and the worker, which it traces, can't be reaped.
+    // LeakSanitizer's tracer process needs PDEATHSIG: if it survived the worker, it would wait forever for a lock,
+    // and the traced worker could not be reaped.
     if (!under_sanitizer)
         filter.deny("prctl", {equals(0, PR_SET_PDEATHSIG)});
 }
 
 void deny_new_processes(Filter &filter, bool may_fork) {
-    // clone3 has its flags in memory, where a filter can't see them; without it libraries take clone.
+    // clone3 has its flags in memory, invisible to the filter; on ENOSYS libraries fall back to clone.
     filter.deny("clone3", {}, ENOSYS);
-    for (const std::uint64_t space :
+    for (const std::uint64_t flag :
          {CLONE_NEWNS, CLONE_NEWCGROUP, CLONE_NEWUTS, CLONE_NEWIPC, CLONE_NEWUSER, CLONE_NEWPID, CLONE_NEWNET})
-        filter.deny("clone", {has_bits(0, space, space)});
+        filter.deny("clone", {has_bits(0, flag, flag)});
     if (may_fork)
         return;
     filter.deny("clone", {has_bits(0, CLONE_THREAD, 0)});
@@ -140,25 +139,25 @@ void deny_sockets(Filter &filter, const Policy &policy) {
     if (policy.allows("display") || policy.allows("network"))
         families.insert(AF_UNIX);
     if (policy.allows("network"))
-        families.insert({AF_INET, AF_INET6, AF_NETLINK}); // getaddrinfo asks netlink for addresses
+        families.insert({AF_INET, AF_INET6, AF_NETLINK}); // getaddrinfo uses netlink
     if (policy.allows("usb"))
-        families.insert(AF_NETLINK); // what is plugged in
-    constexpr unsigned end = 64;     // beyond all families
+        families.insert(AF_NETLINK); // hot-plug events
+    constexpr unsigned end = 64;     // above all families
     for (unsigned family = 0; family < end; ++family)
         if (!families.contains(family))
             filter.deny("socket", {equals(0, family)});
     filter.deny("socket", {from(0, end)});
     if (!families.contains(AF_UNIX))
-        for (const int type : {SOCK_DGRAM, SOCK_RAW}) // with these, a pair reaches any other socket
+        for (const int type : {SOCK_DGRAM, SOCK_RAW}) // these types can send to any socket
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
 }
 
-// What the limit of memory does not count.
+// Memory that RLIMIT_DATA does not count.
 void deny_uncounted_memory(Filter &filter) {
     for (const char *call : {"memfd_create", "memfd_secret", "shmget"})
         filter.deny(call);
     filter.deny("mmap", {has_bits(3, MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED | MAP_ANONYMOUS)});
-    filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // counts as stack
+    filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // would count as stack
 }
 
 } // namespace
@@ -166,19 +165,19 @@ void deny_uncounted_memory(Filter &filter) {
 Layer filter_system_calls(const Policy &policy) {
     Layer layer{"seccomp", "", ""};
     Filter filter;
-    for (const char *call : never)
+    for (const char *call : denied)
         if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
             filter.deny(call);
-    filter.deny("utimensat", {differs(1, 0)}); // futimens passes no name
+    filter.deny("utimensat", {differs(1, 0)}); // futimens passes a null path and stays allowed
     deny_reaching_others(filter, may_start_processes(policy));
     deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);
-    if (!filter.made() || !filter.load())
-        layer.lacks = error_text("the filter can't be loaded");
+    if (!filter.valid() || !filter.load())
+        layer.missing = error_text("loading the filter");
     else
-        layer.reached = "yes";
+        layer.active = "yes";
     return layer;
 }
 

@@ -2,9 +2,11 @@
 //
 // arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3; of no use by hand.
 // It starts workers, tells how they ended, and kills what they leave behind.
+#include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "supervise/launcher_protocol.hpp"
 
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <fcntl.h>
@@ -21,35 +23,16 @@ using namespace arhost::supervise;
 using arhost::base::kill_orphans;
 using arhost::base::UniqueFd;
 
-// In the child: descriptors 3 and 4 as arhost-worker expects them, all others but the standard ones shut.
-[[noreturn]] void become(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
-    // A group of its own: what it forks ends with it, and the terminal's Ctrl-C, which the host alone
-    // interprets, does not reach it.
-    ::setpgid(0, 0);
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != launcher) // it died before the line above
-        ::_exit(127);
-    sigset_t none;
-    ::sigemptyset(&none);
-    ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    ::signal(SIGINT, SIG_IGN);
+// In the child, after fork: control channel and doorbell as descriptors 3 and 4, as arhost-worker expects them.
+[[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
+    ::signal(SIGINT, SIG_IGN); // the host alone handles Ctrl-C
     ::signal(SIGTERM, SIG_DFL);
     ::signal(SIGHUP, SIG_IGN);
     ::signal(SIGPIPE, SIG_IGN); // and SIGXFSZ, which the host ignores too: a full disk is an error value
-    const rlimit no_core{0, 0};
-    ::setrlimit(RLIMIT_CORE, &no_core);
-    // First out of the way of 3 and 4, then into place; dup2 clears close-on-exec.
-    const int control = ::fcntl(fds[0].get(), F_DUPFD_CLOEXEC, 10);
-    const int doorbell = ::fcntl(fds[1].get(), F_DUPFD_CLOEXEC, 10);
-    ::dup2(fds[2].get(), STDOUT_FILENO);
-    ::dup2(fds[2].get(), STDERR_FILENO);
-    ::dup2(control, 3);
-    ::dup2(doorbell, 4);
-    ::syscall(SYS_close_range, 5u, ~0u, 0u);
-    const int null = ::open("/dev/null", O_RDONLY);
-    ::dup2(null, STDIN_FILENO);
-    ::close(null);
-    ::execl(program, program, static_cast<char *>(nullptr));
+    const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    char *const argv[] = {const_cast<char *>(program), nullptr};
+    const int output = fds[2].get();
+    arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, launcher);
     const char message[] = "arhost-worker can't be executed; is it installed beside arhost?\n";
     (void)!::write(STDERR_FILENO, message, sizeof message - 1);
     ::_exit(127);
@@ -59,7 +42,7 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     const pid_t launcher = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0)
-        become(request.program, fds, launcher);
+        exec_worker(request.program, fds, launcher);
     Reply reply{};
     if (pid < 0) {
         reply.kind = Reply::failed;

@@ -177,7 +177,7 @@ private:
 
 // Whoever reads the log sees what this machine lacks.
 sandbox::Level tell(const Link &link, sandbox::Level level) {
-    link.log(sandbox::whole(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO,
+    link.log(sandbox::complete(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO,
              "sandbox: " + sandbox::to_text(level));
     return level;
 }

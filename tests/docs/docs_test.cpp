@@ -15,7 +15,7 @@ const fs::path root = ARHOST_SOURCE_DIRECTORY;
 
 std::vector<fs::path> documents() {
     std::vector<fs::path> found = {root / "README.md", root / "CONTRIBUTING.md", root / "CHANGELOG.md"};
-    for (const char *folder : {"docs", "plugins"})
+    for (const char *folder : {"config", "docs", "plugins"})
         for (const auto &entry : fs::recursive_directory_iterator(root / folder))
             if (entry.path().extension() == ".md")
                 found.push_back(entry.path());
@@ -35,13 +35,13 @@ std::vector<std::string> yaml_blocks(const std::string &markdown) {
 
 } // namespace
 
-TEST(Documentation, ShowsConfigurationsThatArhostAccepts) {
+TEST(Documentation, ContainsOnlyValidConfigurations) {
     int checked = 0;
     for (const fs::path &document : {root / "README.md", root / "docs/config.md"})
         for (const std::string &block : yaml_blocks(read_file(document))) {
             ArhostRun run;
             fs::create_directory_symlink(root / "config", run.path("config"));
-            // Beside the document, since paths are relative to the file.
+            // In the document's folder, as paths are relative to the file.
             const std::string file = (fs::relative(document, root).parent_path() / "snippet.yaml").string();
             run.write(file, block);
             EXPECT_EQ(run.run({"check", file}), 0) << document << ":\n" << block << run.output();
@@ -50,14 +50,14 @@ TEST(Documentation, ShowsConfigurationsThatArhostAccepts) {
     EXPECT_EQ(checked, 2);
 }
 
-TEST(Documentation, DemonstrationTakesTheOtherTrackerByOneLine) {
+TEST(Documentation, DemonstrationWorksWithTheOtherTracker) {
     ArhostRun run;
     const std::string demo = (root / "config/demo.yaml").string();
     EXPECT_EQ(run.run({"check", demo, "--set", "tracker.plugin=tracker_apriltag"}), 0) << run.output();
 }
 
-// Every command of docs/trajectories.md, one after the other, on a few frames.
-TEST(Documentation, ShowsRecordingsAndReplaysThatWork) {
+// Runs every command in docs/trajectories.md in order, on a few frames.
+TEST(Documentation, ContainsWorkingRecordAndReplayCommands) {
     const std::string document = read_file(root / "docs/trajectories.md");
     ArhostRun run;
     fs::create_directory_symlink(root / "config", run.path("config"));
@@ -82,7 +82,7 @@ TEST(Documentation, ShowsRecordingsAndReplaysThatWork) {
         EXPECT_TRUE(run.exists(file)) << file;
 }
 
-TEST(Documentation, ShipsConfigurationsThatArhostAccepts) {
+TEST(Documentation, ExampleConfigurationsAreValid) {
     for (const auto &entry : fs::directory_iterator(root / "config"))
         if (entry.path().extension() == ".yaml") {
             ArhostRun run;
@@ -90,7 +90,7 @@ TEST(Documentation, ShipsConfigurationsThatArhostAccepts) {
         }
 }
 
-TEST(Documentation, LinksToFilesThatAreThere) {
+TEST(Documentation, LinksToExistingFiles) {
     const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
     for (const fs::path &document : documents()) {
         const std::string text = read_file(document);
@@ -99,14 +99,14 @@ TEST(Documentation, LinksToFilesThatAreThere) {
     }
 }
 
-TEST(Documentation, NamesCommandsThatAreThere) {
+TEST(Documentation, NamesExistingCommands) {
     for (const char *command : {"tools/demo", "tools/test", "tools/bench", "tools/check-style", "tools/tidy",
                                 "tools/setup", "tools/get-models", "tools/gallery", "tools/likeness"})
         EXPECT_EQ(::access((root / command).c_str(), X_OK), 0) << command;
 }
 
-// What config/lab.yaml promises where there is no camera: what is missing, and what to try.
-TEST(Documentation, TheLabConfigurationSaysWhatIsMissingWhereThereIsNoCamera) {
+// Without a camera, config/lab.yaml fails with a hint.
+TEST(Documentation, LabConfigurationReportsAMissingCamera) {
     if (fs::exists("/dev/video0"))
         GTEST_SKIP() << "this machine has a camera";
     ArhostRun run;
@@ -115,7 +115,7 @@ TEST(Documentation, TheLabConfigurationSaysWhatIsMissingWhereThereIsNoCamera) {
     EXPECT_THAT(run.output(), testing::HasSubstr("source_synthetic"));
 }
 
-TEST(Documentation, ShowsTheMarkerThatTheLabConfigurationLooksFor) {
+TEST(Documentation, ShowsTheMarkerOfTheLabConfiguration) {
     cv::Mat expected;
     cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_6X6_250), 23, 8, expected);
     cv::Mat shown(8, 8, CV_8UC1, cv::Scalar(0));

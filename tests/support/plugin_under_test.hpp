@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Loads a plugin of this build into the test's own process and calls it as arhost-worker would, without
-// processes and shared memory. For tests of one plugin; tests/system tests the chain.
+// Loads a plugin into the test process and calls it like arhost-worker, without processes and shared memory. For unit
+// tests of plugins; tests/system tests the whole pipeline.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -23,16 +23,16 @@
 
 namespace arhost::test {
 
-// Real photos and meshes, which are not part of the project. A test that needs them begins with
+// Real photos and meshes, which are not in the repository. A test that needs them begins with
 // ARHOST_REQUIRE_SHARED_DATA("markers/julia").
 inline std::filesystem::path shared_data(const std::string &relative) {
     return std::filesystem::path(ARHOST_SHARED_DATA) / relative;
 }
 #define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                         \
     if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
-    GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is not here"
+    GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is missing"
 
-// A folder that is empty at the test's start and gone after it.
+// A temporary folder.
 class ScratchFolder {
 public:
     ScratchFolder() {
@@ -53,7 +53,7 @@ private:
     std::filesystem::path path_;
 };
 
-// A frame or image buffer, 64-byte aligned, with guard bytes behind it that must stay as they are.
+// A frame or image buffer, 64-byte aligned, followed by guard bytes that detect overruns.
 class GuardedBuffer {
 public:
     explicit GuardedBuffer(std::size_t size)
@@ -97,12 +97,12 @@ public:
                  &on_log,      &on_progress,       &on_cancelled, &on_extension};
     }
     ~PluginUnderTest() {
-        destroy(); // the library stays loaded: sanitizers want its symbols at exit
+        destroy(); // no dlclose: sanitizers need its symbols at exit
     }
     PluginUnderTest(const PluginUnderTest &) = delete;
     PluginUnderTest &operator=(const PluginUnderTest &) = delete;
 
-    // `overrides`: option values as they would stand in the YAML; all others take their defaults.
+    // `overrides`: option values as text; all others get their defaults.
     arhost_status create(const std::map<std::string, std::string> &overrides = {}) {
         const arhost_descriptor &descriptor = *plugin_->descriptor;
         std::vector<arhost_option> options;
@@ -110,11 +110,11 @@ public:
         std::size_t used = 0;
         for (uint32_t i = 0; i < descriptor.option_count; ++i) {
             const arhost_option_descriptor &declared = descriptor.options[i];
-            const auto given = overrides.find(declared.key);
-            used += given != overrides.end();
-            if (given == overrides.end() && !declared.default_value)
+            const auto found = overrides.find(declared.key);
+            used += found != overrides.end();
+            if (found == overrides.end() && !declared.default_value)
                 throw std::runtime_error(std::string("option '") + declared.key + "' must be given");
-            texts[i] = given != overrides.end() ? given->second : declared.default_value;
+            texts[i] = found != overrides.end() ? found->second : declared.default_value;
             arhost_option value{sizeof value, declared.type, declared.key, 0, 0.0, texts[i].c_str()};
             if (declared.type == ARHOST_OPTION_BOOL)
                 value.integer = texts[i] == "true";
@@ -139,12 +139,11 @@ public:
     }
     const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
     arhost_instance *instance() const { return instance_; }
-    // The host cancels once the plugin has asked so often whether it does.
-    void cancel(int after = 0) { cancelled_after_ = asked_ + after; }
-    void go_on() { cancelled_after_ = std::numeric_limits<int>::max(); }
-    int asked() const { return asked_; }
+    // Cancels after `after` further calls of the host's `cancelled`.
+    void cancel(int after = 0) { cancelled_after_ = cancel_checks_ + after; }
+    void reset_cancel() { cancelled_after_ = std::numeric_limits<int>::max(); }
 
-    // All messages so far, a line each, "severity text".
+    // All messages so far, one line each: "severity text".
     std::string log() const {
         std::lock_guard lock(mutex_);
         return log_;
@@ -158,7 +157,7 @@ private:
     }
     static void on_progress(const arhost_host *, double, const char *) {}
     static int32_t on_cancelled(const arhost_host *host) {
-        return self(host).asked_++ >= self(host).cancelled_after_;
+        return self(host).cancel_checks_++ >= self(host).cancelled_after_;
     }
     static const void *on_extension(const arhost_host *, const char *) { return nullptr; }
 
@@ -168,7 +167,7 @@ private:
     arhost_instance *instance_ = nullptr;
     mutable std::mutex mutex_;
     std::string log_;
-    std::atomic<int> asked_{0}, cancelled_after_{std::numeric_limits<int>::max()};
+    std::atomic<int> cancel_checks_{0}, cancelled_after_{std::numeric_limits<int>::max()};
 };
 
 } // namespace arhost::test

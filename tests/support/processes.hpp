@@ -7,7 +7,7 @@
 
 namespace arhost::test {
 
-// A zombie is not, which nobody may wait for where no init does.
+// False for a zombie: without an init process, nobody may reap it.
 inline bool is_alive(pid_t pid) {
     std::ifstream status("/proc/" + std::to_string(pid) + "/status");
     std::string word;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Starts the arhost of this build in a scratch folder, and looks at what it does.
+// Runs arhost in a scratch folder and gives access to its results.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -30,7 +30,7 @@ inline std::string read_file(const std::filesystem::path &file) {
 
 class ArhostRun {
 public:
-    // The configuration is written to run.yaml in the scratch folder, where arhost also runs.
+    // Writes the configuration to run.yaml in the scratch folder, which is arhost's working directory.
     explicit ArhostRun(const std::string &yaml = "") {
         if (!yaml.empty())
             write("run.yaml", yaml);
@@ -51,7 +51,7 @@ public:
     bool exists(const std::string &name) const { return std::filesystem::exists(path(name)); }
     nlohmann::json stats() const { return nlohmann::json::parse(read("stats.json")); }
 
-    // Starts `arhost ARGUMENTS`; output() and wait() follow. `prepare` is called in the child, which becomes arhost.
+    // Starts `arhost ARGUMENTS`. `prepare` is called in the child before exec.
     void start(
         std::vector<std::string> arguments = {"--config", "run.yaml"}, const std::function<void()> &prepare = [] {}) {
         pid_ = ::fork();
@@ -101,7 +101,7 @@ public:
         return found.empty() ? 0 : found.front();
     }
 
-    // The worker that serves this plugin now (its process bears the plugin's id); 0 where there is none.
+    // The current worker of a plugin (the process has the plugin's id as its name), or 0.
     pid_t worker(const std::string &plugin) const {
         for (const pid_t launcher : children(pid_))
             for (const pid_t candidate : children(launcher))
@@ -136,17 +136,17 @@ private:
     pid_t pid_ = 0;
 };
 
-// As kill(2), but for a process that must be there: 0, for one that is gone, would be everybody.
+// Like kill(2), but throws for pid 0, which would signal the whole process group.
 inline void send_signal(pid_t pid, int signal) {
     if (pid <= 0)
-        throw std::runtime_error("the process that a signal was meant for is gone");
+        throw std::runtime_error("no process to signal");
     ::kill(pid, signal);
 }
 
-// For plugins that hang on purpose: no busy machine lets one that does not wait as long.
+// Long enough that only plugins that hang on purpose exceed it, even on a busy machine.
 inline constexpr std::chrono::milliseconds counting_deadline{3000};
 
-// A configuration of the counting plugins; every frame's journey can be read off counted.txt.
+// A configuration of the counting plugins; counted.txt has a line for every frame.
 inline std::string counting(const std::string &mode, const std::string &source, const std::string &tracker,
                             const std::string &raytracer, const std::string &more = "",
                             std::chrono::milliseconds deadline = counting_deadline) {

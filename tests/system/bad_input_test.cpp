@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bad input gets one clear message that names the place and the mend, status 2, and no output file.
+// Bad input results in one message with position and fix, exit status 2, and no output file.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ std::string replaced(std::string text, const std::string &from, const std::strin
     return text.replace(at, from.size(), to);
 }
 
-// Takes a parser more than half a second.
+// Takes more than half a second to parse.
 std::string big_scene() {
     std::string text = "version: 1\nnumbers: [0";
     for (int i = 0; i < 300'000; ++i)
@@ -45,7 +45,7 @@ const std::vector<Case> cases = {
     {"ConformOfAnOutput",
      replaced(good, "path: counted.txt", "path: counted.txt, conform: true"),
      small_scene,
-     {"run.yaml:6:", "outputs[0].conform: an output gives nothing back", "arhost conform PLUGIN.so"}},
+     {"run.yaml:6:", "outputs[0].conform: an output returns nothing", "arhost conform PLUGIN.so"}},
     {"DuplicateKey", good + "mode: live\n", small_scene, {"run.yaml:8:", "mode", "twice"}},
     {"WrongType",
      replaced(good, "side_mm: 80", "side_mm: wide"),
@@ -55,7 +55,7 @@ const std::vector<Case> cases = {
      replaced(good, "[{id: 3, side_mm: 80}]", "[{id: 3, side_mm: 80}, {id: 3, side_mm: 60}]"),
      small_scene,
      {"run.yaml:4:", "listed twice"}},
-    {"TrajectoryForNobody",
+    {"TrajectoryWithoutUser",
      "version: 1\ntrajectory: path.txt\noutputs: [{plugin: sink_counter, path: counted.txt}]\n",
      small_scene,
      {"run.yaml:2:13", "trajectory", "needs a 'source'", "or a 'raytracer'"}},
@@ -66,7 +66,7 @@ const std::vector<Case> cases = {
      replaced(good, "tracker_counter", "tracker_conter"),
      small_scene,
      {"run.yaml:4:", "there is no plugin 'tracker_conter'", "did you mean 'tracker_counter'"}},
-    {"PluginOfAnotherKind",
+    {"PluginOfWrongKind",
      replaced(good, "tracker_counter", "rt_counter"),
      small_scene,
      {"run.yaml:4:", "'rt_counter' is a raytracer, not a tracker"}},
@@ -86,14 +86,14 @@ const std::vector<Case> cases = {
      replaced(good, ", path: counted.txt", ""),
      small_scene,
      {"run.yaml:6:", "sink_counter needs 'path'"}},
-    {"PathForAPluginWithoutOne",
+    {"PathForAPluginWithoutPath",
      replaced(good, "source_counter,", "source_counter, path: x,"),
      small_scene,
      {"run.yaml:3:", "source_counter takes no path"}},
-    {"PluginRefuses",
+    {"PluginRejectsOptions",
      replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"),
      small_scene,
-     {"run.yaml:5:", "raytracer", "refused, as the option 'refuse' asks"}},
+     {"run.yaml:5:", "raytracer", "rejected, as the option 'refuse' requests"}},
     {"NoPlugin",
      replaced(good, "rt_counter", "no_plugin"),
      small_scene,
@@ -111,19 +111,19 @@ const std::vector<Case> cases = {
      replaced(good, "rt_counter", "broken_constructor"),
      small_scene,
      {"broken_constructor.so", "signal 11", "while its library was loaded"}},
-    {"PluginThatIsNoLibrary",
+    {"MissingPluginFile",
      replaced(good, "rt_counter", "./run.yaml.so"),
      small_scene,
      {"run.yaml:5:", "there is no plugin"}},
-    {"PluginThatIsText",
+    {"PluginIsATextFile",
      replaced(good, "rt_counter", "./text.so"),
      small_scene,
      {"run.yaml:5:", "text.so", "invalid ELF header"}},
-    {"PluginThatIsCut",
+    {"PluginIsTruncated",
      replaced(good, "rt_counter", "./cut.so"),
      small_scene,
      {"run.yaml:5:", "cut.so", "too short"}},
-    {"PluginThatNeedsASymbolThatNobodyHas",
+    {"PluginWithUndefinedSymbol",
      replaced(good, "rt_counter", "broken_undefined"),
      small_scene,
      {"run.yaml:5:", "broken_undefined.so", "undefined symbol: arhost_test_nowhere"}},
@@ -135,7 +135,7 @@ const std::vector<Case> cases = {
      replaced(good, "plugin: rt_counter", "plugin: \"rt_counter"),
      small_scene,
      {"run.yaml:5:", "this quoted value is not terminated"}},
-    {"OutputsThatMeet",
+    {"TimelineOverAnOutput",
      good + "timeline: ./counted.txt\n",
      small_scene,
      {"run.yaml:", "timeline", "choose another path"}},
@@ -165,11 +165,11 @@ const std::vector<Case> cases = {
      good + "camera: {file: none.yaml}\n",
      small_scene,
      {"run.yaml:8:", "camera.file", "none.yaml does not exist"}},
-    {"TwoOutputsOfOneFile",
+    {"TwoOutputsToOneFile",
      replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, path: ./counted.txt}"),
      small_scene,
      {"run.yaml:6:", "another output writes './counted.txt' already"}},
-    {"TwoOutputsOfOneFileByAnOption",
+    {"TwoOutputsToOneFileByAnOption",
      replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, options: {path: counted.txt}}"),
      small_scene,
      {"run.yaml:6:", "another output writes 'counted.txt' already"}},
@@ -185,14 +185,14 @@ const std::vector<Case> cases = {
      good + "timeline: stats.json\n",
      small_scene,
      {"run.yaml:8:11: timeline: another output writes 'stats.json' already"}},
-    {"TimelineThatIsAFolder",
+    {"TimelineIsAFolder",
      good + "timeline: .\n",
      small_scene,
-     {"run.yaml:8:11: timeline: '.' is no regular file"}},
-    {"TimelineThatIsAFifo",
+     {"run.yaml:8:11: timeline: '.' is not a regular file"}},
+    {"TimelineIsAFifo",
      good + "timeline: fifo.obj\n",
      small_scene,
-     {"run.yaml:8:11: timeline: 'fifo.obj' is no regular file"}},
+     {"run.yaml:8:11: timeline: 'fifo.obj' is not a regular file"}},
     {"TimelineWithTooLongAName",
      good + "timeline: " + std::string(300, 'a') + "\n",
      small_scene,
@@ -205,7 +205,7 @@ const std::vector<Case> cases = {
      replaced(counting("lockstep", "frames: 5", "file: path.txt", ""), "path: counted.txt", "path: path.txt"),
      small_scene,
      {"run.yaml:6:", "'path.txt' is a file that this run reads"}},
-    {"OutputOverThePluginThatIsNamedByItsPath",
+    {"OutputOverAPlugin",
      replaced(replaced(good, "rt_counter", "./text.so"), "path: counted.txt", "path: text.so"),
      small_scene,
      {"run.yaml:6:", "outputs[0].path: 'text.so' is a file that this run reads"}},
@@ -222,7 +222,7 @@ const std::vector<Case> cases = {
      replaced(good, "source_counter,", "source_file, path: f-%04d.png,").append("timeline: f-0001.png\n"),
      small_scene,
      {"run.yaml:8:11: timeline: 'f-0001.png' is a file that this run reads"}},
-    {"OutputOverAFileThatItReadsItself",
+    {"OutputOverItsOwnInput",
      replaced(good, "path: counted.txt", "path: path.txt, options: {script: path.txt}"),
      small_scene,
      {"run.yaml:6:", "outputs[0].path: 'path.txt' is a file that this run reads"}},
@@ -238,24 +238,24 @@ const std::vector<Case> cases = {
      good + "timeline: hard.obj\n",
      replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"),
      {"run.yaml:8:11: timeline: 'hard.obj' is a file that this run reads (", "/mesh.obj)"}},
-    {"FramesPerSecondThatAreNoNumber",
+    {"FpsIsNotANumber",
      replaced(good, "source_counter,", "source_counter, fps: .nan,"),
      small_scene,
      {"run.yaml:3:", "source.fps: must be a finite number, 0 to 10000, is .nan"}},
-    {"FramesPerSecondThatNoClockCounts",
+    {"FpsTooSmall",
      replaced(good, "source_counter,", "source_counter, fps: 1e-300,"),
      small_scene,
-     {"run.yaml:3:", "source.fps: must be 0, for the source's own, or 1e-06 to 10000, is 1e-300"}},
-    {"SceneThatIsAFifo",
+     {"run.yaml:3:", "source.fps: must be 0 (the source's own rate) or 1e-06 to 10000, is 1e-300"}},
+    {"SceneIsAFifo",
      replaced(good, "scene.yaml", "fifo.obj"),
      small_scene,
      {"run.yaml:5:", "there is no scene file"}},
-    {"SceneWithAMeshThatIsAFifo",
+    {"MeshIsAFifo",
      good,
      replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: fifo.obj"),
      {"scene.yaml:4:", "fifo.obj", "is not a regular file"}},
-    {"CalibrationThatIsAFifo", good + "camera: {file: fifo.obj}\n", small_scene, {"fifo.obj", "no regular file"}},
-    {"SceneThatIsLoadedTooSlowly",
+    {"CalibrationIsAFifo", good + "camera: {file: fifo.obj}\n", small_scene, {"fifo.obj", "no regular file"}},
+    {"SceneLoadsTooSlowly",
      replaced(good, "scene.yaml,", "scene.yaml, start_deadline_ms: 20,"),
      big_scene(),
      {"scene.yaml: the scene loader was without a word of progress for 20 ms", "raytracer.start_deadline_ms"}},
@@ -273,7 +273,7 @@ class BadInput : public testing::TestWithParam<Case> {};
 
 } // namespace
 
-TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
+TEST_P(BadInput, IsReportedWithPositionAndFix) {
     ArhostRun run(GetParam().yaml);
     run.write("scene.yaml", GetParam().scene);
     run.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -294,13 +294,13 @@ TEST_P(BadInput, GetsOneMessageThatNamesThePlaceAndTheMend) {
         EXPECT_THAT(output, HasSubstr(part));
     EXPECT_THAT(output, Not(HasSubstr("terminate called")));
     EXPECT_THAT(output, Not(HasSubstr("what():")));
-    EXPECT_FALSE(run.exists("counted.txt")) << "half-written output";
+    EXPECT_FALSE(run.exists("counted.txt")) << "partial output";
     EXPECT_FALSE(run.exists("stats.json"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, testing::ValuesIn(cases), [](const auto &info) { return info.param.name; });
 
-TEST(Check, FindsAnOutputOverAMeshOfTheScene) {
+TEST(Check, DetectsAnOutputOverAMeshOfTheScene) {
     ArhostRun run(replaced(good, "path: counted.txt", "path: mesh.obj"));
     run.write("scene.yaml", replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh.obj"));
     run.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -308,7 +308,7 @@ TEST(Check, FindsAnOutputOverAMeshOfTheScene) {
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:40: outputs[0].path: 'mesh.obj' is a file that this run reads"));
 }
 
-TEST(Check, TakesAMeshWithAPercentSignInItsNameForNoPattern) {
+TEST(Check, DoesNotTreatAMeshNameAsAPattern) {
     ArhostRun run(replaced(good, "path: counted.txt", "path: mesh-7.obj"));
     run.write("scene.yaml", replaced(small_scene, "sphere: {centre: [0, 0, 10], radius: 10}", "mesh: mesh-%d.obj"));
     for (const char *mesh : {"mesh-%d.obj", "mesh-7.obj"})
@@ -316,14 +316,14 @@ TEST(Check, TakesAMeshWithAPercentSignInItsNameForNoPattern) {
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
 }
 
-TEST(Check, EndsWhereTheSceneIsLoadedTooSlowly) {
+TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
     ArhostRun run(good);
     run.write("scene.yaml", big_scene());
     EXPECT_EQ(run.run({"check", "run.yaml", "--set", "raytracer.start_deadline_ms=20"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader was without a word of progress for 20 ms"));
 }
 
-TEST(BadInput, LeavesTheOutputsOfAnEarlierRunAsTheyWere) {
+TEST(BadInput, KeepsTheOutputsOfAnEarlierRun) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
                   "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: last.png}\n"
                   "- {plugin: sink_video, path: film.mp4}\n- {plugin: sink_video, path: film.avi}\n");
@@ -337,7 +337,7 @@ TEST(BadInput, LeavesTheOutputsOfAnEarlierRunAsTheyWere) {
         EXPECT_NE(entry.path().filename().string()[0], '.') << entry.path() << " was left behind";
 }
 
-TEST(BadCommandLine, IsRefused) {
+TEST(BadCommandLine, IsRejected) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);
     struct {
@@ -364,13 +364,13 @@ TEST(BadCommandLine, IsRefused) {
     }
 }
 
-TEST(FullDisk, BehindStandardOutputIsAnError) {
+TEST(FullDisk, OnStandardOutputIsAnError) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);
     for (const std::vector<std::string> &arguments :
          {std::vector<std::string>{"schema"}, {"plugins"}, {"check", "run.yaml"}}) {
         run.start(arguments, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
         EXPECT_EQ(run.wait(), 1);
-        EXPECT_THAT(run.output(), HasSubstr("standard output can't be written"));
+        EXPECT_THAT(run.output(), HasSubstr("can't write to standard output"));
     }
 }

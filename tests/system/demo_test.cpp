@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The demonstration, and films that the real plugins write and read.
+// The demonstration, and videos that the real plugins write and read.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -33,7 +33,7 @@ std::string film_yaml(const std::string &outputs) {
 
 } // namespace
 
-TEST(Demo, LeavesItsFourFiles) {
+TEST(Demo, WritesItsFourFiles) {
     ArhostRun run;
     std::filesystem::copy(ARHOST_SOURCE_DIRECTORY "/config", run.path("config"),
                           std::filesystem::copy_options::recursive);
@@ -41,7 +41,7 @@ TEST(Demo, LeavesItsFourFiles) {
     EXPECT_EQ(frames_of(run.path("out/demo.mp4")), 42);
     const cv::Mat picture = cv::imread(run.path("out/demo.png").string());
     ASSERT_EQ(picture.size(), cv::Size(1280, 720));
-    cv::Mat red; // nothing on the desk is as red as the virtual sphere
+    cv::Mat red; // only the virtual sphere is this red
     cv::inRange(picture, cv::Scalar(0, 0, 120), cv::Scalar(60, 60, 255), red);
     EXPECT_GT(cv::countNonZero(red), 500);
     std::istringstream poses(run.read("out/demo.poses.jsonl"));
@@ -53,8 +53,8 @@ TEST(Demo, LeavesItsFourFiles) {
     EXPECT_EQ(stats["frames"]["augmented"], 42);
 }
 
-// What moves is at its place of the frame's own time, through host, worker and ray tracer.
-TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
+// Moving objects are rendered at the frame's capture time, end to end.
+TEST(Motion, IsRenderedAtTheFramesTime) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
         "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
@@ -71,7 +71,7 @@ TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
     moving.write(
         "scene.yaml",
         scene("motion: {keys: [{at_s: 0}, {at_s: 2, translate: [60, 0, 40]}, {at_s: 3, translate: [0, 0, 0]}]}"));
-    still.write("scene.yaml", scene("transform: [{translate: [30, 0, 20]}]")); // as at 1 s
+    still.write("scene.yaml", scene("transform: [{translate: [30, 0, 20]}]")); // the position at 1 s
     ASSERT_EQ(moving.run(), 0) << moving.output();
     ASSERT_EQ(still.run(), 0) << still.output();
     const auto different_pixels = [&](const char *name) {
@@ -81,12 +81,12 @@ TEST(Motion, PutsObjectsWhereTheyAreAtTheFramesTime) {
         cv::cvtColor(difference, grey, cv::COLOR_BGR2GRAY);
         return cv::countNonZero(grey > 8);
     };
-    EXPECT_LT(different_pixels("0030.png"), 20) << "silhouettes may step, for one is moved as an instance";
+    EXPECT_LT(different_pixels("0030.png"), 20) << "silhouettes may differ, as one object is a moved instance";
     EXPECT_GT(different_pixels("0000.png"), 500);
     EXPECT_GT(different_pixels("0020.png"), 200);
 }
 
-TEST(Film, CutShortIsKeptAndTheExitStatusTells) {
+TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
     ArhostRun run(film_yaml("- {plugin: sink_video, path: film.mkv}\n"));
     ASSERT_EQ(run.run(), 0) << run.output();
     ASSERT_EQ(frames_of(run.path("film.mkv")), 40);
@@ -104,7 +104,7 @@ TEST(Film, CutShortIsKeptAndTheExitStatusTells) {
     EXPECT_EQ(run.stats()["frames"]["composited"], kept);
 }
 
-TEST(Film, OnAFullDiskIsGivenUpAndTheOtherOutputsGoOn) {
+TEST(Film, OnAFullDiskFailsButOtherOutputsContinue) {
     ArhostRun run(film_yaml("- {plugin: sink_video, path: full/film.mp4}\n"
                             "- {plugin: sink_images, path: \"full/%04d.png\"}\n"
                             "- {plugin: sink_images, path: \"%04d.png\"}\n"));
@@ -117,7 +117,7 @@ TEST(Film, OnAFullDiskIsGivenUpAndTheOtherOutputsGoOn) {
     });
     const int status = run.wait();
     if (status == no_mount)
-        GTEST_SKIP() << "this user may not mount a small disk";
+        GTEST_SKIP() << "this user may not mount a tmpfs";
     EXPECT_EQ(status, 1);
     EXPECT_THAT(run.output(), HasSubstr("full/.%04d.png.partial': No space left"));
     EXPECT_THAT(run.output(), HasSubstr("sink_video"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Mode live: the newest frame wins, and the video never waits for a backend.
+// Mode live: the newest frame is processed, and the video never waits for a backend.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// Ascending, each overlay from its own frame's pose.
+// Frames are in order and each overlay belongs to its frame.
 void expect_own_overlays_in_order(const std::vector<CountedLine> &lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         ASSERT_EQ(lines[i].video, lines[i].sequence);
@@ -20,7 +20,7 @@ void expect_own_overlays_in_order(const std::vector<CountedLine> &lines) {
             ASSERT_GT(lines[i].sequence, lines[i - 1].sequence);
         }
         if (lines[i].overlay != "none") {
-            ASSERT_EQ(lines[i].overlay, std::to_string(lines[i].sequence)) << "the overlay is another frame's";
+            ASSERT_EQ(lines[i].overlay, std::to_string(lines[i].sequence)) << "the overlay belongs to another frame";
         }
     }
 }
@@ -29,7 +29,7 @@ bool is_plain(const CountedLine &line) {
     return line.overlay == "none";
 }
 
-std::uint64_t dropped(const nlohmann::json &stats) { // at all stages together
+std::uint64_t dropped(const nlohmann::json &stats) { // sum over all stages
     std::uint64_t sum = 0;
     for (const auto &[stage, count] : stats["frames"]["dropped"].items())
         sum += count.get<std::uint64_t>();
@@ -38,7 +38,7 @@ std::uint64_t dropped(const nlohmann::json &stats) { // at all stages together
 
 } // namespace
 
-TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
+TEST(Live, ASlowRayTracerDropsFramesAndCountsThem) {
     ArhostRun run(counting("live", "frames: 120", "", "delay_ms: 300", "live: {max_latency_ms: 60000}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -46,27 +46,27 @@ TEST(Live, ASlowRayTracerGetsTheNewestFrameAndDropsAreCountedThere) {
     expect_own_overlays_in_order(lines);
     const auto stats = run.stats();
     EXPECT_EQ(stats["frames"]["in"], 120);
-    // 300 ms a frame at 30 fps: eight of nine frames are dropped, however fast the machine is.
+    // 300 ms per frame at 30 fps: eight of nine frames are dropped on any machine.
     EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
-    EXPECT_EQ(dropped(stats) + lines.size(), 120u) << "each frame is shown or counted where it was dropped\n"
+    EXPECT_EQ(dropped(stats) + lines.size(), 120u) << "each frame is either shown or counted as dropped\n"
                                                    << stats.dump(1);
     for (const auto &line : lines)
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
 
-TEST(Live, AtTheEndAnImageThatNoOneWaitsForIsCancelled) {
+TEST(Live, CancelsAnUnneededImageAtTheEnd) {
     ArhostRun run(counting("live", "frames: 40", "", "delay_ms: 600000", "live: {max_latency_ms: 100}\n",
                            std::chrono::minutes(10)));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("cancelled while it waited"));
+    EXPECT_THAT(run.output(), HasSubstr("cancelled while waiting"));
     EXPECT_EQ(run.stats()["frames"]["in"], 40);
     EXPECT_EQ(dropped(run.stats()) + counted(run).size(), 40u) << run.stats().dump(1);
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
-// The real plugins at 30 frames a second; at 64 samples a pixel no machine's ray tracer keeps up.
-TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
+// The real plugins at 30 fps; at 64 samples per pixel the ray tracer is too slow on any machine.
+TEST(Live, ShownFramesEqualThoseOfLockstep) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "takes minutes under a sanitizer";
 #endif
@@ -89,34 +89,34 @@ TEST(Live, EachShownFrameIsTheOneThatLockstepMakesOfIt) {
         if (!live.exists(name))
             continue;
         ++shown;
-        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay is another frame's";
+        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay belongs to another frame";
     }
     EXPECT_EQ(shown + dropped(stats), 45u) << stats.dump(1);
     EXPECT_GT(shown, 2u);
 }
 
-TEST(Live, TheVideoGoesOnWhileABackendHangs) {
-    // In the first of ten frames that reaches it; by the end of its deadline they are past.
+TEST(Live, VideoContinuesWhileABackendHangs) {
+    // Hangs in the first of frames 20 to 29 that it gets; they have passed when its deadline expires.
     ArhostRun run(
         counting("live", "frames: 120", "", "hang_at: 20, hang_until: 30", "live: {max_latency_ms: 150}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.deadline_ms=700"}), 0) << run.output();
     const auto lines = counted(run);
     expect_own_overlays_in_order(lines);
-    EXPECT_GE(std::ranges::count_if(lines, is_plain), 5) << "the plain video was to go on until the deadline";
+    EXPECT_GE(std::ranges::count_if(lines, is_plain), 5) << "plain video must continue until the deadline";
     EXPECT_TRUE(std::ranges::any_of(lines, [](const auto &line) { return line.sequence > 30 && !is_plain(line); }))
-        << "the overlay was to come back";
+        << "the overlay must come back";
     EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
 }
 
-TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
+TEST(Live, VideoContinuesWhileABackendIsDown) {
     ArhostRun run(counting("live", "frames: 100000", "", "",
                            "live: {max_latency_ms: 60000}\nrestart: {proven_after_frames: 100000, first_delay_ms: "
                            "3000}\n"));
     run.write("scene.yaml", small_scene);
     run.start();
-    const auto wait_until = [&](const std::function<bool(const std::vector<CountedLine> &)> &holds) {
-        while (run.running() && !holds(counted(run)))
+    const auto wait_until = [&](const std::function<bool(const std::vector<CountedLine> &)> &condition) {
+        while (run.running() && !condition(counted(run)))
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
     };
     wait_until([](const auto &lines) { return lines.size() >= 15; });
@@ -128,7 +128,7 @@ TEST(Live, TheVideoGoesOnWhileABackendIsDown) {
     expect_own_overlays_in_order(counted(run));
 }
 
-TEST(Live, ASlowOutputDropsItsOwnFramesOnly) {
+TEST(Live, ASlowOutputDropsOnlyItsOwnFrames) {
     ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_counter, options: {frames: 120}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: slow.txt, "
                   "options: {delay_ms: 120}}\n"
@@ -139,7 +139,7 @@ TEST(Live, ASlowOutputDropsItsOwnFramesOnly) {
     EXPECT_GE(counted(run).size(), 80u);
 }
 
-TEST(Live, ASourceThatHasLeftFramesOutGoesOnBehindThemAfterADeath) {
+TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
     ArhostRun run(
         "version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 50, options: {frames: 250}, conform: "
         "true}\ncamera: {width: 64, height: 48, fx: 60}\noutputs: [{plugin: sink_counter, path: "
@@ -160,7 +160,7 @@ TEST(Live, ASourceThatHasLeftFramesOutGoesOnBehindThemAfterADeath) {
     const auto stats = run.stats();
     EXPECT_EQ(stats["restarts"]["source"], 1) << run.output();
     EXPECT_GE(stats["frames"]["dropped"]["source"], 15);
-    // A death comes between no two frames: each is given, or told as skipped. Those at the very end, maybe not.
+    // Each frame is delivered or reported as skipped, except possibly the last ones.
     EXPECT_LE(stats["frames"]["in"].get<int>() + stats["frames"]["dropped"]["source"].get<int>(), 250);
     for (const auto &[promise, entry] : stats["conformance"].items())
         EXPECT_EQ(entry["broken"], 0) << promise;

@@ -63,7 +63,7 @@ TEST(RealFrames, BothTrackersAugmentEveryFrame) {
     }
 }
 
-TEST(RealFrames, TwoRunsGiveTheSameBytes) {
+TEST(RealFrames, RunsAreReproducible) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
     ArhostRun first(configuration(apriltag)), second(configuration(apriltag));
     ASSERT_EQ(first.run(), 0) << first.output();
@@ -71,7 +71,7 @@ TEST(RealFrames, TwoRunsGiveTheSameBytes) {
     expect_same_results(first, second);
 }
 
-TEST(RealFrames, ARunInWhichEveryWorkerIsKilledGivesTheSameBytes) {
+TEST(RealFrames, KillingEveryWorkerDoesNotChangeTheResult) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
     ArhostRun clean(configuration(aruco)), killed(configuration(aruco));
     ASSERT_EQ(clean.run(), 0) << clean.output();

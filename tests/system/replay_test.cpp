@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A run is recorded, and its cameras are traced again.
+// Recording the camera poses of a run, and rendering them again.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 
 const std::string scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml";
 
-// A real chain on a small synthetic film, in the middle of which the marker is covered.
+// The real plugins on a small synthetic video; the marker is occluded in the middle.
 std::string recording(const std::string &frames = "40") {
     return "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, frames: " + frames +
            ", occlude_from: 12, occlude_to: 22}}\n"
@@ -25,7 +25,7 @@ std::string recording(const std::string &frames = "40") {
            "- {plugin: sink_images, path: \"recorded/%03d.png\"}\n- {plugin: sink_poses, path: recorded.jsonl}\n";
 }
 
-// The same without a tracker, its cameras from the trajectory.
+// The same with a trajectory instead of a tracker.
 const std::string replay_of_it = "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, "
                                  "frames: 100, occlude_from: 12, "
                                  "occlude_to: 22}}\n"
@@ -66,13 +66,13 @@ void record_counted(ArhostRun &run, int frames, const std::string &tracker = "",
 
 } // namespace
 
-TEST(Replay, GivesTheImagesOfTheRecordedRunByteForByte) {
+TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
     ArhostRun run(recording());
     ASSERT_EQ(run.run(), 0) << run.output();
     run.write("replay.yaml", replay_of_it);
     ASSERT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
     expect_same_images(run, 40);
-    EXPECT_FALSE(run.exists("replayed/040.png")) << "it ends with the trajectory";
+    EXPECT_FALSE(run.exists("replayed/040.png")) << "the run ends with the trajectory";
     EXPECT_EQ(run.read("again.trajectory"), run.read("run.trajectory"));
     int lost = 0;
     const auto lines = lines_of(run, "run.trajectory");
@@ -83,10 +83,10 @@ TEST(Replay, GivesTheImagesOfTheRecordedRunByteForByte) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 40 - lost);
 }
 
-TEST(Replay, WithThePipelineRunsTheTrackerButTakesTheRecordedCameras) {
+TEST(Replay, WithPipelineRunsTheTrackerButUsesTheRecordedPoses) {
     ArhostRun run(recording());
     ASSERT_EQ(run.run(), 0) << run.output();
-    // The film without the postcard: the tracker sees more than it did.
+    // Without the occlusion, the tracker finds more than it did.
     run.write("chain.yaml", recording("100") + "stats: recorded.stats.json\n");
     ASSERT_EQ(
         run.run({"replay", "--trajectory", "run.trajectory", "--config", "chain.yaml", "--with-pipeline", "--set",
@@ -105,10 +105,10 @@ TEST(Replay, WithThePipelineRunsTheTrackerButTakesTheRecordedCameras) {
     EXPECT_EQ(stats["stages"]["source"]["count"], 40);
     for (const char *process : {"host", "source", "tracker", "raytracer"})
         EXPECT_GT(stats["cpu_seconds"][process], 0.0) << process;
-    EXPECT_FALSE(run.exists("recorded.stats.json")) << "what the configuration writes stays untouched";
+    EXPECT_FALSE(run.exists("recorded.stats.json")) << "the configuration's own outputs are ignored";
 }
 
-TEST(Replay, AloneRunsNothingButTheRayTracer) {
+TEST(Replay, WithoutPipelineRunsOnlyTheRayTracer) {
     ArhostRun run;
     record_counted(run, 50, "lost_from: 10, lost_to: 20");
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--raytracer", "rt_counter",
@@ -125,7 +125,7 @@ TEST(Replay, AloneRunsNothingButTheRayTracer) {
     EXPECT_GT(stats["fps"], 0.0);
 }
 
-TEST(Replay, AloneLaysTheImagesOverBlack) {
+TEST(Replay, WithoutPipelineUsesABlackBackground) {
     ArhostRun run;
     record_counted(run, 30, "lost_from: 10, lost_to: 20");
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--raytracer", "rt_counter",
@@ -141,7 +141,7 @@ TEST(Replay, AloneLaysTheImagesOverBlack) {
     }
 }
 
-TEST(Replay, AloneTracesEachRecordedFrameOnceWhereTheRunDroppedSome) {
+TEST(Replay, RendersEachRecordedFrameOnceIfTheRecordingDroppedSome) {
     ArhostRun run;
     record_counted(run, 30);
     const std::string whole = run.read("t.txt");
@@ -164,7 +164,7 @@ TEST(Replay, AloneTracesEachRecordedFrameOnceWhereTheRunDroppedSome) {
     EXPECT_THAT(shown, testing::ElementsAre(0, 1, 2, 3, 6, 13, 20, 27));
 }
 
-TEST(Replay, LiveTakesTheCameraOfTheFrameThatItShows) {
+TEST(Replay, LiveUsesThePoseOfTheShownFrame) {
     ArhostRun run;
     record_counted(run, 60);
     run.write("live.yaml", "version: 1\nmode: live\ntrajectory: t.txt\n"
@@ -181,7 +181,7 @@ TEST(Replay, LiveTakesTheCameraOfTheFrameThatItShows) {
     EXPECT_LT(lines.back().sequence, 60u);
 }
 
-TEST(Replay, TakesTheDissertationsFormat) {
+TEST(Replay, ReadsTheDissertationsFormat) {
     ArhostRun run;
     record_counted(run, 30, "lost_from: 10, lost_to: 20", "dissertation");
     for (const bool cut : {false, true}) {
@@ -204,7 +204,7 @@ TEST(Replay, TakesTheDissertationsFormat) {
     }
 }
 
-TEST(Replay, TakesTheDissertationsOwnTrajectories) {
+TEST(Replay, ReadsTheDissertationsTrajectories) {
     ARHOST_REQUIRE_SHARED_DATA("seed-samples/camPose.txt");
     ArhostRun run;
     run.write("scene.yaml", small_scene);
@@ -215,7 +215,7 @@ TEST(Replay, TakesTheDissertationsOwnTrajectories) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 4289);
 }
 
-TEST(Replay, WithThePipelineNeedsNoConfiguration) {
+TEST(Replay, WithPipelineNeedsNoConfiguration) {
     ArhostRun run;
     record_counted(run, 4);
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--with-pipeline", "--frames", "3",
@@ -227,7 +227,7 @@ TEST(Replay, WithThePipelineNeedsNoConfiguration) {
     EXPECT_EQ(run.stats()["stages"]["tracker"]["count"], 3);
 }
 
-TEST(Replay, IsTheSameWhenTheRecordingSinkIsKilled) {
+TEST(Replay, RecordsTheSameTrajectoryIfTheSinkIsKilled) {
     ArhostRun run;
     record_counted(run, 400);
     const std::string expected = run.read("t.txt");
@@ -244,7 +244,7 @@ TEST(Replay, IsTheSameWhenTheRecordingSinkIsKilled) {
     EXPECT_EQ(run.read("killed.txt"), expected);
 }
 
-TEST(Replay, SurvivesItsRayTracer) {
+TEST(Replay, SurvivesARayTracerCrash) {
     ArhostRun run;
     record_counted(run, 60);
     ASSERT_EQ(
@@ -293,7 +293,7 @@ TEST(Replay, FinishesItsFilesOnCtrlCAndExitsWith130) {
     }
 }
 
-TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
+TEST(Replay, RejectsBadInputWithPositionAndFix) {
     ArhostRun run;
     record_counted(run, 5);
     const std::string good = run.read("t.txt");
@@ -318,7 +318,7 @@ TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
         const char *expected;
     } const cases[] = {
         {{"replay", "--scene", "scene.yaml"}, "--trajectory is required"},
-        {replay("t.txt", {}), "--scene is missing: the scene to trace"},
+        {replay("t.txt", {}), "--scene is missing: the scene to render"},
         {replay("none.txt"), "none.txt: can't be read: No such file or directory"},
         {replay("."), "is not a regular file"},
         {replay("garbage.txt"), "garbage.txt:2:1: is not valid JSON; delete the line"},
@@ -329,10 +329,10 @@ TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
         {replay("t.txt", {"--scene", "t.txt"}), "t.txt"},
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "rt_embre"}), "did you mean 'rt_embree'"},
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "sink_null"}), "is a sink, not a raytracer"},
-        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64"}), "--width and --height go together"},
-        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}), "tells its own image size"},
+        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64"}), "--width and --height must be given together"},
+        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}), "contains an image size"},
         {replay("plain.txt", {"--scene", "scene.yaml", "--width", "0", "--height", "48"}), "--width"},
-        {replay("t.txt", {"--scene", "scene.yaml", "--output", "x"}), "--output x: end the name in"},
+        {replay("t.txt", {"--scene", "scene.yaml", "--output", "x"}), "--output x: add an extension"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "x.xyz"}), "x.xyz"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "t.txt", "--set", "outputs[0].plugin=sink_counter"}),
          "--output: outputs[0].path: 't.txt' is a file that this run reads"},
@@ -354,7 +354,7 @@ TEST(Replay, RefusesBadInputWithOneMessageThatNamesThePlaceAndTheMend) {
     }
 }
 
-TEST(Replay, ARunWithoutACameraCanNotBeRecorded) {
+TEST(Replay, RecordingNeedsACamera) {
     ArhostRun run(recording("2"));
     ASSERT_EQ(run.run(), 0) << run.output();
     run.write("blind.yaml", "version: 1\nsource: {plugin: source_file, path: recorded/000.png}\n"
@@ -364,7 +364,7 @@ TEST(Replay, ARunWithoutACameraCanNotBeRecorded) {
     EXPECT_FALSE(run.exists("blind.trajectory"));
 }
 
-TEST(Replay, IsCheckedLikeAnyConfiguration) {
+TEST(Replay, CanBeChecked) {
     ArhostRun run;
     record_counted(run, 5);
     run.write("replay.yaml", "version: 1\ntrajectory: t.txt\nraytracer: {plugin: rt_counter, scene: scene.yaml}\n");

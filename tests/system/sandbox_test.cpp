@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A hostile tracker tries what docs/security.md lists; the run's video is whole, and what it tried has failed.
+// A hostile tracker attempts the attacks listed in docs/security.md; they must fail and the video must be complete.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::uint64_t frames = 60, attacked = 20;
+constexpr std::uint64_t frames = 60, attacked_frame = 20;
 
 class HostileRun : public ArhostRun {
 public:
@@ -47,7 +47,7 @@ public:
     HostileRun &operator=(const HostileRun &) = delete;
     fs::path target() const { return elsewhere_.path() / "target"; }
     std::string target_text() const { return read_file(target()); }
-    // `victim` takes the place of the host, which could not tell how it was killed.
+    // `victim`: target of the attacks instead of the host, which could not report its own death.
     void start_it(pid_t victim = 0) {
         start({"--config", "run.yaml"}, [this, victim] {
             ::setenv("HOSTILE_HOST", std::to_string(victim ? victim : ::getpid()).c_str(), 1);
@@ -75,13 +75,13 @@ private:
     std::vector<int> listening_;
 };
 
-// A process that only waits; whatever becomes of it.
+// A process that does nothing; a target for attacks.
 class Victim {
 public:
     Victim() : pid_(::fork()) {
         if (pid_ != 0)
             return;
-        ::prctl(PR_SET_PTRACER, PR_SET_PTRACER_ANY, 0, 0, 0); // whatever Yama says
+        ::prctl(PR_SET_PTRACER, PR_SET_PTRACER_ANY, 0, 0, 0); // allowed even under Yama
         for (;;)
             ::pause();
     }
@@ -111,12 +111,12 @@ void expect_frames_in_order(const ArhostRun &run) {
     }
 }
 
-// And each overlay is its own; only that of the attack may lack, and what it took `before` it.
-void expect_whole_video(const ArhostRun &run, std::uint64_t before = 0) {
+// Also, each overlay belongs to its frame; only the attacked frame and `before` frames before it may have none.
+void expect_complete_video(const ArhostRun &run, std::uint64_t before = 0) {
     expect_frames_in_order(run);
     const auto lines = counted(run, "out/counted.txt");
     for (std::uint64_t i = 0; i < lines.size(); ++i) {
-        if (i + before < attacked || i > attacked || lines[i].overlay != "none") {
+        if (i + before < attacked_frame || i > attacked_frame || lines[i].overlay != "none") {
             ASSERT_EQ(lines[i].overlay, std::to_string(i)) << i;
         }
     }
@@ -132,29 +132,29 @@ const std::string &level() {
     return text;
 }
 bool has(const std::string &layer) {
-    return level().substr(0, level().find("LACKING")).find(layer) != std::string::npos;
+    return level().substr(0, level().find("MISSING")).find(layer) != std::string::npos;
 }
 
-// The plugin can try, has tried, and all of it was stopped; it goes on working.
+// The attacks were attempted and all stopped, and the plugin continued.
 void expect_stopped(HostileRun &run) {
     ASSERT_EQ(run.attack(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(": stopped"));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
     EXPECT_EQ(run.target_text(), "secret");
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 0) << run.output();
-    expect_whole_video(run);
+    expect_complete_video(run);
 }
 
-// It broke the contract, each time that frame came to it: ended for the reason given, and started again.
+// The plugin violated the contract, was ended for `reason` and restarted.
 void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t before = 0) {
     ASSERT_EQ(run.attack(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(reason));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
     EXPECT_GT(run.stats()["restarts"]["tracker"], 0);
-    expect_whole_video(run, before);
+    expect_complete_video(run, before);
 }
 
-// Whose leak checker and stack traces need processes, and whose shadow memory no limit.
+// Sanitizers need processes for leak checks and stack traces, and unlimited shadow memory.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define REQUIRE_NO_SANITIZER() GTEST_SKIP() << "under a sanitizer the sandbox allows processes and all memory"
 #else
@@ -166,16 +166,16 @@ void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t befo
 
 } // namespace
 
-// Without this, the tests below could pass because their plugin tries nothing, or what can't succeed anyway.
+// Verifies the attacks: without the sandbox they succeed, so that the tests below are meaningful.
 class WithoutSandbox : public testing::TestWithParam<std::string> {};
 
-TEST_P(WithoutSandbox, TheSameAttackSucceeds) {
+TEST_P(WithoutSandbox, AttacksSucceed) {
     HostileRun run(GetParam(), "", "sandbox: none\n");
     const Victim victim;
     run.start_it(victim.pid());
     run.wait();
     EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
-    // What takes more than an ordinary user's rights, or a kernel that has it.
+    // Attacks that need more than an ordinary user's rights, or a kernel feature.
     const auto is_rare = [](const std::string &line) {
         const std::initializer_list<const char *> rare = {
             "the passwords", "packets", "virtual machines", "launcher", "/dev/", "/run: ", "/: "};
@@ -193,13 +193,13 @@ INSTANTIATE_TEST_SUITE_P(Sandbox, WithoutSandbox,
                                          "signal", "memory", "disk", "descriptors"),
                          [](const auto &info) { return info.param; });
 
-TEST(Sandbox, NoFileOutsideTheListIsRead) {
+TEST(Sandbox, BlocksReadingUnlistedFiles) {
     REQUIRE_LAYER("landlock");
     HostileRun run("read");
     expect_stopped(run);
 }
 
-TEST(Sandbox, NothingIsWritten) {
+TEST(Sandbox, BlocksWriting) {
     if (!has("landlock"))
         REQUIRE_LAYER("mount");
     HostileRun run("write");
@@ -208,33 +208,33 @@ TEST(Sandbox, NothingIsWritten) {
     expect_stopped(disk);
 }
 
-TEST(Sandbox, NoDeviceIsOpened) {
+TEST(Sandbox, BlocksDevices) {
     if (!has("landlock"))
         REQUIRE_LAYER("mount");
     HostileRun run("devices");
     expect_stopped(run);
 }
 
-TEST(Sandbox, NoSecretOfTheEnvironmentIsRead) {
-    REQUIRE_LAYER("landlock"); // the launcher's is in /proc
+TEST(Sandbox, HidesSecretsInTheEnvironment) {
+    REQUIRE_LAYER("landlock"); // protects /proc of the launcher
     HostileRun run("environment");
     expect_stopped(run);
 }
 
-TEST(Sandbox, NoSocketIsOpened) {
+TEST(Sandbox, BlocksSockets) {
     REQUIRE_LAYER("seccomp");
     HostileRun run("sockets");
     expect_stopped(run);
 }
 
-TEST(Sandbox, NoProcessIsStarted) {
+TEST(Sandbox, BlocksProcesses) {
     REQUIRE_NO_SANITIZER();
     REQUIRE_LAYER("seccomp");
     HostileRun run("processes");
     expect_stopped(run);
 }
 
-TEST(Sandbox, TheHostIsNotTraced) {
+TEST(Sandbox, BlocksTracingTheHost) {
     REQUIRE_NO_SANITIZER();
     REQUIRE_LAYER("seccomp");
     REQUIRE_LAYER("landlock");
@@ -242,22 +242,22 @@ TEST(Sandbox, TheHostIsNotTraced) {
     expect_stopped(run);
 }
 
-TEST(Sandbox, TheHostIsNotSignalled) {
+TEST(Sandbox, BlocksSignals) {
     REQUIRE_NO_SANITIZER();
     REQUIRE_LAYER("seccomp");
     HostileRun run("signal");
     expect_stopped(run);
 }
 
-// What may have processes must be able to signal those, and before Landlock's sixth version that is any single one.
-TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOlderKernels) {
+// A plugin with `processes` may signal its children; before Landlock version 6, it can signal any process.
+TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOldKernels) {
     REQUIRE_NO_SANITIZER();
     REQUIRE_LAYER("seccomp");
     const bool scoped = has("signals");
     for (const char *attack : {"signal", "signal_by_child"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack, ", allow: [processes]");
-        const Victim victim; // should it be reached, not the host
+        const Victim victim; // signalled instead of the host
         run.start_it(victim.pid());
         ASSERT_EQ(run.wait(), 0) << run.output();
         EXPECT_EQ(victim.lives(), scoped) << run.output();
@@ -268,41 +268,41 @@ TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOlderKernels) {
         else
             for (const char *what : {"reach all", "tkill", "pidfd", "a descriptor's owner", "a limit"})
                 EXPECT_THAT(run.output(), HasSubstr(std::string(": ") + what + ": stopped"));
-        expect_whole_video(run);
+        expect_complete_video(run);
     }
     HostileRun strict("none", ", allow: [processes]", "sandbox: strict\n");
-    const int status = strict.attack(); // other layers may be missing too
-    const bool refused = strict.output().find("signals to processes that are not its own") != std::string::npos;
+    const int status = strict.attack(); // other layers may also be missing
+    const bool refused = strict.output().find("blocking signals to other processes") != std::string::npos;
     EXPECT_EQ(refused, !scoped) << strict.output();
     EXPECT_TRUE(!refused || status == 2) << status;
 }
 
-TEST(Sandbox, MemoryEndsAtItsLimit) {
+TEST(Sandbox, LimitsMemory) {
     REQUIRE_NO_SANITIZER();
     HostileRun run("memory", ", memory_mb: 300");
     ASSERT_EQ(run.attack(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("half a GiB: stopped"));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
-    expect_whole_video(run);
+    expect_complete_video(run);
 }
 
-// The host still gives a worker that is started meanwhile its memory.
-TEST(Sandbox, DescriptorsAreLeftForOthers) {
+// The host can still pass descriptors to a new worker.
+TEST(Sandbox, LimitsDescriptors) {
     HostileRun run("descriptors");
     run.start_it();
-    while (run.running() && counted(run, "out/counted.txt").size() < attacked + 5)
+    while (run.running() && counted(run, "out/counted.txt").size() < attacked_frame + 5)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     send_signal(run.worker("sink_counter"), SIGKILL);
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(": stopped"));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
-    expect_whole_video(run);
+    expect_complete_video(run);
 }
 
-// 1,500 of them, of another program of the user's, which no sandbox bounds; fewer where that may not either.
-class DescriptorsUnderWay {
+// Keeps up to 1,500 descriptors in unread messages, like another program of the same user.
+class DescriptorsInFlight {
 public:
-    DescriptorsUnderWay() {
+    DescriptorsInFlight() {
         constexpr std::size_t messages = 6, each = 250;
         if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends_) != 0)
             return;
@@ -323,36 +323,36 @@ public:
         for (std::size_t i = 0; i < messages; ++i)
             (void)!::sendmsg(ends_[1], &message, MSG_DONTWAIT);
     }
-    ~DescriptorsUnderWay() {
+    ~DescriptorsInFlight() {
         ::close(ends_[0]);
         ::close(ends_[1]);
     }
-    DescriptorsUnderWay(const DescriptorsUnderWay &) = delete;
-    DescriptorsUnderWay &operator=(const DescriptorsUnderWay &) = delete;
+    DescriptorsInFlight(const DescriptorsInFlight &) = delete;
+    DescriptorsInFlight &operator=(const DescriptorsInFlight &) = delete;
 
 private:
     int ends_[2] = {-1, -1};
 };
 
-// The scene loader waits until it may hand over what it has loaded.
-TEST(Sandbox, ASceneIsLoadedThoughOthersHaveManyDescriptorsUnderWay) {
+// The scene loader waits until it can send its descriptors.
+TEST(Sandbox, LoadsASceneAlthoughOthersHaveManyDescriptorsInFlight) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);
     {
-        const DescriptorsUnderWay many;
+        const DescriptorsInFlight many;
         run.start({"check", "run.yaml"});
         std::this_thread::sleep_for(std::chrono::milliseconds(500));
     }
     EXPECT_EQ(run.wait(), 0) << run.output();
 }
 
-TEST(Sandbox, ScribbledRingsAndSlotsEndTheirWorker) {
+TEST(Sandbox, CorruptRingsAndSlotsEndTheWorker) {
     HostileRun run("scribble");
-    expect_ended(run, "broke the contract", 1); // it may wipe the last answer before the host has taken it
+    expect_ended(run, "broke the contract", 1); // it may overwrite the last answer before the host has read it
     EXPECT_THAT(run.output(), HasSubstr("make input writable: stopped"));
 }
 
-TEST(Sandbox, APluginForWhichItsMemoryIsTooSmallIsToldSo) {
+TEST(Sandbox, ReportsATooSmallMemoryLimit) {
     REQUIRE_NO_SANITIZER();
     ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
                   "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 1}\n"
@@ -361,17 +361,17 @@ TEST(Sandbox, APluginForWhichItsMemoryIsTooSmallIsToldSo) {
     EXPECT_THAT(run.output(), HasSubstr("'memory_mb' may be too small"));
 }
 
-TEST(Sandbox, RefusesALimitOfMemoryThatADriverWouldNotKeep) {
+TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
     ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
                   "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 100, allow: [gpu]}\n"
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("memory_mb: can't be kept with 'allow: [gpu]'"));
+    EXPECT_THAT(run.output(), HasSubstr("memory_mb: can't be enforced with 'allow: [gpu]'"));
 }
 
-// Whatever changes between a check and a use. A wrong pose may be among it, which nothing can tell from a right one.
-TEST(Sandbox, ThreadsThatChangeRingsAndSlotsDoNotHarmTheHost) {
+// Data may change between check and use. A wrong pose may result, which cannot be detected.
+TEST(Sandbox, SurvivesConcurrentChangesOfRingsAndSlots) {
     for (int i = 0; i < 3; ++i) {
         HostileRun run("race");
         ASSERT_EQ(run.attack(), 0) << run.output();
@@ -380,44 +380,44 @@ TEST(Sandbox, ThreadsThatChangeRingsAndSlotsDoNotHarmTheHost) {
     }
 }
 
-TEST(Sandbox, SharedMemoryIsNotTruncated) {
+TEST(Sandbox, BlocksTruncatingSharedMemory) {
     HostileRun run("truncate");
     expect_ended(run, "broke the contract", 1);
     EXPECT_THAT(run.output(), HasSubstr("open and truncate: stopped"));
 }
 
-TEST(Sandbox, MalformedMessagesEndTheirWorker) {
+TEST(Sandbox, MalformedMessagesEndTheWorker) {
     for (const char *attack : {"no_json", "wrong_types", "out_of_turn", "nested"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack);
         ASSERT_EQ(run.attack(), 0) << run.output();
         EXPECT_GT(run.stats()["restarts"]["tracker"], 0) << run.output();
-        expect_whole_video(run);
+        expect_complete_video(run);
     }
-    for (const char *attack : {"empty", "oversized"}) { // as if it had closed its end; refused by the socket
+    for (const char *attack : {"empty", "oversized"}) { // like a closed channel; rejected by the socket
         HostileRun run(attack);
         ASSERT_EQ(run.attack(), 0) << run.output();
-        expect_whole_video(run);
+        expect_complete_video(run);
     }
 }
 
-TEST(Sandbox, AFloodedDoorbellEndsItsWorker) {
+TEST(Sandbox, AFloodedDoorbellEndsTheWorker) {
     HostileRun run("doorbell");
     expect_ended(run, "floods its doorbell");
 }
 
-TEST(Sandbox, NoFlagOfADescriptorStopsTheHost) {
+TEST(Sandbox, DescriptorFlagsDoNotBlockTheHost) {
     HostileRun run("flags");
     expect_stopped(run);
 }
 
-TEST(Sandbox, AWorkerThatIgnoresAllSignalsIsKilled) {
+TEST(Sandbox, KillsAWorkerThatIgnoresSignals) {
     HostileRun run("deaf");
     expect_ended(run, "hung");
 }
 
-// What the host itself writes can't be led elsewhere or halted, even where the plugin may write beside it.
-TEST(Sandbox, WhatLiesInWaitForTheHostIsNotOpened) {
+// The host's own output files can't be redirected or blocked, even if the plugin can write to their folder.
+TEST(Sandbox, HostDoesNotOpenPlantedLinksOrPipes) {
     for (const char *attack : {"link", "pipe"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack, "", "sandbox: none\n");
@@ -425,7 +425,7 @@ TEST(Sandbox, WhatLiesInWaitForTheHostIsNotOpened) {
         EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
         EXPECT_EQ(run.target_text(), "secret");
         EXPECT_EQ(run.stats()["frames"]["in"], frames);
-        expect_whole_video(run);
+        expect_complete_video(run);
         if (!has("landlock"))
             continue;
         HostileRun inside(attack, ", writes: [.]");
@@ -433,30 +433,30 @@ TEST(Sandbox, WhatLiesInWaitForTheHostIsNotOpened) {
     }
 }
 
-TEST(Sandbox, StrictRunsOnlyWhereAllLayersAre) {
+TEST(Sandbox, StrictNeedsAllLayers) {
     HostileRun run("none", "", "sandbox: strict\n");
     const int status = run.attack();
-    if (has("LACKING") || level().find("LACKING") != std::string::npos) {
+    if (has("MISSING") || level().find("MISSING") != std::string::npos) {
         EXPECT_EQ(status, 2);
-        EXPECT_THAT(run.output(), HasSubstr("'sandbox: strict' asks for all of it"));
+        EXPECT_THAT(run.output(), HasSubstr("'sandbox: strict' requires all layers"));
     } else {
         EXPECT_EQ(status, 0) << run.output();
-        expect_whole_video(run);
+        expect_complete_video(run);
     }
 }
 
-TEST(Sandbox, ThePluginListSaysHowFarItIsReached) {
+TEST(Sandbox, PluginListReportsTheLayers) {
     EXPECT_THAT(level(), HasSubstr("no_new_privs: yes"));
     EXPECT_THAT(level(), HasSubstr("limits: "));
 }
 
-TEST(Sandbox, WhatAPluginNeedsMustBeAllowed) {
+TEST(Sandbox, NeedsMustBeAllowed) {
     const std::string yaml = "version: 1\nsource: {plugin: source_v4l2, options: {device: /dev/none}}\n"
                              "camera: {width: 640, height: 480, fx: 600}\noutputs: [{plugin: sink_null}]\n";
     ArhostRun run(yaml);
     EXPECT_EQ(run.run(), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:2"));
-    EXPECT_THAT(run.output(), HasSubstr("'source_v4l2' needs 'video', which the sandbox keeps from it: add 'allow: "
+    EXPECT_THAT(run.output(), HasSubstr("'source_v4l2' needs 'video', which the sandbox blocks: add 'allow: "
                                         "[video]' to source"));
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "source.allow=[video]"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
@@ -464,7 +464,7 @@ TEST(Sandbox, WhatAPluginNeedsMustBeAllowed) {
     EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
 }
 
-TEST(Sandbox, WarnsOfAnOutputThatMayWriteInAllOfTheWorkingDirectory) {
+TEST(Sandbox, WarnsIfAnOutputMayWriteToTheWorkingDirectory) {
     ArhostRun run(counting("lockstep", "frames: 3", "", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -473,7 +473,7 @@ TEST(Sandbox, WarnsOfAnOutputThatMayWriteInAllOfTheWorkingDirectory) {
     EXPECT_THAT(run.output(), Not(HasSubstr("can write all of")));
 }
 
-TEST(Sandbox, ALibraryThatLiesElsewhereIsGivenByReads) {
+TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {
     REQUIRE_LAYER("landlock");
     ArhostRun run;
     run.run({"plugins"});
@@ -483,7 +483,7 @@ TEST(Sandbox, ALibraryThatLiesElsewhereIsGivenByReads) {
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +can't be used: .*exports no symbol 'arhost_entry'"));
 }
 
-TEST(Sandbox, AllowsOnlyWhatThereIs) {
+TEST(Sandbox, RejectsUnknownPermissions) {
     HostileRun run("none", ", allow: [vidoe]");
     EXPECT_EQ(run.attack(), 2);
     EXPECT_THAT(run.output(), HasSubstr("tracker.allow[0]"));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Registration from end to end, lens distortion on: where the silhouette of a virtual plate lands in the
-// augmented frames, against where the source's exact pose puts it.
+// End-to-end registration with lens distortion: the silhouette of a virtual plate in the augmented frames is compared
+// with its projection by the source's exact pose.
 #include "arhost_run.hpp"
 #include "camera/lens.hpp"
 
@@ -15,7 +15,7 @@ using namespace arhost::test;
 namespace {
 
 constexpr int frames = 50;
-constexpr double half_side_mm = 45; // of the plate, which lies on the marker
+constexpr double half_side_mm = 45; // of the plate, which is centred on the marker
 
 arhost_intrinsics lens() {
     arhost_intrinsics i{};
@@ -46,12 +46,12 @@ std::string configuration(const std::string &tracker) {
            "poses.jsonl}\n";
 }
 
-// Pure green whatever the light: a mask of it is the silhouette.
+// Pure green under any light, so that a colour mask gives the silhouette.
 const char *const plate = "version: 1\naxes: z-up\nambient: 1\n"
                           "materials: {green: {model: diffuse, diffuse: 0, ambient: [0, 1, 0]}}\n"
                           "objects: [{plane: {size: 90}, material: green}]\n";
 
-// The plate's outline in px by the exact pose, bent as the lens bends it. `mt` is in GL eye space.
+// The plate's distorted outline in px for the exact pose `mt` in OpenGL eye space.
 std::vector<cv::Point2d> true_outline(const std::vector<double> &mt) {
     std::vector<cv::Point2d> outline;
     const double corners[5][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}, {-1, 1}};
@@ -81,7 +81,7 @@ double distance_to_outline(cv::Point2d point, const std::vector<cv::Point2d> &ou
 
 class Silhouette : public testing::TestWithParam<const char *> {};
 
-TEST_P(Silhouette, LandsWhereTheTruePosePutsIt) {
+TEST_P(Silhouette, MatchesTheExactPose) {
     ArhostRun run(configuration(GetParam()));
     run.write("plate.yaml", plate);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -99,7 +99,7 @@ TEST_P(Silhouette, LandsWhereTheTruePosePutsIt) {
         std::vector<std::vector<cv::Point>> contours;
         cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
         ASSERT_EQ(contours.size(), 1u) << name;
-        // The outermost pixel centres lie up to a pixel inside the edge, half of one on average.
+        // The outermost pixel centres are 0 to 1 px inside the edge, 0.5 px on average.
         double frame_px = 0;
         for (const cv::Point &point : contours[0])
             frame_px += distance_to_outline(point, outline);

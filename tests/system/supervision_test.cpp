@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Plugins that die, hang and err; the video goes on.
+// Plugins that crash, hang or fail; the video continues.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -25,14 +25,13 @@ void expect_all_frames_in_order(const ArhostRun &run, std::uint64_t frames) {
     }
 }
 
-// Waits until so many frames have been written.
 void wait_for_frames(const ArhostRun &run, std::size_t frames) {
     while (run.running() && counted(run).size() < frames)
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
 }
 
-// Or dead and not waited for: an orphan's new parent may not care.
-bool is_gone(pid_t pid) {
+// True for a zombie too: an orphan's new parent may not reap it.
+bool is_dead(pid_t pid) {
     const auto lives = [&] {
         std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
         std::string text;
@@ -52,7 +51,7 @@ std::vector<pid_t> forked_children(const ArhostRun &run) {
 
 } // namespace
 
-TEST(Supervision, APluginThatDiesOnAFrameIsTriedOnceMoreAndThenPassedBy) {
+TEST(Supervision, ACrashingFrameIsRetriedOnceThenSkipped) {
     struct Case {
         const char *tracker, *raytracer, *component;
     };
@@ -75,7 +74,7 @@ TEST(Supervision, APluginThatDiesOnAFrameIsTriedOnceMoreAndThenPassedBy) {
     }
 }
 
-TEST(Supervision, APluginThatHangsIsEndedAfterItsDeadline) {
+TEST(Supervision, AHungPluginIsEndedAfterItsDeadline) {
     ArhostRun run(counting("lockstep", "frames: 40", "", "hang_at: 20"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -96,7 +95,7 @@ TEST(Supervision, AHungPluginThatIgnoresSigabrtIsKilled) {
     EXPECT_THAT(how, HasSubstr("signal 9"));
 }
 
-TEST(Supervision, AWorkerThatClosesItsControlChannelIsStartedAgain) {
+TEST(Supervision, AWorkerThatClosesItsControlChannelIsRestarted) {
     ArhostRun run(counting("lockstep", "frames: 90, delay_ms: 20", "close_control_at: 10", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -105,7 +104,7 @@ TEST(Supervision, AWorkerThatClosesItsControlChannelIsStartedAgain) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
 }
 
-TEST(Supervision, ASourceThatIsKilledWhileItStartsAgainGoesOn) {
+TEST(Supervision, ASourceKilledDuringRestartContinues) {
     ArhostRun run(counting("lockstep", "frames: 400, delay_ms: 5", "", "", "restart: {first_delay_ms: 1}\n"));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -115,7 +114,7 @@ TEST(Supervision, ASourceThatIsKilledWhileItStartsAgainGoesOn) {
             send_signal(source, SIGKILL);
         for (int tries = 0; tries < 10'000 && !run.worker("source_counter"); ++tries)
             if (const pid_t starting = run.worker("arhost-worker")) {
-                send_signal(starting, SIGKILL); // it has not even said whether it can go on in the middle
+                send_signal(starting, SIGKILL); // before it has reported whether it can seek
                 ++hits;
                 break;
             }
@@ -125,7 +124,7 @@ TEST(Supervision, ASourceThatIsKilledWhileItStartsAgainGoesOn) {
     expect_all_frames_in_order(run, 400);
 }
 
-TEST(Supervision, APluginThatCallsExitIsStartedAgain) {
+TEST(Supervision, APluginThatCallsExitIsRestarted) {
     ArhostRun run(counting("lockstep", "frames: 30", "exit_at: 15", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -134,7 +133,7 @@ TEST(Supervision, APluginThatCallsExitIsStartedAgain) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 2);
 }
 
-TEST(Supervision, ABackendThatIsGivenUpInMidRunTakesNoFrameWithIt) {
+TEST(Supervision, GivingUpABackendLosesNoFrame) {
     struct Case {
         const char *tracker, *raytracer, *component;
     };
@@ -152,7 +151,7 @@ TEST(Supervision, ABackendThatIsGivenUpInMidRunTakesNoFrameWithIt) {
     }
 }
 
-TEST(Supervision, AnOutputThatIsGivenUpInMidRunTakesNoFrameOfTheOthersWithIt) {
+TEST(Supervision, GivingUpAnOutputLosesNoFrameOfTheOthers) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 60}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
                   "options: {crash_at: 20}}\nrestart: {proven_after_frames: 1000, quarantine_after: 1}\n");
@@ -161,7 +160,7 @@ TEST(Supervision, AnOutputThatIsGivenUpInMidRunTakesNoFrameOfTheOthersWithIt) {
     EXPECT_TRUE(run.exists("counted.txt.done"));
 }
 
-TEST(Supervision, AWorkerThatSealsItsMemoryDoesNoHarm) {
+TEST(Supervision, AWorkerThatSealsItsMemoryIsHarmless) {
     for (const char *seal : {"seal", "write"}) {
         ArhostRun run(
             counting("lockstep", "frames: 30", std::string("seal: ") + seal, "", "restart: {first_delay_ms: 1}\n"));
@@ -173,7 +172,7 @@ TEST(Supervision, AWorkerThatSealsItsMemoryDoesNoHarm) {
     }
 }
 
-TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
+TEST(Supervision, ForkedProcessesEndWithTheirWorker) {
     const std::string yaml = counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", "");
     enum class End { worker_dies, launcher_dies, run_stops, host_is_killed };
     for (const End end : {End::worker_dies, End::launcher_dies, End::run_stops, End::host_is_killed}) {
@@ -190,7 +189,7 @@ TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
         else
             send_signal(run.pid(), end == End::run_stops ? SIGTERM : SIGKILL);
         for (const pid_t child : children) {
-            EXPECT_TRUE(is_gone(child)) << static_cast<int>(end);
+            EXPECT_TRUE(is_dead(child)) << static_cast<int>(end);
             ::kill(child, SIGKILL);
         }
         if (end == End::worker_dies || end == End::launcher_dies) {
@@ -199,15 +198,15 @@ TEST(Supervision, WhatAPluginForksEndsWithItsWorker) {
     }
 }
 
-TEST(Supervision, APluginsLastWordsNeedNotBeUtf8) {
+TEST(Supervision, StderrOfACrashedPluginNeedNotBeUtf8) {
     ArhostRun run(counting("lockstep", "frames: 30", "crash_at: 20", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.stats()["crashes"][0]["log_tail"].get<std::string>(), HasSubstr("last words: \uFFFD"));
 }
 
-// As Ctrl-Z does for longer than a deadline: the workers go on, their answers wait for the host.
-TEST(Supervision, NothingIsTakenForHungBecauseTheHostWasStopped) {
+// Like Ctrl-Z for longer than a deadline: the workers continue, and their answers wait.
+TEST(Supervision, NothingHangsIfTheHostIsStopped) {
     ArhostRun run(counting("lockstep", "frames: 120", "", "delay_ms: 5"));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -223,8 +222,8 @@ TEST(Supervision, NothingIsTakenForHungBecauseTheHostWasStopped) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 120);
 }
 
-// As a container that is frozen: the workers have not run, and the host may be thawed first.
-TEST(Supervision, NothingIsTakenForHungBecauseAllWereStopped) {
+// Like a frozen container: the host may be resumed before the workers.
+TEST(Supervision, NothingHangsIfAllProcessesAreStopped) {
     ArhostRun run(counting("lockstep", "frames: 100", "", "delay_ms: 5"));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -243,7 +242,7 @@ TEST(Supervision, NothingIsTakenForHungBecauseAllWereStopped) {
     EXPECT_THAT(run.output(), testing::Not(HasSubstr("hung")));
 }
 
-TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {
+TEST(Supervision, AFrameWithAnErrorIsSkippedWithoutARestart) {
     ArhostRun run(counting("lockstep", "frames: 30", "error_at: 5", "error_at: 8"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -254,13 +253,13 @@ TEST(Supervision, AFrameWithAnErrorIsPassedByWithoutARestart) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
-// A new process opens the device anew, and has memory: only a frame that brings it about each time goes without.
-class FailureThatCallsForANewWorker : public testing::TestWithParam<std::pair<arhost_status, const char *>> {};
-INSTANTIATE_TEST_SUITE_P(Statuses, FailureThatCallsForANewWorker,
+// A new process can reopen the device and has free memory; only a frame that fails again stays without overlay.
+class FatalError : public testing::TestWithParam<std::pair<arhost_status, const char *>> {};
+INSTANTIATE_TEST_SUITE_P(Statuses, FatalError,
                          testing::Values(std::pair(ARHOST_STATUS_ERROR_DEVICE_LOST, "device lost"),
                                          std::pair(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, "out of memory")));
 
-TEST_P(FailureThatCallsForANewWorker, GetsOne) {
+TEST_P(FatalError, RestartsTheWorker) {
     const std::string error = ", error: " + std::to_string(GetParam().first);
     ArhostRun run(counting("lockstep", "frames: 40", "error_at: 15" + error, "error_at: 25" + error));
     run.write("scene.yaml", small_scene);
@@ -273,10 +272,10 @@ TEST_P(FailureThatCallsForANewWorker, GetsOne) {
     for (const CountedLine &line : counted(run))
         EXPECT_EQ(line.overlay == "none", line.sequence == 15 || line.sequence == 25) << line.sequence;
     for (const char *component : {"tracker", "raytracer"})
-        EXPECT_EQ(run.stats()["restarts"][component], 2) << component << ": the frame is tried once more";
+        EXPECT_EQ(run.stats()["restarts"][component], 2) << component << ": the frame is retried once";
 }
 
-TEST_P(FailureThatCallsForANewWorker, AtEachFrameIsGivenUp) {
+TEST_P(FatalError, OnEveryFrameEndsThePlugin) {
     ArhostRun run(counting("lockstep", "frames: 40", "", "answer: " + std::to_string(GetParam().first),
                            "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
     run.write("scene.yaml", small_scene);
@@ -285,7 +284,7 @@ TEST_P(FailureThatCallsForANewWorker, AtEachFrameIsGivenUp) {
     EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
 }
 
-TEST(Supervision, ATrackerThatReportsNonsenseIsEnded) {
+TEST(Supervision, ATrackerThatReportsNanIsEnded) {
     ArhostRun run(counting("lockstep", "frames: 30", "nan_at: 15", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -294,21 +293,21 @@ TEST(Supervision, ATrackerThatReportsNonsenseIsEnded) {
     EXPECT_EQ(counted(run)[15].overlay, "none");
 }
 
-TEST(Supervision, APluginThatNeverWorksIsGivenUpAndTheRunFails) {
+TEST(Supervision, APluginThatNeverWorksFailsTheRun) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
                            "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run(), 1);
     EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
     EXPECT_THAT(run.output(), HasSubstr("in create"));
-    EXPECT_FALSE(run.exists("counted.txt")) << "an output was begun by a run that could not begin";
+    EXPECT_FALSE(run.exists("counted.txt")) << "a run that could not start must not create outputs";
 }
 
-TEST(Supervision, TheFallbackTakesOverFromAPluginThatIsGivenUp) {
+TEST(Supervision, TheFallbackReplacesAPluginThatIsGivenUp) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
                            "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
     run.write("scene.yaml", small_scene);
-    // Without its options the same plugin works.
+    // The same plugin works with its default options.
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("falling back to rt_counter"));
     expect_all_frames_in_order(run, 30);
@@ -316,7 +315,7 @@ TEST(Supervision, TheFallbackTakesOverFromAPluginThatIsGivenUp) {
     EXPECT_EQ(run.stats()["crashes"][0]["plugin"], "rt_counter") << "the one that crashed";
 }
 
-TEST(Supervision, AnyWorkerMayBeKilledAndTheResultIsTheSame) {
+TEST(Supervision, KillingWorkersDoesNotChangeTheResult) {
     const std::string yaml = counting("lockstep", "frames: 400, delay_ms: 1", "", "");
     ArhostRun clean(yaml);
     clean.write("scene.yaml", small_scene);
@@ -337,7 +336,7 @@ TEST(Supervision, AnyWorkerMayBeKilledAndTheResultIsTheSame) {
         EXPECT_EQ(run.stats()["restarts"][component], 1) << component;
 }
 
-TEST(Supervision, SurvivesKillsAndStopsAtRandom) {
+TEST(Supervision, SurvivesRandomKillsAndStops) {
     constexpr std::uint64_t frames = 3000;
     ArhostRun run(counting("lockstep", "frames: " + std::to_string(frames) + ", delay_ms: 0.5", "", ""));
     run.write("scene.yaml", small_scene);
@@ -364,7 +363,7 @@ TEST(Supervision, SurvivesKillsAndStopsAtRandom) {
     expect_all_frames_in_order(run, frames);
 }
 
-TEST(Supervision, ASinkThatCanNotWriteIsGivenUpAndTheOthersGoOn) {
+TEST(Supervision, ASinkThatCannotWriteIsGivenUpAndOthersContinue) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
                   "options: {error_at: 5}}\n");
@@ -373,15 +372,15 @@ TEST(Supervision, ASinkThatCanNotWriteIsGivenUpAndTheOthersGoOn) {
     EXPECT_THAT(run.output(), HasSubstr("can't write frame 5"));
 }
 
-TEST(Supervision, AFrameThatTheSourceFailsToGiveIsAskedForAgainAndNeverLeftOut) {
+TEST(Supervision, AFailedSourceFrameIsRetriedAndNeverSkipped) {
     ArhostRun run(counting("lockstep", "frames: 60, error_at: 30", "", "", "restart: {first_delay_ms: 1}\n"));
     run.write("scene.yaml", small_scene);
-    EXPECT_EQ(run.run(), 1) << "the source can never give frame 30\n" << run.output();
+    EXPECT_EQ(run.run(), 1) << "the source always fails at frame 30\n" << run.output();
     expect_all_frames_in_order(run, 30);
 }
 
-// Else all the right times that follow would run backwards.
-TEST(Supervision, ACaptureTimeOfTheFarFutureCostsARestartAndNoFrame) {
+// Otherwise all correct times that follow would run backwards.
+TEST(Supervision, ACaptureTimeInTheFutureCausesARestartWithoutLosingFrames) {
     ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000, ahead_at: 15", "", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
@@ -390,7 +389,7 @@ TEST(Supervision, ACaptureTimeOfTheFarFutureCostsARestartAndNoFrame) {
     EXPECT_EQ(run.stats()["restarts"]["source"], 1);
 }
 
-TEST(Supervision, ASourceWhoseEveryFrameIsOfTheFarFutureIsGivenUp) {
+TEST(Supervision, ASourceWithOnlyFutureCaptureTimesIsGivenUp) {
     ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000", "", "",
                            "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
     run.write("scene.yaml", small_scene);
@@ -399,7 +398,7 @@ TEST(Supervision, ASourceWhoseEveryFrameIsOfTheFarFutureIsGivenUp) {
     EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
 }
 
-TEST(Supervision, ASourceThatDiesAtTheLastFramesThatAreAskedForGivesThemAll) {
+TEST(Supervision, ASourceThatDiesNearTheFrameLimitDeliversAllFrames) {
     ArhostRun run(counting("lockstep", "frames: 100, hold_at: 12", "", ""));
     run.write("scene.yaml", small_scene);
     run.start({"--config", "run.yaml", "--frames", "14"});
@@ -409,7 +408,7 @@ TEST(Supervision, ASourceThatDiesAtTheLastFramesThatAreAskedForGivesThemAll) {
     expect_all_frames_in_order(run, 14);
 }
 
-TEST(Supervision, AClosedWindowEndsTheRunAndTheOtherOutputsAreFinished) {
+TEST(Supervision, AClosedWindowEndsTheRunAndOtherOutputsFinish) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100000}}\n"
                   "outputs:\n- {plugin: sink_counter, path: window.txt, options: {end_at: 20}}\n"
                   "- {plugin: sink_counter, path: counted.txt, options: {delay_ms: 2}}\n");
@@ -419,7 +418,7 @@ TEST(Supervision, AClosedWindowEndsTheRunAndTheOtherOutputsAreFinished) {
     expect_all_frames_in_order(run, counted(run).size());
 }
 
-TEST(Supervision, AWorkerThatDiesAfterItHasFinishedIsLeftAtThat) {
+TEST(Supervision, AWorkerThatDiesAfterFinishingIsNotRestarted) {
     ArhostRun run(counting("lockstep", "frames: 30", "crash_in_destroy: true", ""));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run(), 0) << run.output();
@@ -428,7 +427,7 @@ TEST(Supervision, AWorkerThatDiesAfterItHasFinishedIsLeftAtThat) {
     EXPECT_THAT(run.output(), HasSubstr("after it had finished"));
 }
 
-TEST(Supervision, AStartMayTakeLongerThanItsDeadlineAsLongAsItTellsProgress) {
+TEST(Supervision, AStartWithProgressMayExceedItsDeadline) {
     ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 50, start_step_ms: 100", ""));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.start_deadline_ms=4000"}), 0) << run.output();
@@ -436,7 +435,7 @@ TEST(Supervision, AStartMayTakeLongerThanItsDeadlineAsLongAsItTellsProgress) {
     expect_all_frames_in_order(run, 5);
 }
 
-TEST(Supervision, AStartWithoutAWordOfProgressIsAHang) {
+TEST(Supervision, AStartWithoutProgressIsAHang) {
     ArhostRun run(counting("lockstep", "frames: 5", "start_steps: 1, start_step_ms: 60000", "",
                            "restart: {quarantine_after: 2, first_delay_ms: 1}\n"));
     run.write("scene.yaml", small_scene);
@@ -446,7 +445,7 @@ TEST(Supervision, AStartWithoutAWordOfProgressIsAHang) {
     EXPECT_FALSE(run.exists("counted.txt"));
 }
 
-TEST(Supervision, AnOutputThatHangsInItsStopIsEndedAndTheOthersAreFinished) {
+TEST(Supervision, AnOutputThatHangsInStopIsEndedAndOthersFinish) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 20}}\n"
                   "outputs:\n- {plugin: sink_counter, path: second.txt, options: {hang_in_stop: true}, "
                   "stop_deadline_ms: 300}\n- {plugin: sink_counter, path: counted.txt}\n");
@@ -457,7 +456,7 @@ TEST(Supervision, AnOutputThatHangsInItsStopIsEndedAndTheOthersAreFinished) {
     expect_all_frames_in_order(run, 20);
 }
 
-TEST(Supervision, AStoppedLauncherIsMadeToGoOn) {
+TEST(Supervision, AStoppedLauncherIsResumed) {
     ArhostRun run(counting("lockstep", "frames: 600, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -469,7 +468,7 @@ TEST(Supervision, AStoppedLauncherIsMadeToGoOn) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 1);
 }
 
-TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
+TEST(Supervision, AStoppedLauncherDoesNotDelayTheEnd) {
     ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 5", "start_steps: 1, start_step_ms: 3000", ""));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -480,8 +479,8 @@ TEST(Supervision, AStoppedLauncherDoesNotHoldUpTheEnd) {
     EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
 }
 
-// Its workers die with it, the output in the midst of a file; all start again under another.
-TEST(Supervision, AKilledLauncherIsReplacedAsOftenAsItTakes) {
+// Its workers die with it, the output while writing; all restart under a new launcher.
+TEST(Supervision, AKilledLauncherIsReplaced) {
     ArhostRun run(counting("lockstep", "frames: 700, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
     run.start();
@@ -496,8 +495,8 @@ TEST(Supervision, AKilledLauncherIsReplacedAsOftenAsItTakes) {
     EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher is gone, and all workers with it; starting"));
 }
 
-// Nobody is left to end what is stopped but the kernel, which lets the launcher go on.
-TEST(Supervision, AHostThatIsKilledLeavesNothingThoughAllIsStopped) {
+// Only the kernel is left to resume the launcher.
+TEST(Supervision, AKilledHostLeavesNoStoppedProcesses) {
     ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", ""));
     run.write("scene.yaml", small_scene);
     run.start({"--config", "run.yaml", "--set", "tracker.allow=[processes]", "--set", "tracker.writes=[.]"});
@@ -512,7 +511,7 @@ TEST(Supervision, AHostThatIsKilledLeavesNothingThoughAllIsStopped) {
         send_signal(*pid, SIGSTOP);
     send_signal(run.pid(), SIGKILL);
     for (const pid_t pid : all) {
-        EXPECT_TRUE(is_gone(pid)) << pid;
+        EXPECT_TRUE(is_dead(pid)) << pid;
         ::kill(pid, SIGKILL);
     }
 }
@@ -528,7 +527,7 @@ TEST(Supervision, OnlySourcesAndOutputsMayEndTheRun) {
     }
 }
 
-TEST(Supervision, TheRunEndsWhenNoOutputIsLeft) {
+TEST(Supervision, TheRunEndsIfNoOutputIsLeft) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000}}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt, options: {error_at: 5}}]\n");
     EXPECT_EQ(run.run(), 1) << run.output();

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
+// render-scene: renders a scene file from a given viewpoint with any ray tracer plugin, without video, tracker or
+// marker.
+#include "base/atomic_file.hpp"
+#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
-#include "base/usage.hpp"
-#include "base/whole_file.hpp"
 #include "base/write_all.hpp"
 #include "ray_tracer.hpp"
 #include "scene/loader.hpp"
 
-#include <CLI/CLI.hpp>
 #include <glm/trigonometric.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -55,7 +55,7 @@ arhost_camera camera_of(const View &view) {
     return camera;
 }
 
-// Straight alpha over a checkerboard of two greys, as painting programs show what is transparent.
+// Composites straight alpha over a grey checkerboard.
 cv::Mat over_checkerboard(const cv::Mat &rgba) {
     cv::Mat picture(rgba.size(), CV_8UC3);
     for (int y = 0; y < rgba.rows; ++y)
@@ -86,7 +86,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);
 }
 
-// The plugin's options: those that have a name of their own here, and above them what `--set` says.
+// Plugin options: those with their own command-line option, then those of `--set`.
 arhost::yaml::Node options_of(const std::optional<int> &samples, const std::optional<int> &light_samples,
                               const std::vector<std::string> &settings) {
     arhost::yaml::Node options = arhost::yaml::Node::parse("{}", "render-scene");
@@ -106,65 +106,54 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a full disk, and who reads no more, are errors
+    std::signal(SIGPIPE, SIG_IGN); // a full disk and a closed pipe are error values
     std::signal(SIGXFSZ, SIG_IGN);
-    CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
+    base::CommandLine app(
+        "Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
     std::string scene, output, label, ray_tracer = "rt_embree";
     View view;
     std::optional<int> samples, light_samples;
     std::vector<std::string> settings;
     double time_s = 0;
     bool transparent = false;
-    app.add_option("scene", scene, "The scene file")->required();
-    app.add_option("--eye", view.eye, "Where the camera is")
-        ->delimiter(',')
-        ->type_name("X,Y,Z")
-        ->capture_default_str();
-    app.add_option("--look-at", view.look_at, "What is in the picture's middle")
-        ->delimiter(',')
-        ->type_name("X,Y,Z")
-        ->capture_default_str();
-    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
-        ->delimiter(',')
-        ->type_name("X,Y,Z");
-    app.add_option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
-        ->check(CLI::Range(1.0, 170.0))
-        ->capture_default_str();
-    app.add_option("--size", view.size, "Of the picture, px")
-        ->delimiter('x')
-        ->type_name("WIDTHxHEIGHT")
-        ->check(CLI::Range(1, 16384))
-        ->default_str(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
-    app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
-        ->check([](const std::string &text) {
+    app.option("scene", scene, "The scene file").required();
+    app.option("--eye", view.eye, "Position of the camera").separator(',').type_name("X,Y,Z").show_default();
+    app.option("--look-at", view.look_at, "Point at the centre of the image")
+        .separator(',')
+        .type_name("X,Y,Z")
+        .show_default();
+    app.option("--up", view.up, "Up direction (default: the scene's)").separator(',').type_name("X,Y,Z");
+    app.option("--fov", view.field_of_view, "Vertical field of view, in degrees").range(1.0, 170.0).show_default();
+    app.option("--size", view.size, "Image size, in px")
+        .separator('x')
+        .type_name("WIDTHxHEIGHT")
+        .range(1, 16384)
+        .default_text(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
+    app.option("--time", time_s, "Time in s; animations repeat")
+        .check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
             return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
         })
-        ->capture_default_str();
-    app.add_option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
-        ->type_name("NAME|PATH")
-        ->capture_default_str();
-    app.add_option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
-        ->type_name("KEY=VALUE")
-        ->allow_extra_args(false);
-    app.add_option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
-        ->check(CLI::Range(1, 256));
-    app.add_option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
-        ->check(CLI::Range(1, 256));
-    app.add_option("--label", label, "A line of text to write into the picture");
-    app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
-    app.add_option("--output,-o", output, "The file to write")->required();
-    app.failure_message(base::usage_failure);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError &error) {
-        return app.exit(error) == 0 && base::stdout_is_written() ? EXIT_SUCCESS : bad_usage;
-    }
+        .show_default();
+    app.option("--raytracer", ray_tracer, "Ray tracer plugin, as in a configuration")
+        .type_name("NAME|PATH")
+        .show_default();
+    app.option("--set", settings, "Plugin option (repeatable); arhost plugins --options lists them")
+        .type_name("KEY=VALUE")
+        .one_value_each();
+    app.option("--samples", samples, "Plugin option 'samples' per pixel (default 16, if supported)").range(1, 256);
+    app.option("--light-samples", light_samples, "Plugin option 'light_samples': shadow rays per sample")
+        .range(1, 256);
+    app.option("--label", label, "Text to draw into the image");
+    app.flag("--transparent", transparent, "Keep alpha (PNG) instead of the checkerboard");
+    app.option("--output,-o", output, "The file to write").required();
+    if (const auto status = app.parse(argc, argv))
+        return base::flush_stdout() ? *status : bad_usage;
     try {
         const std::string kind = std::filesystem::path(output).extension();
         if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
             throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
-        base::WholeFile file(output);
+        base::AtomicFile file(output);
         const cv::Mat rgba =
             render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)), output);
         cv::Mat picture;

@@ -9,7 +9,7 @@
 using namespace arhost::base;
 namespace fs = std::filesystem;
 
-TEST(FileIdentity, IsThatOfTheFileWhateverLeadsToIt) {
+TEST(FileIdentity, IsTheSameForAllLinksToAFile) {
     const arhost::test::ScratchFolder scratch;
     const fs::path folder = fs::canonical(scratch.path()), file = folder / "file";
     std::ofstream(file) << "x";
@@ -24,7 +24,7 @@ TEST(FileIdentity, IsThatOfTheFileWhateverLeadsToIt) {
     EXPECT_EQ(identity_of(folder / "hard").node, identity.node);
 }
 
-TEST(FileIdentity, IsThePathWhereNoFileIs) {
+TEST(FileIdentity, IsThePathIfTheFileDoesNotExist) {
     const arhost::test::ScratchFolder scratch;
     const fs::path folder = fs::canonical(scratch.path());
     fs::create_directory_symlink(".", folder / "here");

@@ -23,12 +23,12 @@ pid_t sleeper() {
 
 } // namespace
 
-TEST(Orphans, EndButForThoseThatAreToBeKept) {
+TEST(Orphans, AreKilledExceptKeptOnes) {
     ::prctl(PR_SET_CHILD_SUBREAPER, 1);
     const pid_t kept = sleeper(), other = sleeper();
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
-    if (const pid_t parent = ::fork(); parent == 0) { // whose child comes here when it ends
+    if (const pid_t parent = ::fork(); parent == 0) { // its child is reparented to this process
         const pid_t left = sleeper();
         (void)!::write(ends[1], &left, sizeof left);
         ::_exit(0);

@@ -47,7 +47,7 @@ TEST_F(WriteAll, WritesMoreThanAPipeHolds) {
     EXPECT_EQ(taken, text);
 }
 
-TEST_F(WriteAll, IsEndedByASignalWhereNobodyReads) {
+TEST_F(WriteAll, IsInterruptedByASignalWhileAPipeIsFull) {
     std::jthread writer([&] {
         try {
             write_all(to_write.get(), std::string(1'000'000, 'x'), signals.get());
@@ -59,11 +59,11 @@ TEST_F(WriteAll, IsEndedByASignalWhereNobodyReads) {
     int waiting = 0; // bytes in the pipe
     while (waiting < 4096 * 16)
         ASSERT_EQ(::ioctl(to_read.get(), FIONREAD, &waiting), 0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50)); // it waits, most times: the signal ends it either way
+    std::this_thread::sleep_for(std::chrono::milliseconds(50)); // usually enough for the write to block
     ::kill(::getpid(), SIGUSR1);
 }
 
-TEST_F(WriteAll, IsEndedByASignalWhereATerminalIsHalted) {
+TEST_F(WriteAll, IsInterruptedByASignalWhileATerminalIsStopped) {
     int main_end = -1, other_end = -1;
     ASSERT_EQ(::openpty(&main_end, &other_end, nullptr, nullptr, nullptr), 0);
     const UniqueFd reader(main_end), terminal(other_end);
@@ -73,7 +73,7 @@ TEST_F(WriteAll, IsEndedByASignalWhereATerminalIsHalted) {
     ::kill(::getpid(), SIGUSR1);
 }
 
-TEST_F(WriteAll, SaysWhyItCantWrite) {
+TEST_F(WriteAll, ThrowsIfItCannotWrite) {
     const UniqueFd full(::open("/dev/full", O_WRONLY | O_CLOEXEC));
     EXPECT_THROW(write_all(full.get(), "x"), std::system_error);
     EXPECT_NO_THROW(write_all(full.get(), ""));

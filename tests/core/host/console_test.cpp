@@ -35,7 +35,7 @@ public:
         ::close(ends_[1]);
         before_ = -1;
     }
-    // What has been written, up to the restoring.
+    // Everything written before restore().
     std::string read_all() {
         std::string text;
         char bytes[4096];
@@ -50,30 +50,30 @@ private:
 
 } // namespace
 
-TEST(Console, KeepsWhateverAComponentSaysToOneLine) {
+TEST(Console, PrintsEachMessageOnOneLine) {
     Stderr stream;
     {
         Console console(false);
         console.log(ARHOST_SEVERITY_WARNING, "tracker", "two\nlines\033[2J");
-        console.log(ARHOST_SEVERITY_DEBUG, "tracker", "not asked for");
+        console.log(ARHOST_SEVERITY_DEBUG, "tracker", "not shown");
         console.log(ARHOST_SEVERITY_PLUGIN_MISBEHAVING, "source", "no frame");
     }
     stream.restore();
     EXPECT_EQ(stream.read_all(), "warning: tracker: two lines [2J\nerror: source: the plugin misbehaves: no frame\n");
 }
 
-TEST(Console, NeverHaltsWhoLogsAndTellsWhatWasLost) {
+TEST(Console, DropsLinesInsteadOfBlockingAndReportsTheirNumber) {
     Stderr stream;
     std::string text;
     std::thread reader;
     {
         Console console(true);
         const std::string long_line(200, 'x');
-        for (int i = 0; i < 5000; ++i) // a pipe holds 64 KiB: who waited for it would wait for ever
+        for (int i = 0; i < 5000; ++i) // far more than the 64 KiB that a pipe holds
             console.log(ARHOST_SEVERITY_INFO, "tracker", long_line);
         reader = std::thread([&] { text = stream.read_all(); });
     }
     stream.restore();
     reader.join();
-    EXPECT_THAT(text, HasSubstr(" lines were lost, since nobody took them from stderr\n"));
+    EXPECT_THAT(text, HasSubstr(" lines were dropped because stderr was not read\n"));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What `arhost new-plugin` writes and refuses; that the skeletons work is tested in tests/sdk.
+// What `arhost new-plugin` writes and rejects; tests/sdk tests the skeletons.
 #include "host/new_plugin.hpp"
 
 #include "plugin_under_test.hpp"
@@ -25,13 +25,13 @@ std::string text_of(const fs::path &file) {
     return text.str();
 }
 
-std::string reason_for_refusing(const NewPlugin &plugin) {
+std::string rejection_of(const NewPlugin &plugin) {
     try {
         new_plugin(plugin, prefix);
     } catch (const std::runtime_error &error) {
         return error.what();
     }
-    return "not refused";
+    return "accepted";
 }
 
 } // namespace
@@ -62,42 +62,42 @@ TEST(NewPlugin, NamesTheClassAfterThePlugin) {
     EXPECT_THAT(text_of(folder.path() / "a_b2_cd/a_b2_cd.py"), HasSubstr("class AB2Cd:"));
 }
 
-TEST(NewPlugin, RefusesNamesThatToolsCannotTake) {
+TEST(NewPlugin, RejectsInvalidNames) {
     const arhost::test::ScratchFolder folder;
     for (const char *name : {"", "Tracer", "2d", "my-tracer", "a b", "../up", "_x", "größe"})
-        EXPECT_THAT(reason_for_refusing({"sink", name, "c", folder.path()}),
-                    HasSubstr("must be 1 to 64 small letters"));
-    EXPECT_THAT(reason_for_refusing({"sink", "test", "c", folder.path()}), HasSubstr("choose another, as 'my_test'"));
+        EXPECT_THAT(rejection_of({"sink", name, "c", folder.path()}),
+                    HasSubstr("must be 1 to 64 lower-case letters"));
+    EXPECT_THAT(rejection_of({"sink", "test", "c", folder.path()}), HasSubstr("choose another, as 'my_test'"));
     EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-TEST(NewPlugin, RefusesNamesThatMeanSomethingElseInTheSkeleton) {
+TEST(NewPlugin, RejectsNamesThatClashWithTheSkeleton) {
     const arhost::test::ScratchFolder folder;
     const auto expect = [&](const NewPlugin &plugin, const std::string &reason) {
-        EXPECT_THAT(reason_for_refusing(plugin), HasSubstr("the name '" + plugin.name + "' " + reason))
+        EXPECT_THAT(rejection_of(plugin), HasSubstr("the name '" + plugin.name + "' " + reason))
             << plugin.kind << " in " << plugin.language;
         EXPECT_TRUE(fs::is_empty(folder.path())) << plugin.name;
     };
     for (const char *name : {"host", "options", "plugin", "result", "failure"})
         for (const std::string &kind : plugin_kinds)
-            expect({kind, name, "rust", folder.path()}, "makes a class '");
+            expect({kind, name, "rust", folder.path()}, "results in the class name '");
     for (const std::string &kind : plugin_kinds)
-        expect({kind, kind, "rust", folder.path()}, "makes a class '");
+        expect({kind, kind, "rust", folder.path()}, "results in the class name '");
     for (const char *language : {"rust", "cpp"})
         for (const auto &[kind, name] : {std::pair{"tracker", "patch"}, {"raytracer", "ray"}})
-            expect({kind, name, language, folder.path()}, "makes a class '");
-    expect({"raytracer", "vec_3", "rust", folder.path()}, "makes a class 'Vec3'");
-    expect({"raytracer", "tracer", "c", folder.path()}, "is that of another file of the skeleton");
+            expect({kind, name, language, folder.path()}, "results in the class name '");
+    expect({"raytracer", "vec_3", "rust", folder.path()}, "results in the class name 'Vec3'");
+    expect({"raytracer", "tracer", "c", folder.path()}, "is the name of another file of the skeleton");
     for (const char *name : {"numpy", "sys", "json", "random", "unittest", "tracker"})
-        expect({"tracker", name, "python", folder.path()}, "has no underscore, which every name in Python needs");
+        expect({"tracker", name, "python", folder.path()}, "has no underscore, which is required in Python");
     for (const char *name : {"py_compile", "pydoc_data", "sre_parse"})
-        expect({"tracker", name, "python", folder.path()}, "is that of a module of Python's");
+        expect({"tracker", name, "python", folder.path()}, "is a standard Python module");
     for (const char *name : {"core", "std", "test", "self", "arhost_sys", "m", "all", "edit_cache"})
         for (const std::string &language : plugin_languages)
             expect({"sink", name, language, folder.path()}, "");
 }
 
-TEST(NewPlugin, RefusesTheNamesOfArhostsOwnPlugins) {
+TEST(NewPlugin, RejectsNamesOfBuiltInPlugins) {
     const arhost::test::ScratchFolder folder;
     fs::create_directories(folder.path() / "lib/arhost/plugins");
     std::ofstream(folder.path() / "lib/arhost/plugins/sink_null.so") << "x";
@@ -105,15 +105,15 @@ TEST(NewPlugin, RefusesTheNamesOfArhostsOwnPlugins) {
     EXPECT_FALSE(fs::exists(folder.path() / "sink_null"));
 }
 
-TEST(NewPlugin, LeavesWhatIsThereAsItIs) {
+TEST(NewPlugin, DoesNotOverwriteAnExistingFile) {
     const arhost::test::ScratchFolder folder;
     const fs::path there = folder.path() / "mine";
     std::ofstream(there) << "precious";
-    EXPECT_THAT(reason_for_refusing({"sink", "mine", "c", folder.path()}), HasSubstr("is there already"));
+    EXPECT_THAT(rejection_of({"sink", "mine", "c", folder.path()}), HasSubstr("already exists"));
     EXPECT_EQ(text_of(there), "precious");
 }
 
-TEST(NewPlugin, SaysWhereTheTemplatesShouldBe) {
+TEST(NewPlugin, ReportsMissingTemplates) {
     const arhost::test::ScratchFolder folder;
     try {
         new_plugin({"sink", "mine", "c", folder.path()}, folder.path());

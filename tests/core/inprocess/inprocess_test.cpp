@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-inprocess does what arhost does, but for processes and deadlines.
+// arhost-inprocess behaves like arhost, except for processes and deadlines.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -12,50 +12,50 @@ using testing::HasSubstr;
 
 namespace {
 
-// Returns the exit status; what it printed lies in said.txt.
+// Returns the exit status; the output is in output.txt.
 int run_in_process(const ArhostRun &run) {
     const std::string command = "cd " + run.path("").string() +
                                 " && ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
                                 " timeout 60 " ARHOST_BINARY_DIRECTORY
-                                "/bin/arhost-inprocess --config run.yaml >said.txt 2>&1";
+                                "/bin/arhost-inprocess --config run.yaml >output.txt 2>&1";
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 } // namespace
 
-TEST(InProcess, LeavesTheSameBytesAsProcesses) {
+TEST(InProcess, WritesTheSameBytesAsSeparateProcesses) {
     ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 5, lost_to: 9", "error_at: 20"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     const std::string of_processes = run.read("counted.txt");
     std::filesystem::remove(run.path("counted.txt"));
-    ASSERT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    ASSERT_EQ(run_in_process(run), 0) << run.read("output.txt");
     EXPECT_EQ(run.read("counted.txt"), of_processes);
     EXPECT_EQ(counted(run).size(), 30u);
 }
 
-TEST(InProcess, WaitsAsLongAsAFrameTakes) {
+TEST(InProcess, IgnoresDeadlines) {
     ArhostRun run(counting("lockstep", "frames: 2", "", "delay_ms: 300", "", std::chrono::milliseconds(100)));
     run.write("scene.yaml", small_scene);
-    EXPECT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    EXPECT_EQ(run_in_process(run), 0) << run.read("output.txt");
     EXPECT_EQ(run.stats()["frames"]["augmented"], 2);
 }
 
-TEST(InProcess, ReportsAPluginThatRefusesLikeArhost) {
+TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
     ArhostRun run(counting("lockstep", "frames: 2", "", "refuse: true"));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run_in_process(run), 2);
-    EXPECT_THAT(run.read("said.txt"), HasSubstr("run.yaml:5:"));
-    EXPECT_THAT(run.read("said.txt"), HasSubstr("refused, as the option 'refuse' asks"));
+    EXPECT_THAT(run.read("output.txt"), HasSubstr("run.yaml:5:"));
+    EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'refuse' requests"));
 }
 
-// Threads can't be killed; one that waits for its next frame ends all the same.
-TEST(InProcess, StartsAPluginAnewWhoseDeviceIsLost) {
+// Threads can't be killed, but a worker that waits for its next frame ends by itself.
+TEST(InProcess, RestartsAPluginWhoseDeviceIsLost) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "error_at: 20, error: -6"));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run_in_process(run), 0) << run.read("said.txt");
+    ASSERT_EQ(run_in_process(run), 0) << run.read("output.txt");
     EXPECT_EQ(counted(run).size(), 30u);
-    EXPECT_EQ(run.stats()["frames"]["augmented"], 29) << "the frame is tried once more";
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 29) << "the frame is retried once";
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 2);
 }

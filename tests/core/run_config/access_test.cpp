@@ -39,14 +39,14 @@ struct Access : testing::Test {
 
 } // namespace
 
-TEST_F(Access, IsNothingByItself) {
+TEST_F(Access, GrantsNothingByDefault) {
     const auto policy = of("{plugin: tracker_aruco, options: {dictionary: DICT_6X6_250, threads: 4}}", false);
     EXPECT_THAT(policy.readable, IsEmpty());
     EXPECT_THAT(policy.writable, IsEmpty());
     EXPECT_THAT(policy.allow, IsEmpty());
 }
 
-TEST_F(Access, OfASourceIsItsFile) {
+TEST_F(Access, ASourceMayReadItsFile) {
     file("film.mp4");
     file("film.mp4.key");
     EXPECT_THAT(of("{plugin: source_file, path: film.mp4}", false).readable, ElementsAre(folder / "film.mp4"));
@@ -54,12 +54,12 @@ TEST_F(Access, OfASourceIsItsFile) {
                 ElementsAre(folder / "film.mp4"));
 }
 
-TEST_F(Access, OfAPatternIsItsFolder) {
+TEST_F(Access, APatternGrantsItsFolder) {
     file("frames/0001.png");
     EXPECT_THAT(of("{plugin: source_file, path: frames/%04d.png}", false).readable, ElementsAre(folder / "frames"));
 }
 
-TEST_F(Access, IsNeverToDevicesNorToAllFiles) {
+TEST_F(Access, PathsNeverGrantDevicesOrBroadFolders) {
     for (const char *path : {"/dev/null", "missing.mp4", "/", "/missing.mp4", "/%04d.png", "/dev/../"}) {
         EXPECT_THAT(of("{plugin: source_file, path: " + std::string(path) + "}", false).readable, IsEmpty()) << path;
         EXPECT_THAT(of("{plugin: p, options: {folder: " + std::string(path) + "}}", false).readable, IsEmpty())
@@ -70,27 +70,27 @@ TEST_F(Access, IsNeverToDevicesNorToAllFiles) {
                 IsEmpty());
 }
 
-TEST_F(Access, OfAnOutputIsItsFolder) {
+TEST_F(Access, AnOutputMayWriteToItsFolder) {
     const std::string path = (folder / "out/film.mp4").string();
     EXPECT_THAT(of("{plugin: sink_video, path: " + path + "}", true).writable, ElementsAre(folder / "out"));
     EXPECT_THAT(of("{plugin: sink_video, options: {path: " + path + "}}", true).writable,
                 ElementsAre(folder / "out"));
 }
 
-TEST_F(Access, OfALinkedOutputIsTheTargetsFolderToo) {
+TEST_F(Access, ALinkedOutputMayAlsoWriteToTheTargetsFolder) {
     file("there/film.mp4");
     fs::create_symlink(folder / "there/film.mp4", folder / "link.mp4");
     EXPECT_THAT(of("{plugin: sink_video, path: " + (folder / "link.mp4").string() + "}", true).writable,
                 ElementsAre(folder, folder / "there"));
 }
 
-TEST_F(Access, OfOptionsIsTheFilesThatTheyName) {
+TEST_F(Access, OptionsGrantTheFilesTheyName) {
     file("tags.txt");
     const auto policy = of("{plugin: p, options: {file: tags.txt, device: /dev/null, other: none.txt}}", false);
     EXPECT_THAT(policy.readable, ElementsAre(folder / "tags.txt"));
 }
 
-TEST_F(Access, IsWidenedByKeys) {
+TEST_F(Access, KeysGrantMore) {
     file("data/a.txt");
     const auto policy = of("{plugin: p, allow: [gpu, video], reads: [data, data/a.txt], writes: [/var/tmp]}", false);
     EXPECT_THAT(policy.allow, ElementsAre("gpu", "video"));
@@ -98,11 +98,11 @@ TEST_F(Access, IsWidenedByKeys) {
     EXPECT_THAT(policy.writable, ElementsAre("/var/tmp"));
 }
 
-TEST_F(Access, ToWhatIsNotThereIsAnError) {
+TEST_F(Access, MissingPathsAreErrors) {
     file("data/a.txt");
     EXPECT_THAT(error_of("{plugin: p, reads: [data, dta]}"),
                 AllOf(HasSubstr("run.yaml:1:27: reads[1]: there is no file or folder '" + (folder / "dta").string()),
-                      HasSubstr("mend the path")));
+                      HasSubstr("correct the path")));
     EXPECT_THAT(error_of("{plugin: p, writes: [/no/such]}"),
                 AllOf(HasSubstr("run.yaml:1:22: writes[0]: there is no folder '/no/such'"), HasSubstr("mkdir -p")));
     EXPECT_THAT(error_of("{plugin: p, writes: [" + (folder / "data/a.txt").string() + "]}"),
@@ -111,7 +111,7 @@ TEST_F(Access, ToWhatIsNotThereIsAnError) {
     EXPECT_FALSE(fs::exists(folder / "dta"));
 }
 
-TEST_F(Access, UpFromALinkIsUpFromItsTarget) {
+TEST_F(Access, DotDotAfterALinkStartsAtItsTarget) {
     file("there/inner/x");
     file("there/tags.txt");
     file("tags.txt");
@@ -124,7 +124,7 @@ TEST_F(Access, UpFromALinkIsUpFromItsTarget) {
     EXPECT_THAT(of("{plugin: p, path: " + up + "/film.mp4}", true).writable, ElementsAre(folder / "there"));
 }
 
-TEST_F(Access, OfTheEnvironmentIsByName) {
+TEST_F(Access, EnvironmentVariablesAreGrantedByName) {
     EXPECT_THAT(of("{plugin: p, environment: [LICENCE_FILE]}", false).environment, ElementsAre("LICENCE_FILE"));
     for (const char *name : {"LICENCE_FILE=/x", R"("LICENCE\nFILE")", R"("LICENCE\0FILE")", "'A B'", "''"})
         EXPECT_THAT(error_of("{plugin: p, environment: [" + std::string(name) + "]}"),
@@ -132,7 +132,7 @@ TEST_F(Access, OfTheEnvironmentIsByName) {
             << name;
 }
 
-TEST_F(Access, ToAHomeOrTheWorkingDirectoryIsWarnedOf) {
+TEST_F(Access, WarnsIfAnOutputMayWriteToHomeOrTheWorkingDirectory) {
     const auto warning = [&](const std::string &path) {
         std::ofstream(folder / "run.yaml") << "path: " << path;
         return warning_of_output(Node::load(folder / "run.yaml").require("path"), "my_sink");
@@ -140,13 +140,13 @@ TEST_F(Access, ToAHomeOrTheWorkingDirectoryIsWarnedOf) {
     const std::string home = fs::canonical(std::getenv("HOME")).string();
     EXPECT_THAT(warning(home + "/film.mp4"),
                 HasSubstr("run.yaml:1:7: path: 'my_sink' can write all of '" + home + "'"));
-    EXPECT_THAT(warning("film.mp4"), HasSubstr("give it a folder of its own, as in 'path: output/film.mp4'"));
+    EXPECT_THAT(warning("film.mp4"), HasSubstr("give it its own folder, as in 'path: output/film.mp4'"));
     EXPECT_THAT(warning("/film.mp4"), HasSubstr("all of '/'"));
     EXPECT_EQ(warning("out/film.mp4"), "");
     EXPECT_EQ(warning((folder / "film.mp4").string()), "");
 }
 
-TEST_F(Access, ToUnknownThingsIsAnError) {
+TEST_F(Access, UnknownPermissionsAreErrors) {
     try {
         of("{plugin: p, allow: [everything]}", false);
         FAIL();

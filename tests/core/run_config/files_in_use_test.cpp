@@ -20,7 +20,7 @@ struct FilesInUseTest : testing::Test {
         std::ofstream(folder / name) << "x";
         return folder / name;
     }
-    // What is said to an output of that path, where the run reads `input`; "" is nothing.
+    // The error for an output of that path in a run that reads `input`, or "".
     std::string refusal(const std::string &input, const std::string &output) const {
         FilesInUse files;
         files.read_numbered(folder / input);
@@ -43,7 +43,7 @@ struct FilesInUseTest : testing::Test {
 
 } // namespace
 
-TEST_F(FilesInUseTest, KnowsAFileByItsName) {
+TEST_F(FilesInUseTest, RecognisesAFileByName) {
     file("a.yaml");
     EXPECT_EQ(refusal("a.yaml", "./a.yaml"), "run.yaml:1:8: path: '" + (folder / "./a.yaml").string() +
                                                  "' is a file that this run reads; choose another path");
@@ -51,7 +51,7 @@ TEST_F(FilesInUseTest, KnowsAFileByItsName) {
     EXPECT_NE(refusal("none.yaml", "none.yaml"), "");
 }
 
-TEST_F(FilesInUseTest, KnowsAFileByItsLinks) {
+TEST_F(FilesInUseTest, RecognisesAFileThroughLinks) {
     fs::create_symlink(file("a.yaml"), folder / "soft.yaml");
     fs::create_hard_link(folder / "a.yaml", folder / "hard.yaml");
     EXPECT_NE(refusal("a.yaml", "soft.yaml"), "");
@@ -60,7 +60,7 @@ TEST_F(FilesInUseTest, KnowsAFileByItsLinks) {
                                                       HasSubstr((folder / "a.yaml").string())));
 }
 
-TEST_F(FilesInUseTest, KnowsAFileUpFromALink) {
+TEST_F(FilesInUseTest, RecognisesAFileViaDotDotAfterALink) {
     file("there/inner/x");
     file("there/a.yaml");
     fs::create_directory_symlink("there/inner", folder / "link");
@@ -69,14 +69,14 @@ TEST_F(FilesInUseTest, KnowsAFileUpFromALink) {
     EXPECT_EQ(refusal("a.yaml", "link/../a.yaml"), "");
 }
 
-TEST_F(FilesInUseTest, KnowsTheFilesOfAPattern) {
+TEST_F(FilesInUseTest, RecognisesTheFilesOfAPattern) {
     file("f-0001.png");
     EXPECT_THAT(refusal("f-%04d.png", "f-00%02d.png"), HasSubstr("(" + (folder / "f-0001.png").string() + ")"));
     EXPECT_NE(refusal("f-%04d.png", "f-0001.png"), "");
     EXPECT_NE(refusal("f-0001.png", "f-%04d.png"), "");
     fs::create_hard_link(folder / "f-0001.png", folder / "g-7.png");
     EXPECT_NE(refusal("f-%04d.png", "g-%d.png"), "");
-    // Files that such a pattern does not write, or that are not there yet.
+    // Files that the pattern does not match, or that do not exist yet.
     for (const char *other : {"f-%d.png", "f-%03d.png", "f-%05d.png", "f-000%%1.png", "f-%04d.jpg", "f-%x.png",
                               "f-0002.png", "f_%04d.png", "g-8.png", "f.%04d.png"})
         EXPECT_EQ(refusal("f-%04d.png", other), "") << other;
@@ -84,12 +84,12 @@ TEST_F(FilesInUseTest, KnowsTheFilesOfAPattern) {
     EXPECT_NE(refusal("f-%.png", "f-%.png"), "");
     file("f-0.png");
     EXPECT_NE(refusal("f-0.png", "f-%01d.png"), "");
-    EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "no digit is left";
+    EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "no digit left to match";
     file("100%f-12345.png");
-    EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "more digits than at least";
+    EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "more than the minimum digits";
 }
 
-TEST_F(FilesInUseTest, TakesNoNameForAPatternButWherePatternsAreMeant) {
+TEST_F(FilesInUseTest, ExpandsPatternsOnlyWhereTheyAreExpected) {
     file("f-0001.png");
     FilesInUse files;
     files.read(folder / "f-%04d.png");
@@ -97,57 +97,58 @@ TEST_F(FilesInUseTest, TakesNoNameForAPatternButWherePatternsAreMeant) {
     EXPECT_NE(error_of([&] { files.write(node("f-%04d.png")); }), "");
 }
 
-TEST_F(FilesInUseTest, TakesOneNumberAlone) {
+TEST_F(FilesInUseTest, AcceptsOnlyOneNumberInAPattern) {
     file("f-00010002.png");
     EXPECT_EQ(refusal("f-%04d%04d.png", "f-00010002.png"), "");
     std::string numbers;
     for (int i = 0; i < 100; ++i)
         numbers += "%d";
     file(std::string(200, '1') + ".png");
-    EXPECT_EQ(refusal("other.png", numbers + ".jpg"), "") << "and soon";
+    EXPECT_EQ(refusal("other.png", numbers + ".jpg"), "") << "and quickly";
 }
 
-TEST_F(FilesInUseTest, ListsNoFolderThatIsNotThere) {
+TEST_F(FilesInUseTest, AcceptsPatternsInMissingFolders) {
     EXPECT_EQ(refusal("none/f-%04d.png", "f-0001.png"), "");
     EXPECT_NE(refusal("none/f-%04d.png", "none/f-%04d.png"), "");
 }
 
-TEST_F(FilesInUseTest, KnowsWhatAnotherOutputWrites) {
+TEST_F(FilesInUseTest, RecognisesFilesOfOtherOutputs) {
     FilesInUse files;
     files.write(node("a.mp4"));
     EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output writes '"));
     file("f-0001.png");
     fs::create_hard_link(folder / "f-0001.png", folder / "f-0002.png");
-    EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "") << "one file by two names is one output's";
+    EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "")
+        << "one output may write a file under two names";
 }
 
-TEST_F(FilesInUseTest, KnowsOutputsThatCanMeetBeforeTheirFilesAreThere) {
-    const auto meet = [&](const std::string &one, const std::string &other) {
+TEST_F(FilesInUseTest, RecognisesOutputsThatCanCollideBeforeTheirFilesExist) {
+    const auto collide = [&](const std::string &one, const std::string &other) {
         FilesInUse files;
         files.write(node(one));
         const std::string error = error_of([&] { files.write(node(other)); });
         EXPECT_THAT(error, testing::AnyOf("", HasSubstr("can write a file of the same name"), HasSubstr("already")));
         return !error.empty();
     };
-    EXPECT_TRUE(meet("f%d.png", "f1%d.png"));
-    EXPECT_TRUE(meet("f1%d.png", "f%d.png"));
-    EXPECT_TRUE(meet("f%03d.png", "./f%04d.png")) << "both write f1000.png";
-    EXPECT_TRUE(meet("f%d.png", "f%d2.png"));
-    EXPECT_TRUE(meet("f%d.png", "f3.png"));
-    EXPECT_TRUE(meet("f3.png", "f%d.png"));
-    EXPECT_FALSE(meet("f%d.png", "g%d.png"));
-    EXPECT_FALSE(meet("f%d.png", "f-%d.png"));
-    EXPECT_FALSE(meet("f%d.png", "f%d.jpg"));
-    EXPECT_FALSE(meet("f%d.png", "f.png"));
-    EXPECT_FALSE(meet("f%d.png", "there/f%d.png"));
+    EXPECT_TRUE(collide("f%d.png", "f1%d.png"));
+    EXPECT_TRUE(collide("f1%d.png", "f%d.png"));
+    EXPECT_TRUE(collide("f%03d.png", "./f%04d.png")) << "both write f1000.png";
+    EXPECT_TRUE(collide("f%d.png", "f%d2.png"));
+    EXPECT_TRUE(collide("f%d.png", "f3.png"));
+    EXPECT_TRUE(collide("f3.png", "f%d.png"));
+    EXPECT_FALSE(collide("f%d.png", "g%d.png"));
+    EXPECT_FALSE(collide("f%d.png", "f-%d.png"));
+    EXPECT_FALSE(collide("f%d.png", "f%d.jpg"));
+    EXPECT_FALSE(collide("f%d.png", "f.png"));
+    EXPECT_FALSE(collide("f%d.png", "there/f%d.png"));
     fs::create_directory(folder / "there");
     fs::create_directory_symlink("there", folder / "link");
-    EXPECT_TRUE(meet("link/f%d.png", "there/f7.png"));
+    EXPECT_TRUE(collide("link/f%d.png", "there/f7.png"));
     fs::create_symlink("f-0001.png", folder / "to_none.json");
-    EXPECT_TRUE(meet("f-%04d.png", "to_none.json"));
+    EXPECT_TRUE(collide("f-%04d.png", "to_none.json"));
 }
 
-TEST_F(FilesInUseTest, TellsOfAnOutputWhenItsFileIsReadLater) {
+TEST_F(FilesInUseTest, RefusesAnOutputThatIsReadLater) {
     file("wood.png");
     FilesInUse files;
     files.write(node("wood.png"));
@@ -162,10 +163,10 @@ TEST_F(FilesInUseTest, TellsOfAnOutputWhenItsFileIsReadLater) {
     fs::create_hard_link(folder / "wood.png", folder / "hard.png");
     EXPECT_THAT(error_about("hard.png"), AllOf(HasSubstr(refused), HasSubstr("/hard.png)")));
     file("new.png");
-    EXPECT_NE(error_about("new.png"), "") << "which was not there yet";
+    EXPECT_NE(error_about("new.png"), "") << "created after write()";
 }
 
-TEST_F(FilesInUseTest, LooksAtNoFileOfThoseThatAreReadLater) {
+TEST_F(FilesInUseTest, DoesNotAccessFilesThatAreReadLater) {
     file("f-0001.png");
     file("wood.png");
     FilesInUse files;

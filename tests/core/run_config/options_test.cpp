@@ -35,7 +35,7 @@ std::string error_of(const std::string &yaml) {
 
 } // namespace
 
-TEST(Options, TakeTheirDefaultsAndTheGivenValuesInTheDeclaredOrder) {
+TEST(Options, UseDefaultsAndGivenValuesInDeclaredOrder) {
     const auto values = resolve("{path: x.png, options: {threads: 4, family: tag25h9}}");
     ASSERT_EQ(values.size(), 5u);
     EXPECT_EQ(values[0].integer, 4);
@@ -45,7 +45,7 @@ TEST(Options, TakeTheirDefaultsAndTheGivenValuesInTheDeclaredOrder) {
     EXPECT_EQ(values[4].text, "/lab/x.png") << "relative to the configuration's folder";
 }
 
-TEST(Options, AreRefusedWithTheirPlace) {
+TEST(Options, ReportErrorsWithTheirPosition) {
     EXPECT_EQ(error_of("{path: x, options: {threads: 9}}"),
               "/lab/a.yaml:1:30: options.threads: must be 1 to 8, is 9");
     EXPECT_THAT(error_of("{path: x, options: {family: tag36h12}}"), HasSubstr("did you mean 'tag36h11'?"));

@@ -20,14 +20,14 @@ std::string document(const std::string &name) {
 
 } // namespace
 
-TEST(Schema, IsWhatTheDocumentationSays) {
+TEST(Schema, MatchesTheDocumentation) {
     EXPECT_THAT(document("config.md"), testing::HasSubstr(schema_as_markdown()))
-        << "docs/config.md is out of date: put the output of 'arhost schema --markdown' there";
+        << "docs/config.md is out of date: replace its table with the output of 'arhost schema --markdown'";
 }
 
-TEST(Schema, IsWhatEditorsAreGiven) {
+TEST(Schema, MatchesTheJsonSchemaFile) {
     EXPECT_EQ(document("arhost.schema.json"), schema_as_json_schema())
-        << "docs/arhost.schema.json is out of date: it is the output of 'arhost schema'";
+        << "docs/arhost.schema.json is out of date: replace it with the output of 'arhost schema'";
 }
 
 TEST(Schema, ListsEachKeyOnceUnderAListedParent) {

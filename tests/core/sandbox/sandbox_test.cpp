@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Each layer alone, and all together, in a child process each: what is shut, and what must stay open.
+// Each layer alone and all together, each in a child process: what is blocked, and what must still work.
 #include "plugin_under_test.hpp"
 #include "sandbox/layers.hpp"
 
@@ -24,7 +24,7 @@ namespace {
 
 constexpr int layer_is_missing = 77;
 
-// Runs it in a child of its own, and returns the number of the first check that failed there; 0: none.
+// Runs `checks` in a child process; returns the number of the first failed check, or 0.
 int in_child(const std::function<int()> &checks) {
     const pid_t child = ::fork();
     if (child == 0)
@@ -34,7 +34,7 @@ int in_child(const std::function<int()> &checks) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-// Tells by number, since a child can't use the test's expectations.
+// Reports by number, since a child process can't use GoogleTest's expectations.
 class Checks {
 public:
     void that(bool holds) {
@@ -88,9 +88,9 @@ struct Sandbox : testing::Test {
 
 } // namespace
 
-TEST_F(Sandbox, NamespacesLeaveNothingWritableButTheFolders) {
+TEST_F(Sandbox, NamespacesMakeEverythingReadOnlyExceptTheFolders) {
     EXPECT_CHECKS(in_child([&] {
-        if (enter_namespaces(policy).reached.find("mount") == std::string::npos)
+        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
             return layer_is_missing;
         Checks check;
         check.that(opens(inside / "new", O_WRONLY | O_CREAT));
@@ -104,10 +104,10 @@ TEST_F(Sandbox, NamespacesLeaveNothingWritableButTheFolders) {
     }));
 }
 
-TEST_F(Sandbox, NamespacesLeaveNoDevicesButThoseOfTheList) {
+TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
     EXPECT_CHECKS(in_child([&] {
         if (!opens("/dev/ptmx", O_RDWR | O_NOCTTY) ||
-            enter_namespaces(policy).reached.find("mount") == std::string::npos)
+            enter_namespaces(policy).active.find("mount") == std::string::npos)
             return layer_is_missing;
         Checks check;
         check.that(!opens("/dev/ptmx", O_RDWR | O_NOCTTY));
@@ -118,7 +118,7 @@ TEST_F(Sandbox, NamespacesLeaveNoDevicesButThoseOfTheList) {
     }));
 }
 
-TEST_F(Sandbox, OfTheEnvironmentTheUsualIsLeftAndWhatIsGiven) {
+TEST_F(Sandbox, EnvironmentKeepsStandardAndGrantedVariables) {
     EXPECT_EQ(in_child([&] {
                   for (const char *variable : {"A_TOKEN", "NVIDIA_API_KEY", "GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME"})
                       ::setenv(variable, "value", 1);
@@ -136,32 +136,32 @@ TEST_F(Sandbox, OfTheEnvironmentTheUsualIsLeftAndWhatIsGiven) {
               0);
 }
 
-TEST_F(Sandbox, NamespacesKeepTheWorkingDirectoryWritableWhereItIsOne) {
+TEST_F(Sandbox, NamespacesKeepAWritableWorkingDirectoryWritable) {
     EXPECT_CHECKS(in_child([&] {
         fs::current_path(inside);
-        if (enter_namespaces(policy).reached.find("mount") == std::string::npos)
+        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
             return layer_is_missing;
         return opens("new", O_WRONLY | O_CREAT) ? 0 : 1;
     }));
 }
 
-TEST_F(Sandbox, NamespacesHaveNoNetworkUnlessAllowed) {
+TEST_F(Sandbox, NamespacesBlockTheNetworkUnlessAllowed) {
     EXPECT_CHECKS(in_child([&] {
-        if (enter_namespaces(policy).reached.find("net") == std::string::npos)
+        if (enter_namespaces(policy).active.find("net") == std::string::npos)
             return layer_is_missing;
         std::ifstream devices("/proc/self/net/dev");
         int lines = 0;
         for (std::string line; std::getline(devices, line);)
             ++lines;
-        return lines <= 3 ? 0 : 1; // two of heading, and lo
+        return lines <= 3 ? 0 : 1; // two header lines and lo
     }));
 }
 
-TEST_F(Sandbox, LandlockLetsThroughWhatIsListed) {
+TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
     policy.readable = {outside / "old"};
     EXPECT_CHECKS(in_child([&] {
         ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (enter_landlock(policy).reached.empty())
+        if (enter_landlock(policy).active.empty())
             return layer_is_missing;
         Checks check;
         check.that(opens(outside / "old", O_RDONLY));
@@ -180,10 +180,10 @@ TEST_F(Sandbox, LandlockLetsThroughWhatIsListed) {
     }));
 }
 
-TEST_F(Sandbox, LandlockMakesNothingThatLiesInWaitForOthers) {
+TEST_F(Sandbox, LandlockBlocksMakingLinksAndPipes) {
     EXPECT_CHECKS(in_child([&] {
         ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (enter_landlock(policy).reached.empty())
+        if (enter_landlock(policy).active.empty())
             return layer_is_missing;
         Checks check;
         check.that(::symlink("/etc/passwd", (inside / "link").c_str()) != 0);
@@ -193,10 +193,10 @@ TEST_F(Sandbox, LandlockMakesNothingThatLiesInWaitForOthers) {
     }));
 }
 
-TEST_F(Sandbox, SystemCallsDoNotReachOthers) {
+TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
     EXPECT_CHECKS(in_child([&] {
         ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).reached.empty())
+        if (filter_system_calls(policy).active.empty())
             return layer_is_missing;
         Checks check;
         const rlimit limit{1000, 1000};
@@ -222,10 +222,10 @@ TEST_F(Sandbox, SystemCallsDoNotReachOthers) {
     }));
 }
 
-TEST_F(Sandbox, SystemCallsMakeThreadsButNoProcesses) {
+TEST_F(Sandbox, SystemCallsAllowThreadsButNotProcesses) {
     EXPECT_CHECKS(in_child([&] {
         ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).reached.empty())
+        if (filter_system_calls(policy).active.empty())
             return layer_is_missing;
         Checks check;
         bool ran = false;
@@ -237,10 +237,10 @@ TEST_F(Sandbox, SystemCallsMakeThreadsButNoProcesses) {
     }));
 }
 
-TEST_F(Sandbox, SystemCallsOpenNoSocketThatLeadsOut) {
+TEST_F(Sandbox, SystemCallsBlockSocketsToOtherProcesses) {
     EXPECT_CHECKS(in_child([&] {
         ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).reached.empty())
+        if (filter_system_calls(policy).active.empty())
             return layer_is_missing;
         Checks check;
         int ends[2];
@@ -252,7 +252,7 @@ TEST_F(Sandbox, SystemCallsOpenNoSocketThatLeadsOut) {
     }));
 }
 
-TEST_F(Sandbox, AllowancesOpenWhatTheyName) {
+TEST_F(Sandbox, AllowancesGrantWhatTheyName) {
     struct Case {
         const char *allow;
         bool forks, unix, internet;
@@ -274,19 +274,19 @@ TEST_F(Sandbox, AllowancesOpenWhatTheyName) {
     }
 }
 
-TEST_F(Sandbox, ItsProcessIsTheFirstToGoWhereMemoryRunsOut) {
+TEST_F(Sandbox, SetsTheHighestOomScore) {
     EXPECT_EQ(in_child([&] {
                   const Level level = enter(policy);
                   int score = 0;
                   std::ifstream("/proc/self/oom_score_adj") >> score;
                   Checks check;
-                  check.that((score == 1000) == level.front().lacks.empty());
+                  check.that((score == 1000) == level.front().missing.empty());
                   return check.result();
               }),
               0);
 }
 
-TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
+TEST_F(Sandbox, LimitsMemoryFilesAndDescriptors) {
     policy.writable.clear();
     policy.memory_bytes = 256u << 20;
     EXPECT_EQ(in_child([&] {
@@ -313,7 +313,7 @@ TEST_F(Sandbox, LimitsEndMemoryFilesAndDescriptors) {
               0);
 }
 
-TEST_F(Sandbox, WhatAGpuNeedsIsNotLimited) {
+TEST_F(Sandbox, DoesNotLimitMemoryForAGpu) {
     policy.allow = {"gpu"};
     policy.memory_bytes = 256u << 20;
     EXPECT_EQ(in_child([&] {
@@ -329,7 +329,7 @@ TEST_F(Sandbox, WhatAGpuNeedsIsNotLimited) {
               0);
 }
 
-TEST_F(Sandbox, MakesTheFoldersThatMayBeWritten) {
+TEST_F(Sandbox, CreatesWritableFolders) {
     policy.writable = {outside / "a/b"};
     EXPECT_EQ(in_child([&] {
                   enter(policy);
@@ -338,7 +338,7 @@ TEST_F(Sandbox, MakesTheFoldersThatMayBeWritten) {
               0);
 }
 
-TEST_F(Sandbox, DiesWithItsParentAsBefore) {
+TEST_F(Sandbox, KeepsTheParentDeathSignal) {
     EXPECT_EQ(in_child([&] {
                   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
                   enter(policy);
@@ -349,23 +349,23 @@ TEST_F(Sandbox, DiesWithItsParentAsBefore) {
               0);
 }
 
-TEST_F(Sandbox, TellsEachLayer) {
+TEST_F(Sandbox, ReportsEachLayer) {
     EXPECT_EQ(in_child([&] {
                   const Level level = enter(policy);
                   Checks check;
                   check.that(level.size() == 7);
                   for (const Layer &layer : level)
-                      check.that(!layer.reached.empty() || !layer.lacks.empty());
+                      check.that(!layer.active.empty() || !layer.missing.empty());
                   return check.result();
               }),
               0);
     const Level level = {{"a", "x, y", ""}, {"b", "z", "no w"}, {"c", "", "no v"}};
-    EXPECT_EQ(to_text(level), "a: x, y; b: z; LACKING b: no w; c: no v");
-    EXPECT_FALSE(whole(level));
-    EXPECT_TRUE(whole({level.front()}));
+    EXPECT_EQ(to_text(level), "a: x, y; b: z; MISSING b: no w; c: no v");
+    EXPECT_FALSE(complete(level));
+    EXPECT_TRUE(complete({level.front()}));
 }
 
-TEST_F(Sandbox, ModeNoneTakesNothing) {
+TEST_F(Sandbox, ModeNoneRestrictsNothing) {
     policy.mode = Mode::none;
     EXPECT_EQ(in_child([&] {
                   Checks check;
@@ -377,7 +377,7 @@ TEST_F(Sandbox, ModeNoneTakesNothing) {
               0);
 }
 
-TEST_F(Sandbox, PoliciesTravelAsJson) {
+TEST_F(Sandbox, PolicySurvivesAJsonRoundTrip) {
     policy.mode = Mode::strict;
     policy.allow = {"gpu", "video"};
     policy.readable = {"/a", "/b"};

@@ -72,7 +72,7 @@ TEST(Worker, GoesOnAfterDevicesThatCantBeListed) {
         const Json failed = worker.next();
         EXPECT_EQ(failed["type"], "failed");
         EXPECT_EQ(failed["status"], ARHOST_STATUS_ERROR_UNSUPPORTED);
-        EXPECT_EQ(failed["text"], "the driver is of another age");
+        EXPECT_EQ(failed["text"], "the driver is too old");
     }
 }
 

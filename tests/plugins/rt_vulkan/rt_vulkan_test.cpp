@@ -129,7 +129,7 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     vulkan.plugin().cancel(1);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_ERROR_CANCELLED);
-    vulkan.plugin().go_on();
+    vulkan.plugin().reset_cancel();
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
 }
@@ -209,7 +209,7 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     EXPECT_EQ(rendered(0.7), ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while an image was traced"));
     EXPECT_EQ(picture.pixels(), untouched);
-    tracer.plugin().go_on();
+    tracer.plugin().reset_cancel();
     ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
     const std::vector<Pixel> after = picture.pixels();
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);

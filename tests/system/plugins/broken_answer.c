@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Says yes and gives nothing. */
+/* Negotiates successfully but returns no plugin. */
 #include <arhost/arhost.h>
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

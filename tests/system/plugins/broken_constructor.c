@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Dies while it is loaded. */
+/* Crashes while it is loaded. */
 #include <arhost/arhost.h>
 #include <signal.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A plugin whose library was left out when it was linked. */
+/* A plugin with an undefined symbol. */
 #include <arhost/arhost.h>
 
 extern arhost_status arhost_test_nowhere(const arhost_offer *offer, arhost_answer *answer);

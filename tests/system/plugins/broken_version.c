@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Speaks a version that nobody offers. */
+/* Selects an ABI version that was not offered. */
 #include <arhost/arhost.h>
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A library, and (with USER) what is linked with it and lies in another folder. */
+/* A library, and (with USER) a library in another folder that is linked with it. */
 int elsewhere(void);
 #ifdef USER
 int uses_elsewhere(void);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Options by which a test plugin fails, and the number that its frames bear.
+// Options that make a test plugin fail at a given frame.
 #pragma once
 
 #include "misbehave.h"
@@ -17,15 +17,15 @@
 namespace arhost::test {
 
 #define ARHOST_FAULT_OPTIONS                                                                                         \
-    option(ARHOST_OPTION_INTEGER, "crash_at", "-1", "Dies of SIGSEGV at this frame, each time; -1: never"),          \
+    option(ARHOST_OPTION_INTEGER, "crash_at", "-1", "Crashes with SIGSEGV at this frame; -1: never"),                \
         option(ARHOST_OPTION_INTEGER, "exit_at", "-1", "Calls exit(0) at this frame; -1: never"),                    \
         option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                  \
         option(ARHOST_OPTION_BOOL, "ignore_abort", "false", "Ignores SIGABRT"),                                      \
         option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),               \
-        option(ARHOST_OPTION_INTEGER, "error", "-8", "Which: its status"),                                           \
+        option(ARHOST_OPTION_INTEGER, "error", "-8", "Status of that error"),                                        \
         option(ARHOST_OPTION_INTEGER, "close_control_at", "-1", "Closes descriptor 3 at this frame; -1: never"),     \
-        option(ARHOST_OPTION_INTEGER, "fork_at", "-1", "Leaves two children behind, listed in children.txt"),        \
-        option(ARHOST_OPTION_REAL, "delay_ms", "0", "Sleeps so long in each frame, in ms", 0, 60000)
+        option(ARHOST_OPTION_INTEGER, "fork_at", "-1", "Forks two children, listed in children.txt; -1: never"),     \
+        option(ARHOST_OPTION_REAL, "delay_ms", "0", "Delay per frame, in ms", 0, 60000)
 
 class Faults {
 public:
@@ -42,8 +42,8 @@ public:
     void at(std::uint64_t sequence) const {
         const auto frame = static_cast<std::int64_t>(sequence);
         if (frame == crash_at_) {
-            (void)!::write(STDERR_FILENO, "last words: \xff\xc3(\n", 16); // no UTF-8
-            std::signal(SIGSEGV, SIG_DFL);                                // sanitizers have a handler of their own
+            (void)!::write(STDERR_FILENO, "last words: \xff\xc3(\n", 16); // not UTF-8
+            std::signal(SIGSEGV, SIG_DFL);                                // sanitizers install a handler
             std::raise(SIGSEGV);
         }
         if (frame == exit_at_)
@@ -54,14 +54,14 @@ public:
             ::close(3);
         if (frame == fork_at_)
             leave_children();
-        if (misbehave_if_asked() || frame == error_at_)
-            throw Failure(error_, "an error, as asked for");
+        if (misbehave_if_requested() || frame == error_at_)
+            throw Failure(error_, "an error, as requested");
         if (delay_ms_ > 0)
             std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(delay_ms_));
     }
 
 private:
-    // One in this process's group, and one that has left it, as daemons do.
+    // One in this process group, and one in a new session, like a daemon.
     static void leave_children() {
         std::string pids;
         for (const bool daemon : {false, true}) {

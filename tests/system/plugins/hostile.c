@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A tracker that does its work, and at one frame tries something that a plugin must not be able to do. Each
- * try is logged, "NAME: what: stopped" or "NAME: what: SUCCEEDED"; each is bounded, should it succeed.
+ * A working tracker that attempts an attack at one frame. Logs each attempt as "NAME: what: stopped" or
+ * "NAME: what: SUCCEEDED"; attacks that succeed do bounded harm.
  */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -37,7 +37,7 @@ struct arhost_instance {
 };
 typedef struct arhost_instance tracker;
 
-static void tell(const tracker *self, const char *what, int succeeded) {
+static void report(const tracker *self, const char *what, int succeeded) {
     char text[256];
     const char *why = succeeded ? "" : strerror(errno);
     snprintf(text, sizeof text, "%s: %s: %s%s%s", self->attack, what, succeeded ? "SUCCEEDED" : "stopped",
@@ -45,7 +45,7 @@ static void tell(const tracker *self, const char *what, int succeeded) {
     self->host->log(self->host, ARHOST_SEVERITY_INFO, text);
 }
 
-/* The host's process; the test gives it, the worker's own parent is the launcher. */
+/* The host's pid, given by the test; the worker's parent is the launcher. */
 static pid_t host_pid(void) {
     const char *text = getenv("HOSTILE_HOST");
     return text ? (pid_t)atoi(text) : getppid();
@@ -60,37 +60,37 @@ static int opens(const char *file, int flags) {
 
 static void read_files(const tracker *self) {
     char file[64];
-    tell(self, "a file outside its list", opens(self->target, O_RDONLY));
-    tell(self, "the passwords", opens("/etc/shadow", O_RDONLY));
+    report(self, "a file outside its list", opens(self->target, O_RDONLY));
+    report(self, "the passwords", opens("/etc/shadow", O_RDONLY));
     snprintf(file, sizeof file, "/proc/%d/environ", (int)host_pid());
-    tell(self, "the host's environment", opens(file, O_RDONLY));
+    report(self, "the host's environment", opens(file, O_RDONLY));
     snprintf(file, sizeof file, "/proc/%d/maps", (int)host_pid());
-    tell(self, "the host's addresses", opens(file, O_RDONLY));
+    report(self, "the host's addresses", opens(file, O_RDONLY));
 }
 
-/* Each on names of its own, so that one that succeeds does not stop the next. */
+/* Each with its own names, so that one success does not affect the next attempt. */
 static void write_files(const tracker *self) {
     char other[1100];
-    tell(self, "an old file", opens(self->target, O_WRONLY));
-    tell(self, "chmod", chmod(self->target, 0777) == 0);
-    tell(self, "chown", chown(self->target, getuid(), getgid()) == 0);
-    tell(self, "truncate", truncate(self->target, 0) == 0);
-    tell(self, "a new file", opens(strcat(strcpy(other, self->target), ".new"), O_WRONLY | O_CREAT));
-    tell(self, "link", link(self->target, strcat(strcpy(other, self->target), ".link")) == 0);
-    tell(self, "symlink", symlink(self->target, strcat(strcpy(other, self->target), ".symlink")) == 0);
-    tell(self, "mkdir", mkdir(strcat(strcpy(other, self->target), ".folder"), 0700) == 0);
-    tell(self, "mkfifo", mkfifo(strcat(strcpy(other, self->target), ".pipe"), 0600) == 0);
-    tell(self, "rename", rename(self->target, strcat(strcpy(other, self->target), ".renamed")) == 0);
-    tell(self, "unlink", unlink(strcat(strcpy(other, self->target), ".other")) == 0);
+    report(self, "an old file", opens(self->target, O_WRONLY));
+    report(self, "chmod", chmod(self->target, 0777) == 0);
+    report(self, "chown", chown(self->target, getuid(), getgid()) == 0);
+    report(self, "truncate", truncate(self->target, 0) == 0);
+    report(self, "a new file", opens(strcat(strcpy(other, self->target), ".new"), O_WRONLY | O_CREAT));
+    report(self, "link", link(self->target, strcat(strcpy(other, self->target), ".link")) == 0);
+    report(self, "symlink", symlink(self->target, strcat(strcpy(other, self->target), ".symlink")) == 0);
+    report(self, "mkdir", mkdir(strcat(strcpy(other, self->target), ".folder"), 0700) == 0);
+    report(self, "mkfifo", mkfifo(strcat(strcpy(other, self->target), ".pipe"), 0600) == 0);
+    report(self, "rename", rename(self->target, strcat(strcpy(other, self->target), ".renamed")) == 0);
+    report(self, "unlink", unlink(strcat(strcpy(other, self->target), ".other")) == 0);
 }
 
-/* Those that there are here. */
+/* Those that exist on this machine. */
 static void open_devices(const tracker *self) {
     const char *const devices[] = {"/dev/ptmx", "/dev/kmsg", "/dev/fuse", "/dev/mem", "/dev/loop0", "/dev/video0"};
     size_t i;
     for (i = 0; i < sizeof devices / sizeof *devices; ++i)
         if (access(devices[i], F_OK) == 0)
-            tell(self, devices[i], opens(devices[i], O_RDONLY | O_NOCTTY));
+            report(self, devices[i], opens(devices[i], O_RDONLY | O_NOCTTY));
 }
 
 static int file_has(const char *file, const char *text) {
@@ -105,13 +105,13 @@ static int file_has(const char *file, const char *text) {
 static void read_environment(const tracker *self) {
     char file[64];
     errno = ENOENT;
-    tell(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
-    tell(self, "where it was in memory", file_has("/proc/self/environ", "HOSTILE_SECRET="));
+    report(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
+    report(self, "where it was in memory", file_has("/proc/self/environ", "HOSTILE_SECRET="));
     snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
-    tell(self, "the launcher's", file_has(file, "HOSTILE_SECRET="));
+    report(self, "the launcher's", file_has(file, "HOSTILE_SECRET="));
 }
 
-/* The test listens on both kinds of name. */
+/* The test listens on a path and on an abstract name. */
 static int connects(const tracker *self, int is_abstract) {
     struct sockaddr_un address = {AF_UNIX, {0}};
     const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
@@ -126,15 +126,15 @@ static int connects(const tracker *self, int is_abstract) {
 
 static void open_sockets(const tracker *self) {
     int ends[2];
-    tell(self, "internet", socket(AF_INET, SOCK_STREAM, 0) >= 0);
-    tell(self, "datagrams", socket(AF_INET6, SOCK_DGRAM, 0) >= 0);
-    tell(self, "netlink", socket(AF_NETLINK, SOCK_RAW, 0) >= 0);
-    tell(self, "packets", socket(AF_PACKET, SOCK_RAW, 0) >= 0);
-    tell(self, "virtual machines", socket(AF_VSOCK, SOCK_STREAM, 0) >= 0);
-    tell(self, "a family with upper bits", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
-    tell(self, "a path", connects(self, 0));
-    tell(self, "an abstract name", connects(self, 1));
-    tell(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
+    report(self, "internet", socket(AF_INET, SOCK_STREAM, 0) >= 0);
+    report(self, "datagrams", socket(AF_INET6, SOCK_DGRAM, 0) >= 0);
+    report(self, "netlink", socket(AF_NETLINK, SOCK_RAW, 0) >= 0);
+    report(self, "packets", socket(AF_PACKET, SOCK_RAW, 0) >= 0);
+    report(self, "virtual machines", socket(AF_VSOCK, SOCK_STREAM, 0) >= 0);
+    report(self, "a family with upper bits", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
+    report(self, "a path", connects(self, 0));
+    report(self, "an abstract name", connects(self, 1));
+    report(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
 }
 
 static void make_processes(const tracker *self) {
@@ -149,23 +149,23 @@ static void make_processes(const tracker *self) {
             waitpid(child, NULL, 0);
         }
     }
-    tell(self, "fork", made > 0);
-    tell(self, "a namespace", unshare(CLONE_NEWUSER) == 0);
-    execv("/bin/true", arguments); /* succeeds without a word: the worker ends */
-    tell(self, "exec", 0);
+    report(self, "fork", made > 0);
+    report(self, "a namespace", unshare(CLONE_NEWUSER) == 0);
+    execv("/bin/true", arguments); /* on success the worker ends */
+    report(self, "exec", 0);
 }
 
 static void trace_host(const tracker *self) {
     static char byte;
     struct iovec mine = {&byte, 1}, theirs = {&byte, 1};
     char file[64];
-    tell(self, "attach", ptrace(PTRACE_SEIZE, host_pid(), NULL, NULL) == 0);
-    tell(self, "attach to the launcher", ptrace(PTRACE_SEIZE, getppid(), NULL, NULL) == 0);
-    tell(self, "read memory", process_vm_readv(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
-    tell(self, "write memory", process_vm_writev(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
+    report(self, "attach", ptrace(PTRACE_SEIZE, host_pid(), NULL, NULL) == 0);
+    report(self, "attach to the launcher", ptrace(PTRACE_SEIZE, getppid(), NULL, NULL) == 0);
+    report(self, "read memory", process_vm_readv(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
+    report(self, "write memory", process_vm_writev(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
     snprintf(file, sizeof file, "/proc/%d/mem", (int)host_pid());
-    tell(self, "open memory", opens(file, O_RDWR));
-    tell(self, "take a descriptor", syscall(SYS_pidfd_getfd, syscall(SYS_pidfd_open, host_pid(), 0), 1, 0) >= 0);
+    report(self, "open memory", opens(file, O_RDWR));
+    report(self, "take a descriptor", syscall(SYS_pidfd_getfd, syscall(SYS_pidfd_open, host_pid(), 0), 1, 0) >= 0);
 }
 
 static void signal_host(const tracker *self) {
@@ -177,23 +177,23 @@ static void signal_host(const tracker *self) {
     info.si_code = SI_QUEUE;
     CPU_ZERO(&processor);
     CPU_SET(0, &processor);
-    tell(self, "kill", kill(host_pid(), SIGKILL) == 0);
-    tell(self, "reach the launcher", kill(getppid(), 0) == 0); /* which would take this one along */
-    tell(self, "reach all", kill(-1, 0) == 0);
-    tell(self, "join the host's group", setpgid(0, getpgid(host_pid())) == 0);
-    tell(self, "tkill", syscall(SYS_tkill, host_pid(), SIGKILL) == 0);
-    tell(self, "tgkill", syscall(SYS_tgkill, host_pid(), host_pid(), SIGKILL) == 0);
-    tell(self, "queue", syscall(SYS_rt_sigqueueinfo, host_pid(), SIGKILL, &info) == 0);
-    tell(self, "pidfd",
-         syscall(SYS_pidfd_send_signal, syscall(SYS_pidfd_open, host_pid(), 0), SIGKILL, NULL, 0) == 0);
-    tell(self, "a descriptor's owner", fcntl(control, F_SETOWN_EX, &owner) == 0);
-    tell(self, "a descriptor's signal", fcntl(control, F_SETSIG, SIGKILL) == 0);
-    tell(self, "a limit", prlimit(host_pid(), RLIMIT_CPU, &second, NULL) == 0);
-    tell(self, "a priority", setpriority(PRIO_PROCESS, (id_t)host_pid(), 19) == 0);
-    tell(self, "a processor", sched_setaffinity(host_pid(), sizeof processor, &processor) == 0);
+    report(self, "kill", kill(host_pid(), SIGKILL) == 0);
+    report(self, "reach the launcher", kill(getppid(), 0) == 0); /* killing it would kill this worker too */
+    report(self, "reach all", kill(-1, 0) == 0);
+    report(self, "join the host's group", setpgid(0, getpgid(host_pid())) == 0);
+    report(self, "tkill", syscall(SYS_tkill, host_pid(), SIGKILL) == 0);
+    report(self, "tgkill", syscall(SYS_tgkill, host_pid(), host_pid(), SIGKILL) == 0);
+    report(self, "queue", syscall(SYS_rt_sigqueueinfo, host_pid(), SIGKILL, &info) == 0);
+    report(self, "pidfd",
+           syscall(SYS_pidfd_send_signal, syscall(SYS_pidfd_open, host_pid(), 0), SIGKILL, NULL, 0) == 0);
+    report(self, "a descriptor's owner", fcntl(control, F_SETOWN_EX, &owner) == 0);
+    report(self, "a descriptor's signal", fcntl(control, F_SETSIG, SIGKILL) == 0);
+    report(self, "a limit", prlimit(host_pid(), RLIMIT_CPU, &second, NULL) == 0);
+    report(self, "a priority", setpriority(PRIO_PROCESS, (id_t)host_pid(), 19) == 0);
+    report(self, "a processor", sched_setaffinity(host_pid(), sizeof processor, &processor) == 0);
 }
 
-/* As a plugin that may have processes of its own: its child is its own, and no more allowed than itself. */
+/* With `allow: [processes]`: a child has the same restrictions, and may be signalled. */
 static void signal_from_a_child(const tracker *self) {
     int status = 0;
     const pid_t child = fork();
@@ -201,7 +201,7 @@ static void signal_from_a_child(const tracker *self) {
         _exit(kill(host_pid(), SIGKILL) == 0 ? 0 : errno);
     waitpid(child, &status, 0);
     errno = WEXITSTATUS(status);
-    tell(self, "a child's kill", child > 0 && status == 0);
+    report(self, "a child's kill", child > 0 && status == 0);
 }
 static void signal_own_child(const tracker *self) {
     const pid_t child = fork();
@@ -213,35 +213,36 @@ static void signal_own_child(const tracker *self) {
                                                                                                : "its child lives");
 }
 
-static void *wait_for_ever(void *nothing) {
+static void *wait_forever(void *nothing) {
     for (;;)
         pause();
     return nothing;
 }
 
 static void fill_memory(const tracker *self) {
-    enum { step = 16 << 20, most = 512 };
+    enum { step = 16 << 20, max_mib = 512 };
     size_t taken = 0;
     pthread_t thread;
     int fd, threads = 0;
-    while (taken < most) {
+    while (taken < max_mib) {
         char *bytes = malloc(step);
         if (!bytes)
             break;
         memset(bytes, 1, step);
         taken += step >> 20;
     }
-    tell(self, "half a GiB", taken >= most);
-    tell(self, "shared", mmap(NULL, step, PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
-    tell(self, "a stack",
-         mmap(NULL, (size_t)400 << 20, PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0) != MAP_FAILED);
+    report(self, "half a GiB", taken >= max_mib);
+    report(self, "shared", mmap(NULL, step, PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
+    report(self, "a stack",
+           mmap(NULL, (size_t)400 << 20, PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0) !=
+               MAP_FAILED);
     fd = open("/dev/zero", O_RDWR | O_CLOEXEC);
-    tell(self, "shared zeros", fd >= 0 && mmap(NULL, step, PROT_WRITE, MAP_SHARED, fd, 0) != MAP_FAILED);
+    report(self, "shared zeros", fd >= 0 && mmap(NULL, step, PROT_WRITE, MAP_SHARED, fd, 0) != MAP_FAILED);
     fd = memfd_create("hostile", 0);
-    tell(self, "a memfd", fd >= 0);
-    while (threads < 1000 && pthread_create(&thread, NULL, wait_for_ever, NULL) == 0)
+    report(self, "a memfd", fd >= 0);
+    while (threads < 1000 && pthread_create(&thread, NULL, wait_forever, NULL) == 0)
         ++threads;
-    tell(self, "a thousand threads", threads == 1000);
+    report(self, "a thousand threads", threads == 1000);
 }
 
 static void fill_disk(const tracker *self) {
@@ -251,7 +252,7 @@ static void fill_disk(const tracker *self) {
         char file[1100];
         snprintf(file, sizeof file, "%s/hostile-%d", folders[i] ? folders[i] : ".", (int)getpid());
         const int fd = open(file, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-        tell(self, folders[i] ? folders[i] : "no home", fd >= 0 && write(fd, file, sizeof file) > 0);
+        report(self, folders[i] ? folders[i] : "no home", fd >= 0 && write(fd, file, sizeof file) > 0);
         if (fd >= 0) {
             close(fd);
             unlink(file);
@@ -259,11 +260,11 @@ static void fill_disk(const tracker *self) {
     }
 }
 
-/* As many as there are, and as many again in messages that nobody takes. */
+/* As many as possible, open and in unread messages. */
 static void hold_descriptors(const tracker *self) {
     enum { pairs = 20 };
     struct rlimit limit;
-    int held = 0, under_way = 0, pair[pairs][2], i, fd;
+    int held = 0, in_flight = 0, pair[pairs][2], i, fd;
     getrlimit(RLIMIT_NOFILE, &limit);
     limit.rlim_cur = limit.rlim_max;
     setrlimit(RLIMIT_NOFILE, &limit);
@@ -271,7 +272,7 @@ static void hold_descriptors(const tracker *self) {
         (void)!socketpair(AF_UNIX, SOCK_STREAM, 0, pair[i]);
     while (held < 5000 && (fd = open("/dev/null", O_RDONLY)) >= 0)
         ++held;
-    tell(self, "more than 1024", held > 1024);
+    report(self, "more than 1024", held > 1024);
     for (i = 0; i < pairs;) {
         char byte = 0;
         _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
@@ -288,12 +289,12 @@ static void hold_descriptors(const tracker *self) {
         if (sendmsg(pair[i][1], &message, MSG_DONTWAIT) < 0)
             ++i;
         else
-            ++under_way;
+            ++in_flight;
     }
-    tell(self, "a thousand under way", under_way > 1000);
+    report(self, "a thousand in flight", in_flight > 1000);
 }
 
-/* Calls back for each mapping of memory that is shared with the host. */
+/* Calls `visit` for each mapping of memory shared with the host. */
 static void each_shared(const tracker *self, void (*visit)(const tracker *, void *, size_t, int writable)) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[512], mode[8];
@@ -309,7 +310,7 @@ static void scribble_on(const tracker *self, void *bytes, size_t size, int writa
     if (writable)
         memset(bytes, 0xa5, size);
     else
-        tell(self, "make input writable", mprotect(bytes, size, PROT_READ | PROT_WRITE) == 0);
+        report(self, "make input writable", mprotect(bytes, size, PROT_READ | PROT_WRITE) == 0);
 }
 
 typedef struct {
@@ -325,7 +326,7 @@ static void note_memory(const tracker *self, void *bytes, size_t size, int writa
         memories[memory_count++] = (memory){bytes, size / sizeof(uint32_t)};
 }
 
-/* Each word is right when the host checks it, and may be another when it uses it. */
+/* Each word is sometimes valid, so that it may change between check and use by the host. */
 static void *race(void *unused) {
     uint32_t flip = 1;
     size_t i, j, twice;
@@ -340,7 +341,7 @@ static void *race(void *unused) {
 static void race_the_host(const tracker *self) {
     pthread_t thread;
     each_shared(self, note_memory);
-    tell(self, "start no race", pthread_create(&thread, NULL, race, NULL) != 0);
+    report(self, "start no race", pthread_create(&thread, NULL, race, NULL) != 0);
 }
 
 static void truncate_one(const tracker *self, void *bytes, size_t size, int writable) {
@@ -348,19 +349,19 @@ static void truncate_one(const tracker *self, void *bytes, size_t size, int writ
     int fd;
     snprintf(file, sizeof file, "/proc/self/map_files/%lx-%lx", (unsigned long)bytes, (unsigned long)bytes + size);
     fd = open(file, O_RDWR | O_CLOEXEC);
-    tell(self, "open and truncate", fd >= 0 && ftruncate(fd, 0) == 0);
+    report(self, "open and truncate", fd >= 0 && ftruncate(fd, 0) == 0);
     if (writable)
-        madvise(bytes, size, MADV_REMOVE); /* a hole reads as zeros: no harm, but a broken contract */
+        madvise(bytes, size, MADV_REMOVE); /* a hole reads as zeros: harmless, but a contract violation */
 }
 
-/* An answer would put the positions right again: the host looks before. */
-static void let_the_host_look(void) {
+/* Makes the host check the rings now; an answer would repair the positions. */
+static void trigger_check(void) {
     (void)!send(doorbell, "", 1, MSG_NOSIGNAL);
     for (;;)
         pause();
 }
 
-/* Clears and sets what flags there are on all that came from the host, and fills what can be filled. */
+/* Changes all flags of the inherited descriptors and fills their buffers. */
 static void change_flags(const tracker *self) {
     const int small = 1;
     int fd, i;
@@ -376,7 +377,7 @@ static void change_flags(const tracker *self) {
             break;
     for (fd = 0; fd <= doorbell; ++fd)
         fcntl(fd, F_SETFL, 0);
-    tell(self, "stand still", 0);
+    report(self, "block the host", 0);
 }
 
 static void say(const char *text, size_t size) {
@@ -416,12 +417,12 @@ static void attack(const tracker *self) {
         hold_descriptors(self);
     else if (!strcmp(name, "scribble")) {
         each_shared(self, scribble_on);
-        let_the_host_look();
+        trigger_check();
     } else if (!strcmp(name, "race"))
         race_the_host(self);
     else if (!strcmp(name, "truncate")) {
         each_shared(self, truncate_one);
-        let_the_host_look();
+        trigger_check();
     } else if (!strcmp(name, "flags"))
         change_flags(self);
     else if (!strcmp(name, "doorbell"))
@@ -447,9 +448,9 @@ static void attack(const tracker *self) {
     } else if (!strcmp(name, "empty"))
         say_text("");
     else if (!strcmp(name, "link")) {
-        tell(self, "a link", symlink(self->target, "stats.json.tmp") == 0);
+        report(self, "a link", symlink(self->target, "stats.json.tmp") == 0);
     } else if (!strcmp(name, "pipe")) {
-        tell(self, "a pipe", mkfifo("stats.json.tmp", 0600) == 0);
+        report(self, "a pipe", mkfifo("stats.json.tmp", 0600) == 0);
     }
 }
 
@@ -460,7 +461,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     self->host = host;
     snprintf(self->attack, sizeof self->attack, "%s", arhost_find_option(options, option_count, "attack")->text);
-    /* The base name: a whole path would be let through. */
+    /* Only the base name: a path option would grant access. */
     snprintf(self->target, sizeof self->target, "%s/%s", getenv("HOSTILE_FOLDER"),
              arhost_find_option(options, option_count, "target_file")->text);
     self->at = arhost_find_option(options, option_count, "at")->integer;
@@ -479,7 +480,7 @@ static arhost_status start(arhost_instance *self, const arhost_tracker_setup *se
     return ARHOST_STATUS_OK;
 }
 
-/* As tracker_counter: a marker so many mm away as the frame's number says. */
+/* Like tracker_counter: reports a marker at 500 mm plus the frame number. */
 static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
     const int number = frame->plane[0][0] + 256 * frame->plane[0][1];
     arhost_marker *marker = &result->markers[0];
@@ -501,8 +502,8 @@ static void stop(arhost_instance *self) {
 }
 
 static const arhost_option_descriptor options[] = {
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "What it tries"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "target_file", "target", 0, 0, NULL, "On what"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "The attack"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "target_file", "target", 0, 0, NULL, "Its target"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "at", "20", 0, 0, NULL, "At this frame"},
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
@@ -512,7 +513,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              "0.1.0",
                                              "arhost",
                                              "Apache-2.0",
-                                             "Tries what it must not be able to do, \x1b[2Jfor tests.",
+                                             "Attempts attacks, \x1b[2Jfor tests.",
                                              0,
                                              sizeof options / sizeof *options,
                                              options,

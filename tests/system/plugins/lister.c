@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Has nothing but a list of devices (arhost/devices.h): LIST says what comes of asking for it, ID is its own. */
+/* A plugin that only lists devices (arhost/devices.h). LIST: the function that does so; ID: the plugin's id. */
 #define _GNU_SOURCE
 #include <arhost/arhost.h>
 
@@ -10,7 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-static void tell(arhost_take_device take, void *context, uint32_t index, const char *name, const char *abilities) {
+static void report(arhost_take_device take, void *context, uint32_t index, const char *name, const char *abilities) {
     arhost_device device;
     memset(&device, 0, sizeof device);
     device.struct_size = sizeof device;
@@ -23,7 +23,7 @@ static void tell(arhost_take_device take, void *context, uint32_t index, const c
 
 static inline arhost_status list_crash(const arhost_host *host, arhost_take_device take, void *context) {
     (void)host;
-    tell(take, context, 0, "The last one", NULL);
+    report(take, context, 0, "The last one", NULL);
     signal(SIGSEGV, SIG_DFL);
     raise(SIGSEGV);
     return ARHOST_STATUS_OK;
@@ -36,15 +36,15 @@ static inline arhost_status list_hang(const arhost_host *host, arhost_take_devic
 }
 static inline arhost_status list_fail(const arhost_host *host, arhost_take_device take, void *context) {
     (void)take, (void)context;
-    host->log(host, ARHOST_SEVERITY_ERROR, "the driver is of another age");
+    host->log(host, ARHOST_SEVERITY_ERROR, "the driver is too old");
     return ARHOST_STATUS_ERROR_UNSUPPORTED;
 }
 static inline arhost_status list_broken(const arhost_host *host, arhost_take_device take, void *context) {
     (void)host;
-    tell(take, context, 0, NULL, NULL);
+    report(take, context, 0, NULL, NULL);
     return ARHOST_STATUS_OK;
 }
-/* 10,000 of them, and the texts of the first have a MiB each: all quotation marks, which take most room as JSON. */
+/* 10,000 devices with texts of 1 MiB: quotation marks, whose JSON form is longest. */
 static inline arhost_status list_many(const arhost_host *host, arhost_take_device take, void *context) {
     const size_t size = 1 << 20;
     char *text = malloc(size + 1);
@@ -55,19 +55,19 @@ static inline arhost_status list_many(const arhost_host *host, arhost_take_devic
     memset(text, '"', size);
     text[size] = '\0';
     for (i = 0; i < 10000; ++i)
-        tell(take, context, i, text, text);
+        report(take, context, i, text, text);
     free(text);
     return ARHOST_STATUS_OK;
 }
 static inline arhost_status list_none(const arhost_host *host, arhost_take_device take, void *context) {
     return (void)host, (void)take, (void)context, ARHOST_STATUS_OK;
 }
-/* A GPU's shaders have a place where the GPU is allowed; and no socket is there where the network is not. */
+/* Reports whether it has a shader cache (allowed with a GPU) and sockets (not allowed without the network). */
 static inline arhost_status list_gpu(const arhost_host *host, arhost_take_device take, void *context) {
     const char *cache = getenv("XDG_CACHE_HOME"), *end = cache ? strrchr(cache, '/') : NULL;
     (void)host;
-    tell(take, context, 0, end && !strcmp(end, "/" ID) ? "with its shaders" : "without its shaders",
-         socket(AF_INET, SOCK_STREAM, 0) < 0 ? "no network" : "the network");
+    report(take, context, 0, end && !strcmp(end, "/" ID) ? "with its shaders" : "without its shaders",
+           socket(AF_INET, SOCK_STREAM, 0) < 0 ? "no network" : "the network");
     return ARHOST_STATUS_OK;
 }
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a test plugin does in its next frame after SIGRTMIN has come with a number: the low byte says what
- * (enum misbehaviour), the others are a seed. tools/faults sends it. Of several before a frame the last counts
- * (of a signal that is not queued it would be the first).
+ * Faults that tools/faults injects: SIGRTMIN carries a number whose low byte selects the fault (enum misbehaviour) of
+ * the next frame; the other bytes are a seed. If several signals arrive before a frame, the last one counts.
  */
 #ifndef ARHOST_TEST_MISBEHAVE_H
 #define ARHOST_TEST_MISBEHAVE_H
@@ -21,27 +20,27 @@
 #include <time.h>
 #include <unistd.h>
 
-/* tools/faults has the same order. */
+/* Same order as in tools/faults. */
 enum misbehaviour {
     MISBEHAVE_CRASH = 1,
     MISBEHAVE_EXIT,
-    MISBEHAVE_HANG,        /* for ever; with an odd seed it ignores SIGABRT */
-    MISBEHAVE_SLOW,        /* a reply that is late, but not yet a hang */
-    MISBEHAVE_ERROR,       /* the frame's status */
-    MISBEHAVE_MESSAGE,     /* garbage to the host */
-    MISBEHAVE_PASS,        /* descriptors to the host, in messages of all kinds */
-    MISBEHAVE_RING,        /* garbage in the memory that it shares with the host */
-    MISBEHAVE_DOORBELL,    /* a flood */
-    MISBEHAVE_CLOSE,       /* the channel to the host */
-    MISBEHAVE_DESCRIPTORS, /* holds as many as it can get, until its end */
-    MISBEHAVE_MEMORY       /* takes as much as it can get, and gives it back */
+    MISBEHAVE_HANG,        /* forever; ignores SIGABRT if the seed is odd */
+    MISBEHAVE_SLOW,        /* a late reply, but within the deadline */
+    MISBEHAVE_ERROR,       /* an error status for the frame */
+    MISBEHAVE_MESSAGE,     /* malformed messages to the host */
+    MISBEHAVE_PASS,        /* messages of all kinds with descriptors */
+    MISBEHAVE_RING,        /* garbage in the memory shared with the host */
+    MISBEHAVE_DOORBELL,    /* floods the doorbell */
+    MISBEHAVE_CLOSE,       /* closes the control channel */
+    MISBEHAVE_DESCRIPTORS, /* opens as many as possible until its end */
+    MISBEHAVE_MEMORY       /* allocates as much as possible, then frees it */
 };
 
-static volatile sig_atomic_t misbehave_asked;
+static volatile sig_atomic_t misbehave_request;
 
 static void misbehave_on_signal(int number, siginfo_t *info, void *context) {
     (void)number, (void)context;
-    misbehave_asked = info->si_value.sival_int;
+    misbehave_request = info->si_value.sival_int;
 }
 
 static inline void misbehave_install(void) {
@@ -57,7 +56,7 @@ static inline uint32_t misbehave_random(uint32_t *seed) {
     return *seed >> 8;
 }
 
-/* With four descriptors or without. */
+/* Sends a message, optionally with four descriptors. */
 static inline void misbehave_send(const char *text, size_t size, int with_descriptors) {
     enum { control = 3, count = 4 };
     char ancillary[CMSG_SPACE(sizeof(int) * count)] __attribute__((aligned(8)));
@@ -108,7 +107,7 @@ static inline void misbehave_message(uint32_t seed, int with_descriptors) {
     misbehave_send(garbage, sizeof garbage, with_descriptors);
 }
 
-/* In the page with its rings alone: what it writes into its images is its own affair. */
+/* Corrupts the page with the rings only; image contents are up to the plugin. */
 static inline void misbehave_scribble(uint32_t seed) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[512], mode[8];
@@ -130,7 +129,7 @@ static inline void misbehave_scribble(uint32_t seed) {
                 words[misbehave_random(&seed) % count] = misbehave_random(&seed);
                 break;
             case 2:
-                words[8] += 1 + misbehave_random(&seed) % 20; /* how many results there are: WorkerPage */
+                words[8] += 1 + misbehave_random(&seed) % 20; /* number of results: see WorkerPage */
                 break;
             default:
                 madvise(words, end - begin, MADV_REMOVE);
@@ -149,10 +148,10 @@ static inline void misbehave_sleep_ms(long ms) {
 }
 
 static inline void misbehave_fill_memory(void) {
-    enum { step = 1 << 20, most = 4096 };
+    enum { step = 1 << 20, max_steps = 4096 };
     void *first = NULL;
     int i;
-    for (i = 0; i < most; ++i) {
+    for (i = 0; i < max_steps; ++i) {
         void **bytes = (void **)malloc(step);
         if (!bytes)
             break;
@@ -167,13 +166,13 @@ static inline void misbehave_fill_memory(void) {
     }
 }
 
-/* To be called in each frame. Non-zero: the frame is to fail. */
-static inline int misbehave_if_asked(void) {
-    const uint32_t asked = (uint32_t)misbehave_asked;
-    const uint32_t seed = asked >> 8;
+/* To be called for each frame; returns non-zero if the frame must fail. */
+static inline int misbehave_if_requested(void) {
+    const uint32_t request = (uint32_t)misbehave_request;
+    const uint32_t seed = request >> 8;
     int i;
-    misbehave_asked = 0;
-    switch (asked & 0xff) {
+    misbehave_request = 0;
+    switch (request & 0xff) {
     case MISBEHAVE_CRASH:
         signal(SIGSEGV, SIG_DFL);
         raise(SIGSEGV);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Built against headers of a later day, whose option descriptors have grown. */
+/* As if built against newer headers with larger option descriptors. */
 #include <arhost/arhost.h>
 
 struct grown {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A ray tracer in plain C, against the C headers alone: a square of 16 px in the top left corner whose
- * colour is the number of the frame, taken from the camera's distance: R and G the low and high byte.
- * It may write into the image that it gave before.
+ * A ray tracer in plain C. Draws a square of 16 px in the top left corner whose colour is the frame number, derived
+ * from the camera's distance: R and G are the low and high byte. Option writes_later: also writes into the previous
+ * image.
  */
 #include "misbehave.h"
 
@@ -19,7 +19,7 @@ struct arhost_instance {
     int64_t crash_at, hang_at, hang_until, error_at, error, answer;
     double delay_ms;
     int64_t writes_later, device_time_ns;
-    uint8_t *last; /* image */
+    uint8_t *last; /* previous image */
 };
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
@@ -39,7 +39,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
     self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
     if (arhost_find_option(options, option_count, "refuse")->integer) {
-        host->log(host, ARHOST_SEVERITY_ERROR, "refused, as the option 'refuse' asks");
+        host->log(host, ARHOST_SEVERITY_ERROR, "rejected, as the option 'refuse' requests");
         free(self);
         return ARHOST_STATUS_ERROR_CONFIGURATION;
     }
@@ -63,8 +63,8 @@ static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *
     return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
 }
 
-/* Whether the host cancels meanwhile. */
-static int waits(const arhost_instance *self) {
+/* Returns whether the host has cancelled. */
+static int wait_or_cancel(const arhost_instance *self) {
     double left_ms = self->delay_ms;
     while (left_ms > 0 && !self->host->cancelled(self->host)) {
         const double step_ms = left_ms < 50 ? left_ms : 50;
@@ -85,10 +85,10 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     }
     while (number == self->hang_at || (number > self->hang_at && number < self->hang_until))
         pause();
-    if (misbehave_if_asked() || number == self->error_at)
+    if (misbehave_if_requested() || number == self->error_at)
         return (arhost_status)self->error;
-    if (waits(self)) {
-        self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while it waited");
+    if (wait_or_cancel(self)) {
+        self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while waiting");
         return ARHOST_STATUS_ERROR_CANCELLED;
     }
     for (y = 0; y < image->height; ++y)
@@ -113,23 +113,24 @@ static void stop(arhost_instance *self) {
 }
 
 static const arhost_option_descriptor options[] = {
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Dies at this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Crashes at this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_until", "-1", 0, 0, NULL,
-     "Nor from those after it that are before this one."},
+     "Nor from later frames before this one"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL,
      "Never returns from this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
      "Returns an error for this frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL, "Which: its status"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "The status of each frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL, "Status of that error"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "Status of each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 600000, NULL,
-     "Sleeps so long in each frame"},
+     "Delay per frame, in ms"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
-     "Writes into the image before, too"},
+     "Also writes into the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
-     "Tells this of each image; a negative one is beyond all times"},
+     "Reported device time; negative values wrap to huge ones"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL, "Dies in create"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL,
+     "Crashes in create"},
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_RAYTRACER,

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Looks at every pixel of the counting plugins' frames, and whether they come in order. It keeps one line, PATH,
-// which is whole at every moment and outlives its process: the number of the next frame, how many frames there were,
-// how many of them with an overlay, how many were wrong, and when the last one came (ns, CLOCK_MONOTONIC). What was
-// wrong is told in PATH.wrong.
+// Checks every pixel and the order of the counting plugins' frames. The file PATH has one line that is always
+// complete and survives restarts: number of the next frame, frames so far, frames with an overlay, wrong frames, and
+// the time of the last frame (ns, CLOCK_MONOTONIC). PATH.wrong describes the errors.
 #include "faults.hpp"
 
-#ifndef ID // sink_suspect is the same, for tools/faults to strike
+#ifndef ID // sink_suspect is the same plugin, as a target for tools/faults
 #define ID "sink_checker"
 #endif
 
@@ -38,9 +37,9 @@ public:
         if (::pread(file_, line.data(), line.size() - 1, 0) > 0)
             std::sscanf(line.data(), "%" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64, &next_, &frames_, &overlaid_,
                         &wrong_);
-        // One that was written, but not confirmed, comes again. One that is left out is lost.
+        // A frame that was written but not confirmed is repeated; a skipped frame is an error.
         if (setup.first_sequence > next_ && !gaps_)
-            tell(setup.first_sequence, "goes on behind a frame that was not written");
+            report(setup.first_sequence, "follows a frame that was not written");
         frames_ -= next_ > setup.first_sequence ? next_ - setup.first_sequence : 0;
         next_ = std::min(next_, setup.first_sequence);
     }
@@ -49,9 +48,9 @@ public:
         const std::uint64_t sequence = output.record->sequence;
         const bool has_overlay = output.record->overlay != ARHOST_OVERLAY_NONE;
         if (gaps_ ? sequence < next_ : sequence != next_)
-            tell(sequence, "is out of order");
-        if (!is_whole(output, has_overlay))
-            tell(sequence, "is torn, or another's");
+            report(sequence, "is out of order");
+        if (!is_correct(output, has_overlay))
+            report(sequence, "is torn or shows another frame");
         next_ = sequence + 1;
         ++frames_;
         overlaid_ += has_overlay;
@@ -67,24 +66,24 @@ public:
     }
 
 private:
-    // The overlay is a square of 16 px in the corner.
-    static bool is_whole(const arhost_output &output, bool has_overlay) {
+    // The overlay is a 16 px square in the corner.
+    static bool is_correct(const arhost_output &output, bool has_overlay) {
         const auto low = static_cast<std::uint8_t>(output.record->sequence),
                    high = static_cast<std::uint8_t>(output.record->sequence >> 8);
         for (std::uint32_t y = 0; y < output.height; ++y)
             for (std::uint32_t x = 0; x < output.width; ++x) {
                 const std::uint8_t *pixel = output.bgr + y * output.stride + 3 * x;
-                const bool laid_over = has_overlay && x < 16 && y < 16;
-                if (pixel[0] != (laid_over ? 170 : low) || pixel[1] != high || pixel[2] != (laid_over ? low : 85))
+                const bool in_overlay = has_overlay && x < 16 && y < 16;
+                if (pixel[0] != (in_overlay ? 170 : low) || pixel[1] != high || pixel[2] != (in_overlay ? low : 85))
                     return false;
             }
         return true;
     }
 
-    void tell(std::uint64_t sequence, const std::string &what) {
+    void report(std::uint64_t sequence, const std::string &what) {
         ++wrong_;
         std::ofstream(path_ + ".wrong", std::ios::app)
-            << "frame " << sequence << ", where " << next_ << " comes next, " << what << "\n";
+            << "frame " << sequence << ", expected " << next_ << ": " << what << "\n";
     }
 
     test::Faults faults_;
@@ -96,7 +95,7 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The file with the line"),
-    option(ARHOST_OPTION_BOOL, "gaps", "false", "Frames may be left out, as in mode live"), ARHOST_FAULT_OPTIONS};
+    option(ARHOST_OPTION_BOOL, "gaps", "false", "Frames may be skipped, as in mode live"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
                                           ID,

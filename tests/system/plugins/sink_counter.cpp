@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A line a frame: its number, the number in the video's pixels, the one in the overlay's or "none" where
-// there is none. At the end it writes a second file, PATH.done. After a restart it goes on behind the last whole line
-// before first_sequence.
+// Writes a line per frame: its number, the number in the video's pixels, and the one in the overlay's pixels or
+// "none". Writes PATH.done at the end. After a restart it keeps the complete lines before first_sequence.
 #include "faults.hpp"
 
-#ifndef ID // sink_realtime is the same, as a window
+#ifndef ID // sink_realtime is the same plugin with a window's capability
 #define ID "sink_counter"
 #define CAPABILITIES 0
 #endif
@@ -36,7 +35,7 @@ public:
             std::ofstream(path_, std::ios::trunc) << std::flush;
             return;
         }
-        // A kill in between must lose nothing.
+        // A kill in between must not lose data.
         std::ofstream(path_ + ".new", std::ios::trunc) << kept << std::flush;
         std::rename((path_ + ".new").c_str(), path_.c_str());
     }
@@ -71,7 +70,7 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The file"),
-    option(ARHOST_OPTION_INTEGER, "end_at", "-1", "Ends the run from this frame on, as a closed window; -1: never"),
+    option(ARHOST_OPTION_INTEGER, "end_at", "-1", "Ends the run at this frame, like a closed window; -1: never"),
     option(ARHOST_OPTION_BOOL, "hang_in_stop", "false", "Never returns from stop"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,

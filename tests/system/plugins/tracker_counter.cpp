@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reads the number out of the frame, refuses one that is not its own, and reports one marker that lies
-// so many mm away, or all that are listed.
+// Reads the frame number from the pixels, rejects a wrong one, and reports the first marker (or all) at a distance of
+// 500 mm plus that number.
 #include "faults.hpp"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ public:
     Counter(const Counter &) = delete;
     Counter &operator=(const Counter &) = delete;
 
-    // More last words than the host takes at a time.
+    // More messages than the host reads at a time.
     void stop() {
         for (int i = 0; i < 100; ++i)
             host_.log(ARHOST_SEVERITY_DEBUG, "last words");
@@ -53,14 +53,14 @@ public:
             std::reverse(listed_.begin(), listed_.end());
         else
             listed_.resize(1);
-        if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // in its first life alone
+        if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // only before any restart
             seal_output();
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
-        if (number != (frame.sequence & 0xffff)) // two bytes hold it
-            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the frame is not its own");
+        if (number != (frame.sequence & 0xffff)) // the pixels have two bytes
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the frame has a wrong number");
         faults_.at(number);
         const auto signed_number = static_cast<std::int64_t>(number);
         if (signed_number >= lost_from_ && signed_number < lost_to_)
@@ -87,7 +87,7 @@ private:
         }
     }
 
-    // Plays the worker's part until it has the memory for its results, and seals that before the host does.
+    // Speaks the worker's protocol until it receives the memory for its results, and seals that before the host does.
     void seal_output() const {
         constexpr int control = 3;
         const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
@@ -120,14 +120,14 @@ private:
 
 constexpr const char *seals[] = {"no", "seal", "write", nullptr};
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_TEXT, "seal", "no", "The seal that it puts on the memory it is given", 0, 0, seals),
+    option(ARHOST_OPTION_TEXT, "seal", "no", "Seal to add to its shared memory", 0, 0, seals),
     option(ARHOST_OPTION_BOOL, "reversed", "false", "Reports all markers, the last of the list first"),
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
-    option(ARHOST_OPTION_INTEGER, "lost_to", "0", "to before this one"),
-    option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Dies in destroy"),
+    option(ARHOST_OPTION_INTEGER, "lost_to", "0", "until before this one"),
+    option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Crashes in destroy"),
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
-    option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Starts in so many steps, each told as progress"),
-    option(ARHOST_OPTION_REAL, "start_step_ms", "0", "Time of such a step, in ms", 0, 60000),
+    option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Number of steps in start, each reported as progress"),
+    option(ARHOST_OPTION_REAL, "start_step_ms", "0", "Duration of each step, in ms", 0, 60000),
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,

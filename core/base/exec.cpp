@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/exec.hpp"
+
+#include <csignal>
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+namespace arhost::base {
+
+void exec_child(const char *program, char *const argv[], std::span<const int> fds, pid_t parent) {
+    // Its own group: a kill reaches what it forks, and the terminal's Ctrl-C does not reach it.
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) // it died before the line above
+        return;
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    // First above the target numbers, then into place, so that none is overwritten; dup2 clears close-on-exec.
+    constexpr int first_free = 10, max_fds = 8;
+    int high[max_fds];
+    if (fds.size() > max_fds)
+        return;
+    for (std::size_t i = 0; i < fds.size(); ++i)
+        if ((high[i] = ::fcntl(fds[i], F_DUPFD_CLOEXEC, first_free)) < 0)
+            return;
+    for (std::size_t i = 0; i < fds.size(); ++i)
+        if (::dup2(high[i], static_cast<int>(i)) < 0)
+            return;
+    ::syscall(SYS_close_range, static_cast<unsigned>(fds.size()), ~0u, 0u);
+    ::execv(program, argv);
+}
+
+} // namespace arhost::base
