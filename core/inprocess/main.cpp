@@ -14,7 +14,7 @@
 int main(int argc, char **argv) {
     using namespace arhost;
     std::signal(SIGPIPE, SIG_IGN);
-    worker::keep_freed_memory();
+    worker::retain_freed_memory();
     CLI::App app("arhost-inprocess runs a configuration as arhost does, but with every plugin in this one process\n"
                  "and without deadlines and sandbox: for debuggers.");
     app.set_version_flag("--version", "arhost-inprocess " ARHOST_VERSION);

@@ -3,12 +3,13 @@
 // A configuration, read and checked as far as it can be without its plugins (docs/config.md).
 #pragma once
 
+#include "base/limits.hpp"
 #include "camera/coordinates.hpp"
 #include "camera/trajectory.hpp"
+#include "ipc/json_abi.hpp"
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
 #include "sandbox/sandbox.hpp"
-#include "supervise/component.hpp"
 #include "yaml/yaml.hpp"
 
 #include <arhost/camera.h>
@@ -28,7 +29,7 @@ struct ComponentConfiguration {
     yaml::Node node;                            // its map, for errors
     std::vector<std::filesystem::path> plugins; // the shared object, then its fallback
     std::optional<yaml::Node> path, options;
-    supervise::Limits limits;
+    base::Limits limits;
     sandbox::Policy policy; // what its worker may touch (docs/security.md)
     bool conform = false;   // its promises are looked at on real frames (docs/conformance.md)
 };

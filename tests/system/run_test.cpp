@@ -400,8 +400,9 @@ TEST(CommandLine, ListsTheDevicesOfEveryPluginThatTells) {
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
     EXPECT_EQ(below("lister_none"), what + "no device that it could run on\n");
     EXPECT_EQ(below("lister_fail"), what + "its devices can't be listed: the driver is of another age\n");
-    EXPECT_EQ(below("lister_broken"),
-              what + "its devices can't be listed: it told of a device that has no name, or is too short\n");
+    EXPECT_EQ(
+        below("lister_broken"),
+        what + "its devices can't be listed: it reported a device that has no name or whose struct is too short\n");
     EXPECT_THAT(below("lister_crash"),
                 testing::StartsWith(what + "its devices can't be listed: killed by signal 11 "));
     EXPECT_THAT(below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
