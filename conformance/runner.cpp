@@ -5,6 +5,7 @@
 #include "base/orphans.hpp"
 #include "base/text.hpp"
 #include "ipc/memory.hpp"
+#include "ipc/protocol.hpp"
 
 #include <fmt/format.h>
 
@@ -32,29 +33,7 @@ using ipc::Call;
 
 std::string place(Call call, const Test &test) {
     constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
-    switch (call) {
-    case Call::none:
-        return " between calls";
-    case Call::load:
-        return " while its library was loaded";
-    case Call::negotiate:
-        return " in negotiate";
-    case Call::create:
-        return " in create";
-    case Call::start:
-        return " in start";
-    case Call::per_frame:
-        return fmt::format(" in {}", per_frame[test.kind]);
-    case Call::idle:
-        return " in idle";
-    case Call::stop:
-        return " in stop";
-    case Call::destroy:
-        return " in destroy";
-    case Call::devices:
-        return " while it listed its devices";
-    }
-    return " in an unknown call";
+    return " " + ipc::to_text(call, per_frame[test.kind]);
 }
 
 // A folder of a test's own.

@@ -61,7 +61,7 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
 
 void lift_deadlines(run_config::Configuration &configuration) {
     const auto lift = [](run_config::ComponentConfiguration &component) {
-        supervise::Limits &limits = component.limits;
+        base::Limits &limits = component.limits;
         limits.start = limits.frame = limits.stop = std::chrono::hours(1000);
     };
     if (configuration.source)
@@ -192,18 +192,19 @@ bool write_file(const fs::path &file, const char *key, Console &console, const s
     }
 }
 
-void tell_of_promises(const Promises &promises, Console &console) {
-    std::size_t kept = 0;
-    for (const auto &[name, promise] : promises.all()) {
-        kept += promise.broken == 0;
-        if (promise.broken > 0)
+void log_contract_checks(const ContractChecks &checks, Console &console) {
+    std::size_t passed = 0;
+    for (const auto &[name, check] : checks.all()) {
+        passed += check.violations == 0;
+        if (check.violations > 0)
             console.log(ARHOST_SEVERITY_WARNING, "conform",
-                        name + ": broken in " + std::to_string(promise.broken) + " of " +
-                            std::to_string(promise.looked) + " frames");
+                        name + ": violated in " + std::to_string(check.violations) + " of " +
+                            std::to_string(check.checked) + " frames");
     }
-    if (!promises.all().empty())
+    if (!checks.all().empty())
         console.log(ARHOST_SEVERITY_INFO, "conform",
-                    std::to_string(kept) + " of " + std::to_string(promises.all().size()) + " promises kept");
+                    std::to_string(passed) + " of " + std::to_string(checks.all().size()) +
+                        " contract checks passed");
 }
 
 int run(const run_config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
@@ -246,7 +247,7 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     if (!completed)
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
-    tell_of_promises(statistics.promises, console);
+    log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
         written = write_file(*configuration.stats, "stats", console,

@@ -11,7 +11,7 @@
 namespace arhost::host {
 namespace {
 
-constexpr std::int64_t tolerated_ahead_ns = 1'000'000'000; // arhost/source.h
+constexpr std::int64_t max_ahead_ns = 1'000'000'000; // arhost/source.h
 
 template <class Range> bool all_finite(const Range &values) {
     return std::all_of(std::begin(values), std::end(values), [](double value) { return std::isfinite(value); });
@@ -33,13 +33,13 @@ const char *problem_with(const arhost_marker &marker) {
 
 } // namespace
 
-const char *take_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
-                                arhost_record &record) {
-    // Copied out once; from here on the worker may scribble as it likes.
+const char *accept_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
+                                  arhost_record &record) {
+    // Reads the shared memory only once, as the worker may still write to it.
     const auto &result = *reinterpret_cast<const volatile arhost_tracker_result *>(slot.data());
     const std::uint32_t count = result.marker_count;
     if (count > ARHOST_MAX_MARKERS)
-        return "it reports more markers than fit";
+        return "it reports more markers than ARHOST_MAX_MARKERS";
     std::memcpy(record.markers, slot.data() + offsetof(arhost_tracker_result, markers),
                 count * sizeof(arhost_marker));
     record.marker_count = 0;
@@ -47,7 +47,7 @@ const char *take_tracker_result(std::span<const std::byte> slot, const std::set<
     for (std::uint32_t i = 0; i < count; ++i) {
         const arhost_marker &marker = record.markers[i];
         if (!ids.contains(marker.id))
-            return "it reports a marker that was not asked for";
+            return "it reports a marker that the configuration does not list";
         if (!seen.insert(marker.id).second)
             return "it reports a marker twice";
         if (const char *problem = problem_with(marker))
@@ -57,13 +57,13 @@ const char *take_tracker_result(std::span<const std::byte> slot, const std::set<
     return nullptr;
 }
 
-const char *take_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
-                            arhost_record &record) {
+const char *accept_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
+                              arhost_record &record) {
     if (info.clock != ARHOST_CLOCK_MONOTONIC && info.clock != ARHOST_CLOCK_MEDIA)
         return "a frame's clock is not set";
     if (info.capture_ns < previous_capture_ns)
         return "a frame's capture time runs backwards";
-    if (info.clock == ARHOST_CLOCK_MONOTONIC && info.capture_ns > now_ns + tolerated_ahead_ns)
+    if (info.clock == ARHOST_CLOCK_MONOTONIC && info.capture_ns > now_ns + max_ahead_ns)
         return "a frame's capture time is more than a second ahead of the clock";
     record.clock = info.clock;
     record.capture_ns = info.capture_ns;

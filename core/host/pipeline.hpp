@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One run of one configuration: source → tracker → camera → ray tracer → composite → outputs. A trajectory
-// gives the cameras in place of the tracker, and does without a source. Everything
-// happens on the thread that calls run(), one event at a time; the work is done by the workers, all but
-// the composite.
+// One run of a configuration: source → tracker → camera → ray tracer → composite → outputs. A trajectory can replace
+// the tracker, and the source. Workers do everything except compositing; the pipeline runs on the thread that calls
+// run(), one event at a time.
 //
-// Events only note what has come in; `pump` then moves every frame as far as it can go. Modes differ in
-// little: in lockstep a frame waits for its stage and frames leave in order; in live a newer frame takes
-// the place of one that waits, and a stage that is down is passed by.
+// Events only record results; `pump` then advances every frame as far as possible. In lockstep, frames wait for each
+// stage and leave in order. In mode live, a newer frame replaces a waiting one, and frames skip a stage that is down.
+//
+// pipeline.cpp has the phases of a run, pipeline_components.cpp creates the components, pipeline_frames.cpp moves
+// frames through the stages.
 #pragma once
 
 #include "host/frames.hpp"
@@ -21,11 +22,10 @@
 
 namespace arhost::host {
 
-// How far a run is.
 struct Progress {
     std::uint64_t frame = 0;       // composited so far
-    std::uint64_t frame_count = 0; // in all; 0: unknown
-    bool finishing = false;        // the outputs are being closed
+    std::uint64_t frame_count = 0; // in total; 0: unknown
+    bool finishing = false;        // closing the outputs
 };
 
 class Pipeline {
@@ -33,31 +33,33 @@ public:
     Pipeline(const run_config::Configuration &configuration, supervise::Context context,
              std::function<void(const Progress &)> on_progress);
 
-    // Runs to the end. Returns false where the run failed or ended with a component given up; failure()
-    // then says why, in words for the user.
+    // Runs to the end. Returns false if the run failed or a component was disabled; failure() then has the reason, a
+    // message for the user.
     bool run();
     const std::string &failure() const { return failure_; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
-    // Ctrl-C: lets what is under way finish, then ends. A second call ends at once. From the reactor.
+    // For Ctrl-C: finishes the frames in progress and ends; a second call ends at once. Call from the reactor.
     void interrupt();
 
     const Statistics &statistics() const { return statistics_; }
     std::vector<supervise::Component *> components() const; // source, tracker, ray tracer, outputs
 
 private:
-    enum class Phase { source, stages, outputs, running, stopping, over };
+    enum class Phase { source, stages, outputs, running, stopping, finished };
 
     void make_source();
     void make_black_frames();
     void make_tracker();
     void make_raytracer();
     void make_outputs();
-    supervise::Component::Hooks hooks_for(const std::string &name, const yaml::Node &node);
+    void make_sink(const run_config::ComponentConfiguration &output, const std::string &name);
+    void load_scene();
+    supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
     void pump();
-    void enter_next_phase();
-    void end_run(); // as if the source had no more
+    void advance_phase();
+    void end_run(); // as if the source had ended
     bool no_more_frames() const;
     bool read();
     bool read_from_trajectory();
@@ -71,26 +73,27 @@ private:
     void stop_components();
 
     void on_read(const ipc::Command &command, const ipc::Result &result);
-    void begin(std::unique_ptr<Frame> frame);
-    void take_camera_of_markers(Frame &frame);
-    void take_camera_of_trajectory(Frame &frame) const;
+    void start_frame(std::unique_ptr<Frame> frame);
+    void set_camera_from_markers(Frame &frame);
+    void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);
-    Frame *take_answer(const ipc::Command &command, const ipc::Result &result, const char *stage);
+    Frame *accept_result(const ipc::Command &command, const ipc::Result &result, const char *stage);
     void on_tracked(const ipc::Command &command, const ipc::Result &result);
     void on_rendered(const ipc::Command &command, const ipc::Result &result);
-    void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting, const char *stage);
+    void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
 
-    // A stage that does not answer commands at the moment: may the frame go on without it?
-    bool may_pass(const supervise::Component *stage) const;
+    // Whether a frame may continue without a stage that is down.
+    bool may_skip(const supervise::Component *stage) const;
     bool is_behind() const;
-    void pass(Frame &frame, const char *stage);
-    void wait_for(Frame &frame, Frame::Stage stage);
+    void skip(Frame &frame, const char *stage);
+    void enqueue(Frame &frame, Frame::Stage stage);
     Frame *next_waiting(Frame::Stage stage);
-    void forget_overtaken(std::uint64_t shown);
+    void drop_overtaken(std::uint64_t shown);
 
-    void give_up_sink(SinkQueue &sink);
-    void fail(const std::string &reason, bool by_configuration);
-    void give_up(const std::string &name, const yaml::Node &node, const std::string &reason, bool by_configuration);
+    void disable_sink(SinkQueue &sink);
+    void fail(const std::string &reason, bool is_configuration_error);
+    void on_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
+                     bool is_configuration_error);
 
     const run_config::Configuration &configuration_;
     supervise::Context context_;
@@ -109,22 +112,22 @@ private:
     std::optional<arhost_frame_format> format_;
     std::uint64_t frame_count_ = 0;
     arhost_intrinsics intrinsics_{};
-    std::shared_ptr<LensWarp> warp_; // NULL where the ray tracer traces through the lens
+    std::shared_ptr<LensWarp> warp_; // null if the ray tracer supports lens distortion
     std::set<std::int32_t> marker_ids_;
 
-    std::deque<Lease> reads_; // the slots of the reads under way, oldest first
+    std::deque<Lease> reads_; // slots of the reads in flight, oldest first
     std::uint64_t next_read_ = 0;
-    std::uint64_t skipped_ = 0; // by the source, before that
+    std::uint64_t skipped_ = 0; // by the source, before next_read_
     std::int64_t last_capture_ns_ = INT64_MIN;
-    bool ended_ = false; // the source has said so, or shall give no more
+    bool input_ended_ = false; // the source has ended, or is read no further
     bool interrupted_ = false;
-    bool abandoned_ = false; // everything is to end at once
+    bool abandoned_ = false; // end at once
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
-    std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // and the frame it belongs to
+    std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the frame it belongs to
 
     Statistics statistics_;
-    std::optional<SourcePromises> source_promises_; // of the plugin at work, over its restarts
-    std::optional<OverlayPromises> overlay_promises_;
+    std::optional<SourceChecks> source_checks_; // of the current plugin, across restarts
+    std::optional<OverlayChecks> overlay_checks_;
     std::string failure_;
     bool failed_by_configuration_ = false;
 };

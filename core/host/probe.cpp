@@ -7,43 +7,42 @@ using namespace ipc;
 
 namespace {
 
-// Opens the plugin in a worker, and hands its messages to `take` until that returns true: "". Otherwise the reason
-// why it never did. `late`: the reason where `timeout` is over.
-std::string converse(supervise::Context &context, const std::filesystem::path &plugin, const sandbox::Policy &policy,
-                     std::chrono::seconds timeout, const std::string &late,
-                     const std::function<bool(supervise::Process &, const Json &)> &take) {
+// Opens the plugin in a worker and calls `on_message` for its messages until that returns true. Returns "", or the
+// reason of a failure, which is `late` after `timeout`.
+std::string query(supervise::Context &context, const std::filesystem::path &plugin, const sandbox::Policy &policy,
+                  std::chrono::seconds timeout, const std::string &late,
+                  const std::function<bool(supervise::Process &, const Message &)> &on_message) {
     std::string reason;
-    bool taken = false, dead = false;
+    bool done = false, dead = false;
     supervise::Process *running = nullptr;
-    supervise::Process::Events events;
-    events.message = [&](Message &message) {
+    supervise::Process::Callbacks callbacks;
+    callbacks.message = [&](Message &message) {
         try {
-            if (message.body.at("type") == "failed")
-                reason = message.body.at("text").get<std::string>();
-            else if (!taken)
-                taken = take(*running, message.body);
+            if (is<messages::Failed>(message))
+                reason = parse<messages::Failed>(message).text;
+            else if (!done)
+                done = on_message(*running, message);
         } catch (const std::exception &error) {
-            reason = std::string("what it tells is not valid: ") + error.what();
+            reason = std::string("its response is invalid: ") + error.what();
         }
-        if (taken || !reason.empty())
+        if (done || !reason.empty())
             running->kill_now();
     };
-    events.result = [](const Result &) {};
-    events.died = [&](const supervise::Death &death) {
-        if (!taken && reason.empty())
+    callbacks.result = [](const Result &) {};
+    callbacks.died = [&](const supervise::Death &death) {
+        if (!done && reason.empty())
             reason = death.how;
         dead = true;
     };
-    supervise::Process process(
-        context, plugin.stem().string(), std::move(events),
-        Json{{"type", "open"}, {"plugin", plugin.string()}, {"sandbox", sandbox::to_json(policy)}});
+    supervise::Process process(context, plugin.stem().string(), std::move(callbacks),
+                               encode(messages::Open{plugin.string(), policy}));
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + timeout, [&] {
         process.end(late + " within " + std::to_string(timeout.count()) + " s");
     });
     while (!dead)
         context.reactor.run_once();
-    return taken ? "" : reason;
+    return done ? "" : reason;
 }
 
 } // namespace
@@ -51,19 +50,19 @@ std::string converse(supervise::Context &context, const std::filesystem::path &p
 ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                   std::string *level) {
     policy.writable.clear();
-    PluginDescription description;
-    std::string reason = converse(context, plugin, policy, std::chrono::seconds(10), "did not say hello",
-                                  [&](supervise::Process &, const Json &message) {
-                                      if (message.at("type") != "hello")
-                                          return false;
-                                      description = description_from_json(message.at("descriptor"));
-                                      if (level)
-                                          *level = message.at("sandbox").get<std::string>();
-                                      return true;
-                                  });
+    messages::Hello hello;
+    const std::string reason = query(context, plugin, policy, std::chrono::seconds(10), "did not respond",
+                                     [&](supervise::Process &, const Message &message) {
+                                         if (!is<messages::Hello>(message))
+                                             return false;
+                                         hello = parse<messages::Hello>(message);
+                                         return true;
+                                     });
     if (!reason.empty())
         return reason;
-    return description;
+    if (level)
+        *level = hello.sandbox;
+    return hello.descriptor;
 }
 
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
@@ -73,16 +72,15 @@ DevicesResult list_devices(supervise::Context &context, const std::filesystem::p
         if (need == "video" || need == "usb" || need == "gpu")
             policy.allow.insert(need);
     std::optional<DeviceList> list;
-    std::string reason = converse(context, plugin, policy, timeout, "no answer",
-                                  [&](supervise::Process &process, const Json &message) {
-                                      if (message.at("type") == "hello")
-                                          process.send({{"type", "devices"}});
-                                      if (message.at("type") != "devices")
-                                          return false;
-                                      if (message.contains("devices"))
-                                          list = devices_from_json(message);
-                                      return true;
-                                  });
+    const std::string reason = query(context, plugin, policy, timeout, "no answer",
+                                     [&](supervise::Process &process, const Message &message) {
+                                         if (is<messages::Hello>(message))
+                                             process.send(messages::ListDevices{});
+                                         if (!is<messages::Devices>(message))
+                                             return false;
+                                         list = parse<messages::Devices>(message).list;
+                                         return true;
+                                     });
     if (!reason.empty())
         return reason;
     return list;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Asks a plugin, in a worker of its own, who it is and what it could run on: for `arhost plugins` and `arhost check`.
+// Queries a plugin's description and devices in a worker, for `arhost plugins` and `arhost check`.
 #pragma once
 
 #include "ipc/json_abi.hpp"
@@ -15,19 +15,19 @@
 
 namespace arhost::host {
 
-// The description, or the reason why the plugin can't be used.
+// The description, or why the plugin can't be used.
 using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
 
-// It may read what `policy` says and write nothing: who it is, a plugin tells before it is asked to do anything.
-// Where it answers, `level` gets how far the sandbox was reached.
+// The plugin may read what `policy` permits and write nothing. On success, `level` receives the sandbox level
+// reached.
 ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                   std::string *level = nullptr);
 
-// The devices, nullopt where the plugin tells of none (arhost/devices.h), or the reason why it can't.
+// The devices, nullopt if the plugin lacks the extension (arhost/devices.h), or why they can't be listed.
 using DevicesResult = std::variant<std::optional<ipc::DeviceList>, std::string>;
 
-// Of what it needs (its descriptor's `needs`) it gets the devices, which it could not see otherwise, without a word
-// of a configuration; but no network, no processes and no display. Drivers may take long to load.
+// From `needs` (of the descriptor) it grants access to devices only, and not to network, processes and display. The
+// timeout is long, as drivers may load slowly.
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                            const std::vector<std::string> &needs,
                            std::chrono::seconds timeout = std::chrono::seconds(20));

@@ -9,8 +9,8 @@ using namespace ipc;
 
 namespace {
 
-// Which files a scene, and the meshes that it names, name in turn is known when they have been parsed. So all
-// may be read, but for the kernel's and devices; what comes out is an arena and no file.
+// The files that a scene and its meshes reference are known only after parsing. So the loader may read all files
+// except those of the kernel and devices; its only output is the arena.
 sandbox::Policy policy_of(sandbox::Mode mode) {
     sandbox::Policy policy;
     policy.mode = mode;
@@ -25,40 +25,42 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
 } // namespace
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                           std::chrono::milliseconds timeout, run_config::FilesInUse files, Hooks hooks)
-    : context_(context), hooks_(std::move(hooks)), files_(std::move(files)), scene_(scene.string()),
+                           std::chrono::milliseconds timeout, run_config::FilesInUse files, Callbacks callbacks)
+    : context_(context), callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
       timeout_(timeout) {
-    supervise::Process::Events events;
-    events.message = [this](Message &message) {
-        const std::string type = message.body.at("type").get<std::string>();
-        watch();
-        if (type == "failed")
-            fail(message.body.at("text").get<std::string>());
-        else if (type == "loaded" && message.fds.size() == 1)
-            arena_ = std::move(message.fds[0]);
-        else if (type == "reads")
-            look_at({message.body.at("path").get<std::string>(), message.body.at("node").get<std::string>()});
-        else if (type == "progress")
-            context_.log(ARHOST_SEVERITY_DEBUG, "scene", message.body.at("what").get<std::string>());
-    };
-    events.result = [](const Result &) {};
-    events.died = [this](const supervise::Death &death) { on_died(death); };
-    process_ = std::make_unique<supervise::Process>(
-        context, "scene", std::move(events),
-        Json{{"type", "load"}, {"scene", scene.string()}, {"sandbox", sandbox::to_json(policy_of(sandbox))}});
-    watch();
+    supervise::Process::Callbacks process_callbacks;
+    process_callbacks.message = [this](Message &message) { on_message(message); };
+    process_callbacks.result = [](const Result &) {};
+    process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
+    process_ = std::make_unique<supervise::Process>(context, "scene", std::move(process_callbacks),
+                                                    encode(messages::Load{scene_, policy_of(sandbox)}));
+    restart_deadline();
 }
 
-void SceneLoading::watch() {
+void SceneLoading::on_message(Message &message) {
+    restart_deadline();
+    if (is<messages::Failed>(message)) {
+        fail(parse<messages::Failed>(message).text);
+    } else if (is<messages::Loaded>(message) && message.fds.size() == 1) {
+        arena_ = std::move(message.fds[0]);
+    } else if (is<messages::Reads>(message)) {
+        const auto reads = parse<messages::Reads>(message);
+        check_read({reads.path, reads.node});
+    } else if (is<messages::Progress>(message)) {
+        context_.log(ARHOST_SEVERITY_DEBUG, "scene", parse<messages::Progress>(message).what);
+    }
+}
+
+void SceneLoading::restart_deadline() {
     deadline_ = context_.reactor.at(Reactor::Clock::now() + timeout_, [this] {
-        process_->end("without a word of progress for " + std::to_string(timeout_.count()) +
+        process_->end("made no progress for " + std::to_string(timeout_.count()) +
                       " ms (raytracer.start_deadline_ms)");
     });
 }
 
-void SceneLoading::look_at(const base::FileIdentity &file_read) {
+void SceneLoading::check_read(const base::FileIdentity &file) {
     try {
-        files_.check_read(file_read);
+        files_.check_read(file);
     } catch (const yaml::Error &error) {
         fail(error.what());
         process_->end("no longer needed");
@@ -66,24 +68,24 @@ void SceneLoading::look_at(const base::FileIdentity &file_read) {
 }
 
 void SceneLoading::fail(const std::string &reason) {
-    if (failure_.empty()) // the first is the cause
+    if (failure_.empty()) // the first failure is the cause
         failure_ = reason;
 }
 
 void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
-    const Hooks hooks = std::move(hooks_);
+    const Callbacks callbacks = std::move(callbacks_);
     if (!failure_.empty() || !death.clean || !arena_)
-        return hooks.failed(failure_.empty() ? scene_ + ": the scene loader was " + death.how : failure_);
+        return callbacks.failed(failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : failure_);
     try {
-        // The loader is gone, so nobody maps it writable; where somebody does, this throws.
+        // The loader has exited, so no writable mapping should exist; adopt_and_freeze throws if one does.
         SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
         const Mapping mapping = arena.map(Access::read_only);
         if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
-            return hooks.failed(scene_ + ": the loaded scene is not valid, which is a fault of arhost: " + fault);
-        hooks.loaded(std::move(arena));
+            return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault);
+        callbacks.loaded(std::move(arena));
     } catch (const std::exception &error) {
-        hooks.failed(std::string("the scene loader's memory can't be used: ") + error.what());
+        callbacks.failed(std::string("the scene loader's memory can't be used: ") + error.what());
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Has a scene loaded by a worker of its own, since parsers of meshes are attack surface, and checks what
-// comes back before anyone else sees it.
+// Loads a scene in a sandboxed worker, as mesh parsers are attack surface, and validates the arena before others use
+// it.
 #pragma once
 
 #include "run_config/files_in_use.hpp"
@@ -18,23 +18,25 @@ namespace arhost::host {
 
 class SceneLoading {
 public:
-    // Exactly one of the two is called, from the reactor; the SceneLoading may be destroyed in it.
-    struct Hooks {
+    // Exactly one is called, from the reactor; it may destroy the SceneLoading.
+    struct Callbacks {
         std::function<void(ipc::SharedMemory arena)> loaded; // frozen and valid
         std::function<void(const std::string &reason)> failed;
     };
-    // `timeout`: the longest time without a word of progress. Fails where one of `files` that is written is read.
+    // `timeout` limits the time between messages of the loader. Fails if the scene reads one of `files` that the run
+    // writes.
     SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                 std::chrono::milliseconds timeout, run_config::FilesInUse files, Hooks hooks);
+                 std::chrono::milliseconds timeout, run_config::FilesInUse files, Callbacks callbacks);
 
 private:
-    void watch();
-    void look_at(const base::FileIdentity &file_read);
+    void restart_deadline();
+    void on_message(ipc::Message &message);
+    void check_read(const base::FileIdentity &file);
     void fail(const std::string &reason);
     void on_died(const supervise::Death &death);
 
     supervise::Context &context_;
-    Hooks hooks_;
+    Callbacks callbacks_;
     run_config::FilesInUse files_;
     std::string scene_, failure_;
     base::UniqueFd arena_;

@@ -9,14 +9,14 @@ void SinkQueue::offer(OutputFramePointer frame) {
     if (failed)
         return;
     waiting_.push_back(std::move(frame));
-    if (depth > 0 && waiting_.size() > depth) {
+    if (max_waiting > 0 && waiting_.size() > max_waiting) {
         waiting_.pop_front();
         ++statistics_.dropped[component->name()];
     }
 }
 
 void SinkQueue::pump() {
-    while (!failed && component->running() && !waiting_.empty() && component->in_flight() < in_flight_limit) {
+    while (!failed && component->running() && !waiting_.empty() && component->in_flight() < max_in_flight) {
         const OutputFramePointer frame = waiting_.front();
         waiting_.pop_front();
         unconfirmed_.push_back(frame);
@@ -29,7 +29,7 @@ void SinkQueue::pump() {
 }
 
 void SinkQueue::on_result(const Command &command, const Result &result) {
-    if (result.status > 0) // a failed one was not written
+    if (result.status > 0)
         next_sequence_ = command.sequence + 1;
     if (!unconfirmed_.empty())
         unconfirmed_.pop_front();
@@ -48,7 +48,7 @@ void SinkQueue::clear() {
 
 std::uint64_t SinkQueue::first_sequence() const {
     if (next_sequence_ == 0)
-        return 0; // nothing has been written: a fresh start
+        return 0; // nothing was written: a new start
     if (!unconfirmed_.empty())
         return unconfirmed_.front()->sequence;
     return waiting_.empty() ? next_sequence_ : waiting_.front()->sequence;

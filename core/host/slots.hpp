@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Who holds which slot of a region. Only the host decides that: a worker is told a slot, and a dead
-// worker's slots come back by the leases' destruction.
+// Ownership of a region's slots. Only the host assigns slots; destroying the leases releases the slots of a dead
+// worker.
 #pragma once
 
 #include "supervise/component.hpp"
@@ -14,7 +14,7 @@ namespace arhost::host {
 
 class SlotPool;
 
-// The right to use one slot, until it is destroyed.
+// Exclusive use of one slot; releases it on destruction.
 class Lease {
 public:
     Lease() = default;
@@ -37,16 +37,16 @@ private:
     std::uint32_t index_ = 0;
 };
 
-// The slots of one region. A restarted component has a new region and so a new pool; leases of the old
-// one keep its memory alive until the last frame in it is done.
+// The slots of one region. A restarted component gets a new region and pool; leases keep the old memory alive until
+// the last frame in it is done.
 class SlotPool : public std::enable_shared_from_this<SlotPool> {
 public:
-    explicit SlotPool(supervise::RegionPointer region) : region_(std::move(region)), taken_(region_->layout.count) {}
+    explicit SlotPool(supervise::RegionPointer region) : region_(std::move(region)), in_use_(region_->layout.count) {}
 
     std::optional<Lease> acquire() {
-        for (std::uint32_t i = 0; i < taken_.size(); ++i)
-            if (!taken_[i]) {
-                taken_[i] = true;
+        for (std::uint32_t i = 0; i < in_use_.size(); ++i)
+            if (!in_use_[i]) {
+                in_use_[i] = true;
                 return Lease(shared_from_this(), i);
             }
         return std::nullopt;
@@ -55,12 +55,12 @@ public:
 private:
     friend class Lease;
     supervise::RegionPointer region_;
-    std::vector<bool> taken_;
+    std::vector<bool> in_use_;
 };
 
 inline Lease::~Lease() {
     if (pool_)
-        pool_->taken_[index_] = false;
+        pool_->in_use_[index_] = false;
 }
 inline const supervise::RegionPointer &Lease::region() const {
     return pool_->region_;

@@ -68,14 +68,14 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                    {"augmented", statistics.augmented},
                    {"composited", statistics.composited},
                    {"dropped", statistics.dropped},
-                   {"passed_unaugmented", statistics.passed}}},
+                   {"passed_unaugmented", statistics.skipped}}},
                  {"fps", statistics.fps()}};
     for (const auto &[name, timing] : statistics.stages)
         json["stages"][name] = timing.to_json();
-    for (const auto &[name, promise] : statistics.promises.all()) {
-        Json &entry = json["conformance"][name] = {{"looked", promise.looked}, {"broken", promise.broken}};
-        if (promise.broken > 0)
-            entry["first"] = promise.first;
+    for (const auto &[name, check] : statistics.contract_checks.all()) {
+        Json &entry = json["conformance"][name] = {{"checked", check.checked}, {"violations", check.violations}};
+        if (check.violations > 0)
+            entry["first_violation"] = check.first_violation;
     }
     double total = host_cpu_seconds;
     json["cpu_seconds"]["host"] = host_cpu_seconds;

@@ -14,7 +14,7 @@
 int main(int argc, char **argv) {
     using namespace arhost;
     std::signal(SIGPIPE, SIG_IGN);
-    worker::keep_freed_memory();
+    worker::retain_freed_memory();
     base::CommandLine app(
         "arhost-inprocess runs a configuration like arhost, but with all plugins in one process and without\n"
         "deadlines and sandbox: for debuggers.");

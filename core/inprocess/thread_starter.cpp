@@ -48,7 +48,7 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
     const pid_t pid = spawned.pid = first_pid + static_cast<pid_t>(threads_.size());
     threads_.emplace_back([this, pid, death = std::move(death),
                            link = worker::Link(std::move(theirs), std::move(doorbell.worker))]() mutable {
-        const int status = worker::work(link);
+        const int status = worker::run(link);
         const std::lock_guard ending(mutex_);
         exits_.push_back({pid, status << 8, cpu_seconds_of_thread()}); // as returned by wait(2)
         ended_.notify_all();

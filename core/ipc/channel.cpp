@@ -20,7 +20,7 @@ std::pair<Channel, Channel> Channel::make_pair() {
 }
 
 bool Channel::send(const Json &body, std::initializer_list<int> fds, bool wait) const {
-    // Bytes that are no UTF-8 (a plugin's log) are replaced, not refused.
+    // Invalid UTF-8 (in a plugin's log, say) is replaced rather than rejected.
     const std::string text = body.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (text.size() > max_message_size || fds.size() > max_passed_fds)
         throw std::length_error("a control message of " + std::to_string(text.size()) + " bytes is too long");
@@ -41,10 +41,10 @@ ReceiveState Channel::receive(Message &message, int timeout_ms) const {
     if (size <= 0)
         return size < 0 && errno == EAGAIN ? ReceiveState::none : ReceiveState::closed;
     if (truncated)
-        return ReceiveState::breach;
+        return ReceiveState::malformed;
     message.body = Json::parse(text.data(), text.data() + size, nullptr, false);
     if (!message.body.is_object() || !message.body.contains("type") || !message.body["type"].is_string())
-        return ReceiveState::breach;
+        return ReceiveState::malformed;
     return ReceiveState::message;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The control channel between the host and a worker: JSON messages with file descriptors, over a Unix
-// socket that keeps message borders. For what happens a few times in a worker's life (hello, create,
-// attach, log); frames go through the rings.
+// The control channel between the host and a worker: JSON messages with file descriptors over a Unix socket that
+// preserves message boundaries. It carries what happens a few times in a worker's life (messages.hpp); frames go
+// through the rings.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -18,14 +18,18 @@ namespace arhost::ipc {
 using Json = nlohmann::json;
 
 struct Message {
-    Json body; // an object; "type" says which
+    Json body; // an object with a string "type"
     std::vector<base::UniqueFd> fds;
 };
 
-enum class ReceiveState { message, none, closed, breach };
+enum class ReceiveState {
+    message,
+    none, // within the timeout
+    closed,
+    malformed // too large, not a JSON object, or without "type"
+};
 
-// Blocking and non-blocking use is chosen by call, not by a flag of the socket, which the peer's end
-// does not share.
+// Each call chooses whether it blocks. O_NONBLOCK would not do: it is a flag of one end only.
 class Channel {
 public:
     static constexpr std::size_t max_message_size = 128 * 1024;
@@ -34,10 +38,10 @@ public:
     explicit Channel(base::UniqueFd fd) : fd_(std::move(fd)) {}
     static std::pair<Channel, Channel> make_pair();
 
-    // False where the peer is gone or, without `wait`, its queue is full.
+    // False if the peer has closed its end or, without `wait`, its queue is full (errno EAGAIN).
     bool send(const Json &body, std::initializer_list<int> fds = {}, bool wait = true) const;
 
-    // Waits up to `timeout_ms` (0: not, -1: for ever). `breach`: too large, no JSON object, no "type".
+    // Waits up to `timeout_ms`; 0 does not wait, -1 waits without limit.
     ReceiveState receive(Message &message, int timeout_ms) const;
 
     int fd() const { return fd_.get(); }

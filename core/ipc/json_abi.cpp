@@ -14,16 +14,16 @@ std::string text_or_empty(const char *text) {
     return text ? text : "";
 }
 
-// A string of a message, of a sane length.
+// A string of a descriptor, at most max_text_size bytes long.
 std::string text_of(const Json &json, const char *key) {
     std::string text = json.at(key).get<std::string>();
     if (text.size() > max_text_size)
         throw std::runtime_error(std::string("the descriptor's '") + key + "' has " + std::to_string(text.size()) +
-                                 " bytes, and " + std::to_string(max_text_size) + " are the most");
+                                 " bytes; the maximum is " + std::to_string(max_text_size));
     return text;
 }
 
-// The worker's side of max_device_text_size. Of an endless text no more is read than decides where it is cut.
+// Truncates to max_device_text_size. Reads no further than needed, as the text may be unterminated.
 std::string device_text(const char *text) {
     constexpr std::size_t longest_character = 4;
     return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
@@ -49,41 +49,61 @@ std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor
     return all;
 }
 
-Json to_json(const arhost_descriptor &d) {
-    Json options = Json::array();
-    for (const arhost_option_descriptor *o : options_of(d)) {
-        Json option = {{"key", text_or_empty(o->key)},
-                       {"type", o->type},
-                       {"minimum", o->minimum},
-                       {"maximum", o->maximum},
-                       {"help", text_or_empty(o->help)}};
+PluginDescription describe(const arhost_descriptor &descriptor) {
+    PluginDescription d{descriptor.kind,
+                        text_or_empty(descriptor.id),
+                        text_or_empty(descriptor.name),
+                        text_or_empty(descriptor.version),
+                        text_or_empty(descriptor.vendor),
+                        text_or_empty(descriptor.licence),
+                        text_or_empty(descriptor.description),
+                        descriptor.capabilities,
+                        {},
+                        {}};
+    for (const arhost_option_descriptor *o : options_of(descriptor)) {
+        OptionDeclaration option{text_or_empty(o->key), o->type, {}, o->minimum, o->maximum, {},
+                                 text_or_empty(o->help)};
         if (o->default_value)
-            option["default"] = o->default_value;
-        option["choices"] = Json::array();
+            option.default_value = o->default_value;
         for (const char *const *choice = o->choices; choice && *choice; ++choice)
-            option["choices"].push_back(*choice);
+            option.choices.emplace_back(*choice);
+        d.options.push_back(std::move(option));
+    }
+    for (const char *const *need = descriptor.needs; need && *need; ++need)
+        d.needs.emplace_back(*need);
+    return d;
+}
+
+Json to_json(const PluginDescription &d) {
+    Json options = Json::array();
+    for (const OptionDeclaration &o : d.options) {
+        Json option = {{"key", o.key},         {"type", o.type},       {"minimum", o.minimum},
+                       {"maximum", o.maximum}, {"choices", o.choices}, {"help", o.help}};
+        if (o.default_value)
+            option["default"] = *o.default_value;
         options.push_back(std::move(option));
     }
-    Json needs = Json::array();
-    for (const char *const *need = d.needs; need && *need; ++need)
-        needs.push_back(*need);
     return {{"kind", d.kind},
-            {"id", text_or_empty(d.id)},
-            {"name", text_or_empty(d.name)},
-            {"version", text_or_empty(d.version)},
-            {"vendor", text_or_empty(d.vendor)},
-            {"licence", text_or_empty(d.licence)},
-            {"description", text_or_empty(d.description)},
+            {"id", d.id},
+            {"name", d.name},
+            {"version", d.version},
+            {"vendor", d.vendor},
+            {"licence", d.licence},
+            {"description", d.description},
             {"capabilities", d.capabilities},
             {"options", std::move(options)},
-            {"needs", std::move(needs)}};
+            {"needs", d.needs}};
+}
+
+Json to_json(const arhost_descriptor &descriptor) {
+    return to_json(describe(descriptor));
 }
 
 PluginDescription description_from_json(const Json &json) {
     PluginDescription d;
     d.kind = json.at("kind").get<arhost_kind>();
     if (d.kind < ARHOST_KIND_SOURCE || d.kind > ARHOST_KIND_SINK)
-        throw std::runtime_error("the descriptor's kind is " + std::to_string(d.kind) + ", which is none");
+        throw std::runtime_error("the descriptor's kind is " + std::to_string(d.kind) + ", which is invalid");
     d.id = text_of(json, "id");
     d.name = text_of(json, "name");
     d.version = text_of(json, "version");
@@ -98,7 +118,7 @@ PluginDescription description_from_json(const Json &json) {
         option.key = text_of(o, "key");
         option.type = o.at("type").get<arhost_option_type>();
         if (option.type < ARHOST_OPTION_BOOL || option.type > ARHOST_OPTION_OUTPUT_PATH)
-            throw std::runtime_error("the option '" + option.key + "' has no valid type");
+            throw std::runtime_error("the option '" + option.key + "' has an invalid type");
         if (o.contains("default"))
             option.default_value = text_of(o, "default");
         option.minimum = finite(o, "minimum");
@@ -111,29 +131,41 @@ PluginDescription description_from_json(const Json &json) {
     return d;
 }
 
-Json to_json(const arhost_device &device) {
-    return {{"index", device.index},
-            {"kind", device.kind},
-            {"is_default", device.is_default != 0},
-            {"name", device_text(device.name)},
-            {"uuid", device_text(device.uuid)},
-            {"abilities", device_text(device.abilities)}};
+DeviceDescription describe(const arhost_device &device) {
+    return {device.index,
+            device.kind,
+            device.is_default != 0,
+            device_text(device.name),
+            device_text(device.uuid),
+            device_text(device.abilities)};
+}
+
+Json to_json(const DeviceList &list) {
+    Json devices = Json::array();
+    for (const DeviceDescription &d : list.devices)
+        devices.push_back({{"index", d.index},
+                           {"kind", d.kind},
+                           {"is_default", d.is_default},
+                           {"name", d.name},
+                           {"uuid", d.uuid},
+                           {"abilities", d.abilities}});
+    return {{"devices", std::move(devices)}, {"left_out", list.left_out}};
 }
 constexpr std::size_t longest_device_text = max_device_text_size + std::string_view("…").size();
-// A message holds them all, should each byte of a text be a quotation mark, which JSON escapes.
+// The longest list fits a message even if JSON escapes each byte of each text.
 static_assert(max_devices * (3 * 2 * longest_device_text + 128) < Channel::max_message_size);
 
-DeviceList devices_from_json(const Json &message) {
-    const auto text_of = [](const Json &json, const char *key) {
-        std::string text = json.at(key).get<std::string>();
+DeviceList devices_from_json(const Json &json) {
+    const auto text_of = [](const Json &device, const char *key) {
+        std::string text = device.at(key).get<std::string>();
         if (text.size() > longest_device_text)
             throw std::runtime_error(std::string("a device's '") + key + "' is too long");
         return text;
     };
     DeviceList list;
-    if (message.at("devices").size() > max_devices)
-        throw std::runtime_error("there are too many devices");
-    for (const Json &d : message.at("devices")) {
+    if (json.at("devices").size() > max_devices)
+        throw std::runtime_error("the list has more than " + std::to_string(max_devices) + " devices");
+    for (const Json &d : json.at("devices")) {
         DeviceDescription device;
         device.index = d.at("index").get<std::uint32_t>();
         device.kind = d.at("kind").get<arhost_device_kind>();
@@ -143,25 +175,8 @@ DeviceList devices_from_json(const Json &message) {
         device.abilities = text_of(d, "abilities");
         list.devices.push_back(std::move(device));
     }
-    list.left_out = message.at("left_out").get<std::uint64_t>();
+    list.left_out = json.at("left_out").get<std::uint64_t>();
     return list;
-}
-
-Json to_json(const std::vector<OptionValue> &options) {
-    Json json = Json::array();
-    for (const OptionValue &o : options)
-        json.push_back(
-            {{"key", o.key}, {"type", o.type}, {"integer", o.integer}, {"real", o.real}, {"text", o.text}});
-    return json;
-}
-
-std::vector<OptionValue> options_from_json(const Json &json) {
-    std::vector<OptionValue> options;
-    for (const Json &o : json)
-        options.push_back({o.at("key").get<std::string>(), o.at("type").get<arhost_option_type>(),
-                           o.at("integer").get<std::int64_t>(), o.at("real").get<double>(),
-                           o.at("text").get<std::string>()});
-    return options;
 }
 
 Json to_json(const arhost_intrinsics &i) {
@@ -213,7 +228,7 @@ arhost_frame_format format_from_json(const Json &json) {
         (yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709 ||
                  f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL)) ||
         !arhost_frame_layout(&f))
-        throw std::runtime_error("the frame format is not valid: pixel format " + std::to_string(f.pixel_format) +
+        throw std::runtime_error("the frame format is invalid: pixel format " + std::to_string(f.pixel_format) +
                                  ", " + std::to_string(f.width) + "x" + std::to_string(f.height) + " px, " +
                                  std::to_string(f.fps) + " fps");
     return f;

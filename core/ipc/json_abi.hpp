@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// ABI structs in control messages. Reading throws nlohmann::json::exception or std::runtime_error on
-// anything malformed: what comes from a worker is not trusted.
+// ABI structs in control messages. Reading throws nlohmann::json::exception or std::runtime_error on malformed input,
+// as workers are not trusted.
 #pragma once
 
 #include "ipc/channel.hpp"
@@ -14,7 +14,7 @@
 
 namespace arhost::ipc {
 
-// A descriptor and its options with strings of its own, as it comes out of a worker's hello.
+// An arhost_descriptor with its options, owning all strings.
 struct OptionDeclaration {
     std::string key;
     arhost_option_type type = 0;
@@ -28,7 +28,7 @@ struct PluginDescription {
     std::string id, name, version, vendor, licence, description;
     std::uint32_t capabilities = 0;
     std::vector<OptionDeclaration> options;
-    std::vector<std::string> needs; // of sandbox::allowances
+    std::vector<std::string> needs; // from sandbox::allowances
 };
 struct OptionValue {
     std::string key;
@@ -38,38 +38,40 @@ struct OptionValue {
     std::string text;
 };
 
-// The options in a descriptor: elements are as long as the plugin's headers had them, which may be newer than these.
+// The options of a descriptor. Their size is that of the plugin's headers, which may be newer than these.
 std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
 
-// What a host takes of a descriptor: in a text of it, and in all as JSON, which must fit a hello.
+PluginDescription describe(const arhost_descriptor &descriptor);
+
+// Limits in bytes of a descriptor's texts and of the whole as JSON, which must fit a hello.
 constexpr std::size_t max_text_size = 4096, max_descriptor_size = Channel::max_message_size - 1024;
 
+Json to_json(const PluginDescription &description);
 Json to_json(const arhost_descriptor &descriptor);
 PluginDescription description_from_json(const Json &json);
 
-// What a plugin's extension arhost.devices/1 tells, as a worker passes it on: so many of them, their texts printable.
+// A plugin's answer through the extension arhost.devices/1, with printable texts.
 struct DeviceDescription {
     std::uint32_t index = 0;
     arhost_device_kind kind = 0;
     bool is_default = false;
-    std::string name, uuid, abilities; // "": none
+    std::string name, uuid, abilities; // may be empty
 };
 struct DeviceList {
     std::vector<DeviceDescription> devices;
-    std::uint64_t left_out = 0; // behind them
+    std::uint64_t left_out = 0; // devices beyond max_devices
 };
-constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, before the "…" of what is longer
+constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, without the "…" of a cut text
 
-Json to_json(const arhost_device &device);
-DeviceList devices_from_json(const Json &message);
+DeviceDescription describe(const arhost_device &device);
 
-Json to_json(const std::vector<OptionValue> &options);
-std::vector<OptionValue> options_from_json(const Json &json);
+Json to_json(const DeviceList &list);
+DeviceList devices_from_json(const Json &json);
 
 Json to_json(const arhost_intrinsics &intrinsics);
 arhost_intrinsics intrinsics_from_json(const Json &json);
 
-// Only the fields that a source sets; the layout is computed anew on reading.
+// Only the fields that a source sets; reading recomputes the layout.
 Json to_json(const arhost_frame_format &format);
 arhost_frame_format format_from_json(const Json &json);
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Memory shared between processes: anonymous memfds, each with one writer, sealed so that no peer can
-// resize it under a reader or map it writable once its writer has.
+// Shared memory: anonymous memfds with one writer each. Seals keep peers from resizing one under a reader and from
+// mapping it writable once its writer has.
 //
-// Life of a memfd that a worker writes: the host creates it (size fixed by seals), sends it, the worker
-// maps it writable and acknowledges, the host seals it against further writers, and only then hands it
-// to readers. What the host writes it maps and seals at once.
+// Life cycle of a memfd that a worker writes: the host creates it with a sealed size and sends it; the worker maps it
+// writable and acknowledges; the host seals it against further writers and only then passes it to readers. Memory
+// that the host writes is mapped and sealed at once.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -32,7 +32,7 @@ public:
 
     std::span<std::byte> bytes() const { return {address_, size_}; }
     explicit operator bool() const { return address_ != nullptr; }
-    // The mapping as a T, which must fit. T is trivially copyable or made of atomics, and starts as zeros.
+    // The mapping as a T, which must fit. T is trivially copyable or consists of atomics; memory starts zeroed.
     template <class T> T &as() const { return *reinterpret_cast<T *>(address_); }
 
 private:
@@ -45,16 +45,15 @@ enum class Access { read_only, read_write };
 class SharedMemory {
 public:
     SharedMemory() = default;
-    // Zeros, sealed against growing and shrinking. `name` shows up in /proc for debugging.
+    // Zeroed, with a sealed size. `name` appears in /proc for debugging.
     static SharedMemory create(const char *name, std::size_t size);
-    // One that came from a peer. Throws where it is no memfd or could still be resized by the peer.
+    // Memory received from a peer. Throws if it is not a memfd or the peer could still resize it.
     static SharedMemory adopt(base::UniqueFd fd);
-    // One that a peer has finished, has sealed or not: sealed here against everything. Throws where a
-    // writable mapping still exists.
+    // Memory that a peer has finished writing: applies all seals. Throws if a writable mapping still exists.
     static SharedMemory adopt_and_freeze(base::UniqueFd fd);
 
     Mapping map(Access access) const;
-    // No new writable mapping and no write(2) from now on; those that exist stay.
+    // Forbids new writable mappings and write(2); existing mappings stay writable.
     void seal_future_writes() const;
 
     int fd() const { return fd_.get(); }
@@ -67,9 +66,9 @@ private:
     std::size_t size_ = 0;
 };
 
-// Slots of equal size in one memfd, each 64 KiB aligned so that no two share a (large) page or line.
+// Slots of equal size in one memfd, aligned to 64 KiB so that no two share a page or cache line.
 struct SlotLayout {
-    std::uint64_t slot_size = 0; // bytes used of each slot
+    std::uint64_t slot_size = 0; // used bytes of each slot
     std::uint32_t count = 0;
 
     static constexpr std::uint64_t alignment = 64 * 1024;

@@ -1,23 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the host and a worker say to each other: the two pages of a link and the entries of their rings.
-// The control messages (JSON) are listed here too; core/worker sends and takes one side of them,
-// core/supervise the other.
-//
-//   host → worker                                        worker → host
-//   {type: open, plugin, sandbox} + host and worker page  {type: hello, descriptor, sandbox: how far it was reached}
-//   {type: devices}, or straight on                       {type: devices [, devices, left_out]} or failed; it goes on
-//   {type: create, options, setup…} [+ arena, inputs]     {type: ready, properties…}
-//   {type: attach, role, generation, layout} + memory     {type: attached, role, generation}
-//   {type: detach, generation}                            {type: detached, generation}
-//   {type: stop}                                          {type: stopped, status}
-//   at any time                                           {type: log, severity, text}, {type: progress, what,
-//   fraction},
-//                                                         {type: failed, status, text}, {type: end}
-//   the loader: {type: load, scene, sandbox}             {type: loaded, …} + arena
-//
-// Once a worker is ready, the host announces each further message by a `control` command in the ring, so
-// that the order of messages and frames is fixed.
+// The shared pages of host and worker, and the entries of their rings. messages.hpp has the control messages.
 #pragma once
 
 #include "ipc/ring.hpp"
@@ -26,15 +9,17 @@
 #include <arhost/arhost.h>
 
 #include <cstdint>
+#include <string>
+#include <string_view>
 
 namespace arhost::ipc {
 
 enum class CommandKind : std::uint32_t {
-    control = 1, // take one message from the control channel
+    control = 1, // receive one message from the control channel
     read = 2,    // source: a frame into output slot `slot`
     track = 3,   // tracker: input slot `input_slot` of `input_generation`, the result into output slot `slot`
     render = 4,  // ray tracer: `camera` into output slot `slot`
-    write = 5    // sink: input slot `input_slot`
+    write = 5    // sink: input slot `input_slot` of `input_generation`
 };
 
 struct Command {
@@ -42,7 +27,7 @@ struct Command {
     std::uint32_t slot;
     std::uint32_t input_generation;
     std::uint32_t input_slot;
-    std::uint64_t ticket; // counts up; the answer bears it
+    std::uint64_t ticket; // increasing; the result repeats it
     std::uint64_t sequence;
     std::int64_t capture_ns;
     arhost_clock clock;
@@ -60,8 +45,11 @@ struct Result {
     arhost_render_info render; // of render
 };
 
-// The plugin's function that a worker is in, for crash reports.
+// The plugin function that a worker is in, for crash reports.
 enum class Call : std::uint32_t { none, load, negotiate, create, start, per_frame, idle, stop, destroy, devices };
+
+// "in create", "while its library was loaded". `per_frame` names the kind's own function.
+std::string to_text(Call call, std::string_view per_frame = "its per-frame call");
 
 constexpr std::uint32_t ring_capacity = 16;
 
@@ -85,7 +73,7 @@ using CommandConsumer = Consumer<Command, ring_capacity>;
 using ResultProducer = Producer<Result, ring_capacity>;
 using ResultConsumer = Consumer<Result, ring_capacity>;
 
-// An output slot that sinks read: the record first, then the image from `image_offset` on.
+// An output slot that sinks read: the record, then the image at `image_offset`.
 struct OutputSlot {
     static constexpr std::uint64_t image_offset = (sizeof(arhost_record) + 4095) / 4096 * 4096;
     static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
@@ -93,7 +81,7 @@ struct OutputSlot {
         return image_offset + std::uint64_t(stride(width)) * height;
     }
 };
-// A ray tracer's slot: RGBA8 rows of this many bytes.
+// Bytes of one RGBA8 row in a ray tracer's slot.
 inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }

@@ -44,7 +44,7 @@ void Reactor::remove(std::uint64_t id) {
 
 void Reactor::run_once() {
     using std::chrono::milliseconds;
-    // Short, so that a halt of this process shows as time beyond what was asked for.
+    // Short waits make a suspension of this process visible: the wait takes longer than requested.
     constexpr milliseconds slice{100};
     std::optional<milliseconds> timeout;
     if (!deadlines_.empty()) {
@@ -52,25 +52,25 @@ void Reactor::run_once() {
         const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - Clock::now());
         timeout = std::clamp(left, milliseconds(0), slice);
     }
-    take_events(timeout);
+    dispatch_events(timeout);
     if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
-        take_events(milliseconds(0)); // what came while this process was halted came in time
+        dispatch_events(milliseconds(0)); // events during a suspension of this process arrived in time
     while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
         auto due = deadlines_.extract(deadlines_.begin());
         due.mapped().callback();
     }
 }
 
-void Reactor::take_events(std::optional<std::chrono::milliseconds> timeout) {
+void Reactor::dispatch_events(std::optional<std::chrono::milliseconds> timeout) {
     std::array<epoll_event, 32> events;
     const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
                                    timeout ? static_cast<int>(timeout->count()) : -1);
     if (count < 0 && errno != EINTR)
         base::throw_errno("epoll_wait");
-    postpone_by_halt(timeout);
+    postpone_by_suspension(timeout);
     for (int i = 0; i < count; ++i) {
         const std::uint64_t id = events[static_cast<std::size_t>(i)].data.u64; // a copy: epoll_event is packed
-        // A callback may have removed this one; its id is never given out again.
+        // An earlier callback may have removed this watch; ids are never reused.
         const auto found = watches_.find(id);
         if (found == watches_.end())
             continue;
@@ -79,18 +79,18 @@ void Reactor::take_events(std::optional<std::chrono::milliseconds> timeout) {
     }
 }
 
-// Time that this process did not run counts for no deadline: others may not have run either.
-void Reactor::postpone_by_halt(std::optional<std::chrono::milliseconds> timeout) {
-    constexpr std::chrono::milliseconds noticeable{50}; // above what a busy machine delays
-    const Clock::time_point now = Clock::now(), before = std::exchange(looked_, now);
-    if (!timeout) // nothing was due, and any time is well spent
+// Extends all deadlines by the time in which this process did not run: workers may not have run either.
+void Reactor::postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout) {
+    constexpr std::chrono::milliseconds noticeable{50}; // above the scheduling delays of a busy machine
+    const Clock::time_point now = Clock::now(), before = std::exchange(last_wait_end_, now);
+    if (!timeout) // no deadline was pending
         return;
-    const auto halt = now - before - *timeout;
-    if (halt < noticeable)
+    const auto suspension = now - before - *timeout;
+    if (suspension < noticeable)
         return;
     std::multimap<Clock::time_point, Deadline> postponed;
     for (auto &[when, deadline] : deadlines_)
-        postponed.emplace_hint(postponed.end(), when + halt, std::move(deadline));
+        postponed.emplace_hint(postponed.end(), when + suspension, std::move(deadline));
     deadlines_ = std::move(postponed);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One epoll for everything that the host waits for: doorbells, control channels, deaths (pidfds), signals
-// and deadlines. Single-threaded.
+// The host's event loop: one epoll for doorbells, control channels, process exits (pidfds), signals and deadlines.
+// Single-threaded.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -20,7 +20,7 @@ public:
     using Clock = std::chrono::steady_clock;
     using Callback = std::function<void()>;
 
-    // Ends a watch or a deadline when it goes out of scope. It may do so inside any callback.
+    // Cancels a watch or a deadline on destruction, which may happen inside any callback.
     class Registration {
     public:
         Registration() = default;
@@ -43,13 +43,13 @@ public:
 
     Reactor();
 
-    // Calls back while `fd` is readable or hung up. The fd stays open until the registration ends.
+    // Calls back while `fd` is readable or hung up. `fd` must stay open until the registration ends.
     [[nodiscard]] Registration watch(int fd, Callback callback);
     // Calls back once.
     [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
 
-    // Waits until something happens, and handles it. What has come in counts before a deadline does, and time
-    // in which this process did not run (Ctrl-Z, a frozen container) counts for none.
+    // Waits for events and handles them. Events precede expired deadlines, and deadlines do not include time in
+    // which this process did not run (Ctrl-Z, a frozen container).
     void run_once();
 
 private:
@@ -62,14 +62,14 @@ private:
         Callback callback;
     };
     void remove(std::uint64_t id);
-    void take_events(std::optional<std::chrono::milliseconds> timeout);
-    void postpone_by_halt(std::optional<std::chrono::milliseconds> timeout);
+    void dispatch_events(std::optional<std::chrono::milliseconds> timeout);
+    void postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout);
 
     base::UniqueFd epoll_;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
-    Clock::time_point looked_ = Clock::now(); // when the last wait for events ended
+    Clock::time_point last_wait_end_ = Clock::now();
 };
 
 } // namespace arhost::ipc

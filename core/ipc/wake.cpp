@@ -10,7 +10,7 @@
 namespace arhost::ipc {
 namespace {
 
-// std::atomic::wait uses private futexes, which do not reach another process: the system call itself.
+// std::atomic::wait uses private futexes, which do not work across processes.
 long futex(const std::atomic<std::uint32_t> &word, int operation, std::uint32_t value, const timespec *timeout) {
     static_assert(sizeof(word) == sizeof(std::uint32_t));
     return ::syscall(SYS_futex, reinterpret_cast<const std::uint32_t *>(&word), operation, value, timeout, nullptr,
@@ -26,13 +26,13 @@ void pause_cpu() {
 } // namespace
 
 void wake(WakeWord &word) {
-    // SYNC POINT with wake_count: what was pushed before is visible to who sees the new count. The
-    // kernel's futex re-reads the word under its own lock, so a sleeper either sees it or is woken.
+    // SYNC POINT with wake_count (its acquire load): entries pushed before are visible to a reader of the new count.
+    // The kernel re-reads the word under the futex lock, so a sleeper either sees the new count or is woken.
     word.count.fetch_add(1, std::memory_order_release);
     futex(word.count, FUTEX_WAKE, INT_MAX, nullptr);
 }
 
-// SYNC POINT with wake: pairs with its release increment.
+// SYNC POINT with wake (its release increment).
 std::uint32_t wake_count(const WakeWord &word) {
     return word.count.load(std::memory_order_acquire);
 }
@@ -49,7 +49,7 @@ bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanose
         if (left <= 0)
             return false;
         const timespec relative{left / 1'000'000'000, left % 1'000'000'000};
-        // Returns at once (EAGAIN) where the word is no longer `seen`; a signal (EINTR) just loops.
+        // Returns at once (EAGAIN) if the word differs from `seen`; EINTR loops.
         futex(word.count, FUTEX_WAIT, seen, &relative);
     }
     return true;
@@ -63,7 +63,7 @@ DoorbellPair make_doorbell() {
 }
 
 void ring_doorbell(int worker_end) {
-    // A full buffer means that the bell is ringing already.
+    // If the buffer is full, the host has been notified already.
     (void)::send(worker_end, "!", 1, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 

@@ -31,8 +31,8 @@ std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, st
 
 constexpr std::int64_t max_ms = 3'600'000;
 
-supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
-    supervise::RestartLimits limits;
+base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
+    base::RestartLimits limits;
     if (!node)
         return limits;
     node->allow_keys(keys_of("restart"));
@@ -49,7 +49,7 @@ supervise::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
 // Settings that all components share.
 struct Shared {
     PluginPath plugin_path;
-    supervise::RestartLimits restart;
+    base::RestartLimits restart;
     sandbox::Mode sandbox;
 };
 

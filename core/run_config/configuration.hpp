@@ -3,12 +3,13 @@
 // Configuration files: parsing, and all checks that need no plugin (docs/config.md).
 #pragma once
 
+#include "base/limits.hpp"
 #include "camera/coordinates.hpp"
 #include "camera/trajectory.hpp"
+#include "ipc/json_abi.hpp"
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
 #include "sandbox/sandbox.hpp"
-#include "supervise/component.hpp"
 #include "yaml/yaml.hpp"
 
 #include <arhost/camera.h>
@@ -28,7 +29,7 @@ struct ComponentConfiguration {
     yaml::Node node;                            // its YAML map, for error messages
     std::vector<std::filesystem::path> plugins; // shared objects: the plugin, then its fallback
     std::optional<yaml::Node> path, options;
-    supervise::Limits limits;
+    base::Limits limits;
     sandbox::Policy policy; // docs/security.md
     bool conform = false;   // check results at run time (docs/conformance.md)
 };

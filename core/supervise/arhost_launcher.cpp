@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3; of no use by hand.
-// It starts workers, tells how they ended, and kills what they leave behind.
+// arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3. Starts workers,
+// reports how they exited, and kills the processes that they leave behind.
 #include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "supervise/launcher_protocol.hpp"
@@ -38,7 +38,7 @@ using arhost::base::UniqueFd;
     ::_exit(127);
 }
 
-void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &fds, std::set<pid_t> &spawned) {
+void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds, std::set<pid_t> &spawned) {
     const pid_t launcher = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0)
@@ -50,10 +50,10 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
         send_struct(socket, reply);
         return;
     }
-    // No race: the child stays a zombie until this process reaps it.
+    // No race: the child remains a zombie until this process reaps it.
     const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
     reply.exit.pid = pid;
-    if (!pidfd) { // a container that does not allow it, or no descriptor left
+    if (!pidfd) { // forbidden in this container, or out of descriptors
         reply.kind = Reply::failed;
         reply.error = errno;
         ::kill(pid, SIGKILL);
@@ -65,17 +65,17 @@ void spawn_for(int socket, const Request &request, const std::vector<UniqueFd> &
     send_struct(socket, reply, {pidfd.get()});
 }
 
-// The host is gone: so are the workers in a moment, and so must be what they have started. Nothing is done at the
-// exit: a sanitizer's search for leaks stops this process, and the host, which waits, makes a stopped one go on.
+// The host has exited: kills the workers and their children. Uses _exit, as a sanitizer's leak check at exit would
+// stop this process, which conflicts with the SIGCONT of a waiting host.
 [[noreturn]] void end_all(const std::set<pid_t> &spawned) {
     for (const pid_t worker : spawned)
         ::kill(-worker, SIGKILL);
-    for (int i = 0; i < 500; ++i) { // a process that hangs in the kernel is not waited for
+    for (int i = 0; i < 500; ++i) { // does not wait for a process that hangs in the kernel
         kill_orphans({});
-        pid_t gone;
-        while ((gone = ::waitpid(-1, nullptr, WNOHANG)) > 0) {
+        pid_t reaped;
+        while ((reaped = ::waitpid(-1, nullptr, WNOHANG)) > 0) {
         }
-        if (gone < 0)
+        if (reaped < 0)
             break;
         ::usleep(1000);
     }
@@ -91,8 +91,8 @@ void reap(int socket, std::set<pid_t> &spawned) {
         if (reply.exit.pid <= 0)
             return (void)kill_orphans(spawned);
         if (spawned.erase(reply.exit.pid) == 0)
-            continue;                     // the orphan of a worker
-        ::kill(-reply.exit.pid, SIGKILL); // what it has forked; kill_orphans finds what has left its group
+            continue;                     // a worker's orphan
+        ::kill(-reply.exit.pid, SIGKILL); // its children; kill_orphans finds those that left its group
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -109,14 +109,14 @@ int main() {
     }
     ::fcntl(launcher_fd, F_SETFD, FD_CLOEXEC);
     ::syscall(SYS_close_range, launcher_fd + 1u, ~0u, 0u);
-    // The socket tells when the host is gone, and then there is something left to do: not SIGKILL, but the signal
-    // that lets one go on which somebody has stopped.
+    // The closed socket shows that the host has exited. SIGCONT instead of SIGKILL: a stopped launcher must continue
+    // to clean up.
     ::prctl(PR_SET_PDEATHSIG, SIGCONT);
-    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a worker leaves behind comes here
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // adopts the orphans of workers
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGHUP, SIG_IGN);
-    ::signal(SIGCHLD, SIG_DFL); // ignored, as a parent may have left it, its children's ends would be lost
+    ::signal(SIGCHLD, SIG_DFL); // if inherited as ignored, the exits of children would be lost
     sigset_t child;
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);
@@ -138,7 +138,7 @@ int main() {
             std::vector<UniqueFd> fds;
             if (!receive_struct(launcher_fd, request, fds) || fds.size() != 3)
                 end_all(spawned);
-            spawn_for(launcher_fd, request, fds, spawned);
+            spawn(launcher_fd, request, fds, spawned);
         }
     }
 }

@@ -10,11 +10,11 @@ namespace arhost::supervise {
 
 struct Exit {
     pid_t pid;
-    int wait_status; // as of wait(2)
+    int wait_status; // as from wait(2)
     double cpu_seconds;
 };
 
-// User and system.
+// User plus system time.
 inline double cpu_seconds(const rusage &usage) {
     const auto seconds = [](const timeval &t) {
         return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);

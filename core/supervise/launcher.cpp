@@ -29,17 +29,18 @@ constexpr int max_attempts = 5;
 } // namespace
 
 Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds timeout)
-    : program_(std::move(program)), timeout_(timeout), not_of_workers_(base::children()) {
+    : program_(std::move(program)), timeout_(timeout), unrelated_children_(base::children()) {
     if (::access(program_.c_str(), X_OK) != 0)
-        throw std::runtime_error(cannot_start(errno));
-    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // what a killed launcher leaves behind comes here
+        throw std::runtime_error(start_error(errno));
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // adopts the orphans of a killed launcher
 }
 
-std::string Launcher::cannot_start(int error) const {
-    return program_.string() + " can't be started: " + std::strerror(error) + "; is it installed beside arhost?";
+std::string Launcher::start_error(int error) const {
+    return program_.string() + " can't be started: " + std::strerror(error) +
+           "; is it installed in the same folder as arhost?";
 }
 
-// A new program and not a fork: this process may have threads, whose locks a fork would keep for ever.
+// posix_spawn instead of fork: this process may have threads, whose locks would stay locked in a forked child.
 void Launcher::start() {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
@@ -51,24 +52,25 @@ void Launcher::start() {
     ::posix_spawn_file_actions_adddup2(&actions, launcher_end.get(), launcher_fd);
     posix_spawnattr_t attributes;
     ::posix_spawnattr_init(&attributes);
-    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP); // who kills the host's whole group leaves it to
-    ::posix_spawnattr_setpgroup(&attributes, 0);                    // end the rest
+    // A process group of its own: it survives a signal to the host's group and can then kill the workers.
+    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    ::posix_spawnattr_setpgroup(&attributes, 0);
     std::string path = program_;
     char *const arguments[] = {path.data(), nullptr};
     const int error = ::posix_spawn(&pid_, path.c_str(), &actions, &attributes, arguments, environ);
     ::posix_spawnattr_destroy(&attributes);
     ::posix_spawn_file_actions_destroy(&actions);
     if (error != 0)
-        throw std::runtime_error(cannot_start(error));
+        throw std::runtime_error(start_error(error));
     socket_ = std::move(host_end);
 }
 
-// One that somebody has stopped is made to go on: the host must not stand still.
+// Sends SIGCONT while waiting, as a stopped launcher must not block the host.
 std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
     const auto deadline = Clock::now() + timeout_;
     pollfd ready{socket_.get(), POLLIN, 0};
-    for (bool is_late = false;;
-         is_late = Clock::now() > deadline) { // asked first: this process may have been stopped
+    // Polls once more after the deadline, as this process itself may have been stopped.
+    for (bool is_late = false;; is_late = Clock::now() > deadline) {
         const int count = ::poll(&ready, 1, is_late ? 0 : 50);
         if (count > 0)
             break;
@@ -84,20 +86,20 @@ std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
     return reply;
 }
 
-void Launcher::lose() {
-    ::kill(pid_, SIGKILL); // should only its socket be shut
-    // One that hangs in the kernel, or whose end a debugger has not looked at, is left alone.
+void Launcher::discard() {
+    ::kill(pid_, SIGKILL); // it may only have closed its socket
+    // Gives up on a launcher that hangs in the kernel or whose exit a debugger has not collected.
     for (int i = 0; i < 500 && ::waitpid(pid_, nullptr, WNOHANG) == 0; ++i)
         ::usleep(1000);
     std::vector<UniqueFd> fds;
-    // What it had still told. Its end of the socket may be open in who is to die below.
+    // Collects its last reports. Does not wait: processes that are killed below may hold its end of the socket.
     for (Reply reply; socket_ && receive_struct(socket_.get(), reply, fds, MSG_DONTWAIT);)
         if (reply.kind == Reply::exited)
-            note(reply.exit);
+            record(reply.exit);
     socket_.reset();
     is_lost_ = true;
     alive_.clear();
-    base::end_orphans(not_of_workers_); // what its workers have forked does not die with them
+    base::end_orphans(unrelated_children_); // processes that its workers have forked
 }
 
 Launcher::~Launcher() {
@@ -107,10 +109,10 @@ Launcher::~Launcher() {
     const auto deadline = Clock::now() + timeout_;
     while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
         if (Clock::now() > deadline) {
-            lose();
+            discard();
             return;
         }
-        ::kill(pid_, SIGCONT); // should somebody have stopped it
+        ::kill(pid_, SIGCONT); // it may be stopped
         ::usleep(1000);
     }
 }
@@ -121,9 +123,10 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());
 
-    for (int tries = 0; tries < max_attempts; ++tries) {
+    for (int attempts = 0; attempts < max_attempts; ++attempts) {
         if (is_lost_)
-            log(ARHOST_SEVERITY_WARNING, "arhost", "the launcher is gone, and all workers with it; starting another");
+            log(ARHOST_SEVERITY_WARNING, "arhost",
+                "the launcher has died, and all workers with it; starting a new one");
         if (!socket_)
             start();
         is_lost_ = false;
@@ -140,17 +143,17 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
 
         std::vector<UniqueFd> fds;
         const bool sent = send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()});
-        if (!sent && errno != EPIPE && errno != ECONNRESET) // the machine is short of something, not of a launcher
+        if (!sent && errno != EPIPE && errno != ECONNRESET) // a resource limit, not a dead launcher
             base::throw_errno("no process can be started");
         std::optional<Reply> reply;
         while (sent && (reply = receive_reply(fds)) && reply->kind == Reply::exited)
-            note(reply->exit);
+            record(reply->exit);
         if (!reply) {
-            lose();
+            discard();
             continue;
         }
         const bool has_failed = reply->kind == Reply::failed;
-        if (has_failed || fds.size() != 1 || !fds[0]) // or this process may have no more descriptors
+        if (has_failed || fds.size() != 1 || !fds[0]) // or this process is out of descriptors
             throw std::runtime_error(std::string("no process can be started: ") +
                                      std::strerror(has_failed ? reply->error : EMFILE));
         alive_.insert(reply->exit.pid);
@@ -161,10 +164,10 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
         return spawned;
     }
     throw std::runtime_error("no process can be started: " + program_.string() + " was started " +
-                             std::to_string(max_attempts) + " times, and ended or did not answer each time");
+                             std::to_string(max_attempts) + " times and exited or did not respond each time");
 }
 
-void Launcher::note(const Exit &exit) {
+void Launcher::record(const Exit &exit) {
     alive_.erase(exit.pid);
     exits_.push_back(exit);
 }
@@ -177,13 +180,13 @@ Exit Launcher::wait_exit(pid_t pid) {
                 exits_.erase(it);
                 return found;
             }
-        if (!alive_.contains(pid)) // it died with its launcher
+        if (!alive_.contains(pid)) // killed together with its launcher
             return {pid, SIGKILL, 0};
         std::vector<UniqueFd> fds;
         if (const auto reply = receive_reply(fds))
-            note(reply->exit);
+            record(reply->exit);
         else
-            lose();
+            discard();
     }
 }
 

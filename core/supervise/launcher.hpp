@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The launcher: a small single-threaded process, arhost-launcher, that is the parent of all workers. It starts them
-// on request and reports how they ended. Workers die with it (PR_SET_PDEATHSIG follows the thread that forked), and
-// it ends with the host, so a host that is killed leaves nothing behind. One that somebody kills, or that does not
-// answer, is replaced, as often as it takes.
+// The launcher: arhost-launcher, a small single-threaded process, is the parent of all workers. It starts them on
+// request and reports how they exited. Workers die with it (PR_SET_PDEATHSIG follows the thread that forked), and it
+// exits with the host, so a killed host leaves no process behind. The host replaces a launcher that was killed or
+// does not respond, any number of times.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -26,35 +26,35 @@ namespace arhost::supervise {
 using LogFunction =
     std::function<void(arhost_severity severity, const std::string &component, const std::string &text)>;
 
-// A process that has just been started.
+// A newly started worker process.
 struct Spawned {
     pid_t pid = 0;
-    base::UniqueFd pidfd;    // readable once it is dead
+    base::UniqueFd pidfd;    // readable once it has exited
     ipc::Channel channel;    // its descriptor 3
     base::UniqueFd doorbell; // its descriptor 4
-    base::UniqueFd output;   // what it writes to stdout and stderr
+    base::UniqueFd output;   // its stdout and stderr
 };
 
 struct Reply;
 
-// What starts workers: the launcher, or whatever stands in for it (core/inprocess).
+// Starts workers: the launcher, or a replacement (core/inprocess, tests).
 class Starter {
 public:
     virtual ~Starter() = default;
 
-    // Throws std::runtime_error where no process can be had.
+    // Throws std::runtime_error if no process can be started.
     virtual Spawned spawn(const std::filesystem::path &program, const LogFunction &log) = 0;
 
-    // How a process that is dead already (its pidfd is readable) ended. Waits until that is known.
+    // Waits for the exit status of a process that has exited already (its pidfd is readable).
     virtual Exit wait_exit(pid_t pid) = 0;
 };
 
-// To be used from the thread that lives longest, and one for all of a process: the launcher is that thread's child,
-// and so is what the workers of a killed one leave behind, which is ended.
+// Create one per process, on the thread that lives longest: that thread becomes the parent of the launcher and of the
+// orphans of a killed launcher, which it kills.
 class Launcher final : public Starter {
 public:
-    // `program`: arhost-launcher, which is started together with the first worker. Throws std::runtime_error where it
-    // can't be executed. `timeout`: what it has to answer, and at the end to finish.
+    // `program` is arhost-launcher; the first spawn starts it. Throws std::runtime_error if it can't be executed.
+    // `timeout` limits each response and the final exit.
     explicit Launcher(std::filesystem::path program, std::chrono::milliseconds timeout = std::chrono::seconds(4));
     ~Launcher() override;
     Launcher(const Launcher &) = delete;
@@ -64,19 +64,19 @@ public:
     Exit wait_exit(pid_t pid) override;
 
 private:
-    std::string cannot_start(int error) const;
+    std::string start_error(int error) const;
     void start();
-    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds); // none: it is gone, or as good as
-    void lose();                                                          // it is gone, and its workers with it
-    void note(const Exit &exit);
+    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds); // nullopt: no launcher or no response
+    void discard();                                                       // the launcher and all its workers
+    void record(const Exit &exit);
 
     std::filesystem::path program_;
     std::chrono::milliseconds timeout_;
-    std::set<pid_t> not_of_workers_; // children of who became this program by exec
-    base::UniqueFd socket_;          // none: no launcher is at work
+    std::set<pid_t> unrelated_children_; // inherited by exec, not workers
+    base::UniqueFd socket_;              // closed: no launcher is running
     pid_t pid_ = 0;
     bool is_lost_ = false;  // and not yet replaced
-    std::set<pid_t> alive_; // its children
+    std::set<pid_t> alive_; // the launcher's children
     std::deque<Exit> exits_;
 };
 

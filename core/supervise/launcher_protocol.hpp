@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the host and arhost-launcher send each other, as plain structs: both are of one build.
+// The messages between the host and arhost-launcher: plain structs, as both are of the same build.
 #pragma once
 
 #include "ipc/fd_passing.hpp"
@@ -11,13 +11,13 @@
 namespace arhost::supervise {
 
 struct Request {
-    char program[PATH_MAX]; // with descriptors: control, doorbell, output
+    char program[PATH_MAX]; // comes with the descriptors control, doorbell and output
 };
 
 struct Reply {
     enum Kind : int { spawned, failed, exited } kind;
     int error; // errno of `failed`
-    Exit exit; // `spawned`: only pid, and its pidfd comes along
+    Exit exit; // `spawned`: only the pid; comes with the pidfd
 };
 
 // The launcher's end of the socket.

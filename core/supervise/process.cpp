@@ -14,54 +14,28 @@ namespace {
 
 using namespace ipc;
 
-const char *to_text(Call call) {
-    switch (call) {
-    case Call::none:
-        return "between calls";
-    case Call::load:
-        return "while its library was loaded";
-    case Call::negotiate:
-        return "in negotiate";
-    case Call::create:
-        return "in create";
-    case Call::start:
-        return "in start";
-    case Call::per_frame:
-        return "in its per-frame call";
-    case Call::idle:
-        return "in idle";
-    case Call::stop:
-        return "in stop";
-    case Call::destroy:
-        return "in destroy";
-    case Call::devices:
-        return "while it listed its devices";
-    }
-    return "in an unknown call";
-}
-
-// False where it is no process (arhost-inprocess).
+// False if the worker is a thread (arhost-inprocess).
 bool signal_process(const base::UniqueFd &pidfd, int signal) {
     return ::syscall(SYS_pidfd_send_signal, pidfd.get(), signal, nullptr, 0) == 0 || errno != EBADF;
 }
 
 } // namespace
 
-Process::Process(Context &context, std::string name, Events events, const Json &first)
-    : context_(context), name_(std::move(name)), events_(std::move(events)),
+Process::Process(Context &context, std::string name, Callbacks callbacks, const Json &first)
+    : context_(context), name_(std::move(name)), callbacks_(std::move(callbacks)),
       spawned_(context.launcher.spawn(context.worker_program, context.log)),
       host_memory_(SharedMemory::create("arhost-host-page", sizeof(HostPage))),
       worker_memory_(SharedMemory::create("arhost-worker-page", sizeof(WorkerPage))),
       host_page_(host_memory_.map(Access::read_write)), worker_page_(worker_memory_.map(Access::read_only)),
       commands_(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands),
       results_(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results) {
-    host_memory_.seal_future_writes(); // the worker can map it for reading only
+    host_memory_.seal_future_writes(); // the worker can map it read-only
     Reactor &reactor = context_.reactor;
-    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { take_messages(16); });
+    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { receive_messages(16); });
     doorbell_watch_ = reactor.watch(spawned_.doorbell.get(), [this] { on_doorbell(); });
-    output_watch_ = reactor.watch(spawned_.output.get(), [this] { take_output(4096); });
+    output_watch_ = reactor.watch(spawned_.output.get(), [this] { read_output(4096); });
     death_watch_ = reactor.watch(spawned_.pidfd.get(), [this] { on_death(); });
-    send(first, {host_memory_.fd(), worker_memory_.fd()});
+    send_json(first, {host_memory_.fd(), worker_memory_.fd()});
 }
 
 Process::~Process() {
@@ -69,18 +43,19 @@ Process::~Process() {
         signal_process(spawned_.pidfd, SIGKILL);
 }
 
-void Process::send(const Json &body, std::initializer_list<int> fds) {
+void Process::send_json(const Json &body, std::initializer_list<int> fds) {
     if (spawned_.channel.send(body, fds, false))
         return;
-    // A worker whose queue is full has stopped listening; a dead one is noticed by its pidfd.
+    // A full queue means that the worker has stopped receiving. The pidfd reports a dead worker.
     if (errno == EAGAIN)
-        end("does not take messages");
+        end("does not receive messages");
     else if (errno == ETOOMANYREFS)
-        end("can't be given its memory: this user's processes have too many descriptors under way in messages");
+        end("can't receive its memory: this user's processes have too many file descriptors in flight "
+            "(ETOOMANYREFS)");
 }
 
-void Process::send_in_turn(const Json &body, std::initializer_list<int> fds) {
-    send(body, fds);
+void Process::send_json_ordered(const Json &body, std::initializer_list<int> fds) {
+    send_json(body, fds);
     Command command{};
     command.kind = CommandKind::control;
     submit(command);
@@ -88,12 +63,12 @@ void Process::send_in_turn(const Json &body, std::initializer_list<int> fds) {
 
 void Process::submit(const Command &command) {
     if (commands_.push(command) != RingResult::done)
-        return end("broke the contract: its command ring is inconsistent");
+        return end("protocol violation: its command ring is inconsistent");
     wake(host_page_.as<HostPage>().wake);
 }
 
-void Process::ask_to_cancel() {
-    host_page_.as<HostPage>().cancelled.store(1, std::memory_order_relaxed); // a flag alone, nothing behind it
+void Process::request_cancel() {
+    host_page_.as<HostPage>().cancelled.store(1, std::memory_order_relaxed); // publishes no other data
     wake(host_page_.as<HostPage>().wake);
 }
 
@@ -101,7 +76,7 @@ void Process::end(const std::string &reason) {
     if (!end_reason_.empty())
         return;
     end_reason_ = reason;
-    if (!signal_process(spawned_.pidfd, SIGABRT)) { // a thread ends when it finds its host gone
+    if (!signal_process(spawned_.pidfd, SIGABRT)) { // a thread ends once its channel is closed
         ::shutdown(spawned_.channel.fd(), SHUT_RDWR);
         wake(host_page_.as<HostPage>().wake);
     }
@@ -121,58 +96,61 @@ double Process::cpu_seconds() const {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// A few at a time, so that a flood of messages can't keep the host from its frames.
-void Process::take_messages(int most) {
-    for (int i = 0; i < most; ++i) {
+// Bounded, so that a flood of messages can't starve the frames.
+void Process::receive_messages(int max_messages) {
+    for (int i = 0; i < max_messages; ++i) {
         Message message;
         switch (spawned_.channel.receive(message, 0)) {
         case ReceiveState::none:
             return;
         case ReceiveState::closed:
             channel_watch_.cancel();
-            // Its death follows most times; a worker that only closed its end is useless.
+            // Usually its exit follows. A worker that only closed its end is useless.
             if (!ending())
                 kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
                                                      [this] { end("closed its control channel"); });
             return;
-        case ReceiveState::breach:
-            return end("broke the contract: it sent a malformed message");
+        case ReceiveState::malformed:
+            return end("protocol violation: malformed message");
         case ReceiveState::message:
             break;
         }
         try {
-            if (message.body["type"] == "log") {
-                const auto severity = message.body.at("severity").get<arhost_severity>();
-                log(severity, message.body.at("text").get<std::string>().substr(0, 4000));
+            if (is<messages::Log>(message)) {
+                const auto [severity, text] = parse<messages::Log>(message);
+                log(severity, text.substr(0, 4000));
             } else {
-                events_.message(message);
+                callbacks_.message(message);
             }
+        } catch (const ProtocolViolation &violation) {
+            return end(std::string("protocol violation: ") + violation.what());
         } catch (const std::exception &error) {
             return end(std::string("can't be served: ") + error.what());
         }
     }
 }
 
-// What the plugin says; it must not drown what others say, nor its chatter its own warnings.
+// Limits the rate of a worker's log lines, separately for warnings, so that they remain visible.
 void Process::log(arhost_severity severity, const std::string &text) {
-    constexpr int max_a_second = 100;
-    remember(text);
+    constexpr int max_per_second = 100;
+    append_to_tail(text);
     if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
-        tell_of_lines_left_out();
+        report_suppressed_lines();
         log_second_ends_ = now + std::chrono::seconds(1);
     }
-    Lines &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : chatter_;
-    if (lines.said++ < max_a_second)
+    LineCount &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_;
+    if (lines.logged++ < max_per_second)
         context_.log(severity, name_, text);
     else
-        ++lines.left_out;
+        ++lines.suppressed;
 }
 
-void Process::tell_of_lines_left_out() {
+void Process::report_suppressed_lines() {
     for (const auto &[lines, severity] :
-         {std::pair{&chatter_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
-        if (lines->left_out > 0)
-            context_.log(severity, name_, std::to_string(lines->left_out) + " more lines within a second left out");
+         {std::pair{&other_lines_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
+        if (lines->suppressed > 0)
+            context_.log(severity, name_,
+                         std::to_string(lines->suppressed) + " more lines within a second suppressed");
         *lines = {};
     }
 }
@@ -184,29 +162,29 @@ void Process::on_doorbell() {
         return;
     }
     rings_ += static_cast<std::uint64_t>(rings);
-    take_results();
-    if (rings_ > results_taken_ + 8192)
-        end("broke the contract: it floods its doorbell");
+    receive_results();
+    if (rings_ > results_received_ + 8192)
+        end("protocol violation: it floods its doorbell");
 }
 
-void Process::take_results() {
+void Process::receive_results() {
     for (std::uint32_t i = 0; i < ring_capacity; ++i) {
         Result result;
         switch (results_.pop(result)) {
         case RingResult::wait:
             return;
-        case RingResult::breach:
-            return end("broke the contract: its result ring is inconsistent");
+        case RingResult::violation:
+            return end("protocol violation: its result ring is inconsistent");
         case RingResult::done:
-            ++results_taken_;
-            events_.result(result);
+            ++results_received_;
+            callbacks_.result(result);
         }
     }
 }
 
-void Process::take_output(std::size_t max_bytes) {
+void Process::read_output(std::size_t max_bytes) {
     char bytes[4096];
-    for (std::size_t taken = 0; taken < max_bytes; taken += sizeof bytes) {
+    for (std::size_t total = 0; total < max_bytes; total += sizeof bytes) {
         const ssize_t count = ::read(spawned_.output.get(), bytes, sizeof bytes);
         if (count <= 0) {
             if (count == 0)
@@ -224,30 +202,29 @@ void Process::take_output(std::size_t max_bytes) {
     }
 }
 
-void Process::remember(const std::string &line) {
+void Process::append_to_tail(const std::string &line) {
     tail_.push_back(line);
     if (tail_.size() > 20)
         tail_.pop_front();
 }
 
 void Process::on_death() {
-    // What it managed to finish counts: messages and results first. The writer is dead, and the sockets'
-    // and the pipe's buffers bound what is left.
+    // Receives what it sent before it exited. The socket and pipe buffers bound the amount.
     if (channel_watch_.active())
-        take_messages(100'000);
-    take_results();
+        receive_messages(100'000);
+    receive_results();
     if (output_watch_.active())
-        take_output(1 << 20);
+        read_output(1 << 20);
     if (!partial_line_.empty())
-        remember(partial_line_);
-    tell_of_lines_left_out();
+        append_to_tail(partial_line_);
+    report_suppressed_lines();
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;
     death.cpu_seconds = exit.cpu_seconds;
     death.by_host = ending();
     death.signal = WIFSIGNALED(exit.wait_status) ? WTERMSIG(exit.wait_status) : 0;
     death.clean = WIFEXITED(exit.wait_status) && WEXITSTATUS(exit.wait_status) == 0;
-    // SYNC: relaxed suffices, the writer is dead and its exit has been waited for.
+    // SYNC with Link::mark: relaxed suffices, as the writer has exited.
     const auto call = static_cast<Call>(worker_page_.as<WorkerPage>().call.load(std::memory_order_relaxed));
     if (WIFSIGNALED(exit.wait_status))
         death.how = "killed by signal " + std::to_string(WTERMSIG(exit.wait_status)) + " (" +
@@ -263,7 +240,7 @@ void Process::on_death() {
     output_watch_.cancel();
     death_watch_.cancel();
     kill_deadline_.cancel();
-    const auto died = std::move(events_.died); // it may destroy this object
+    const auto died = std::move(callbacks_.died); // which may destroy this object
     died(death);
 }
 

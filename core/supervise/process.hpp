@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One live worker process as the host sees it: its messages, results and death, and the ways to end it.
+// The host's view of one running worker: its messages, results and exit.
 #pragma once
 
-#include "ipc/channel.hpp"
 #include "ipc/memory.hpp"
+#include "ipc/messages.hpp"
 #include "ipc/protocol.hpp"
 #include "ipc/reactor.hpp"
 #include "supervise/launcher.hpp"
@@ -15,7 +15,7 @@
 
 namespace arhost::supervise {
 
-// What every component of a host shares.
+// Shared by all components of a host.
 struct Context {
     ipc::Reactor &reactor;
     Starter &launcher;
@@ -27,35 +27,39 @@ struct Death {
     std::string how;      // "killed by signal 11 (Segmentation fault) in per-frame"
     bool clean = false;   // exit status 0
     bool by_host = false; // the host ended it, for the reason in `how`
-    int signal = 0;       // that killed it; 0: it exited
+    int signal = 0;       // that killed it; 0: it exited by itself
     double cpu_seconds = 0;
-    std::string log_tail; // the last lines that it logged or printed
+    std::string log_tail; // the last 20 lines logged or printed
 };
 
 class Process {
 public:
-    // Each is called from the reactor. `died` comes last and once; the Process may be destroyed in it,
-    // and in none of the others. An exception out of `message` ends the process.
-    struct Events {
-        std::function<void(ipc::Message &)> message; // but for log messages
+    // Called from the reactor. `died` is called last and once; only there the Process may be destroyed. An exception
+    // from `message` ends the process.
+    struct Callbacks {
+        std::function<void(ipc::Message &)> message; // all except Log
         std::function<void(const ipc::Result &)> result;
         std::function<void(const Death &)> died;
     };
 
-    // Starts a worker and gives it its pages together with `first`, whose body lacks nothing else.
-    Process(Context &context, std::string name, Events events, const ipc::Json &first);
+    // Starts a worker and sends it the pages with `first`, the encoded messages::Open or messages::Load.
+    Process(Context &context, std::string name, Callbacks callbacks, const ipc::Json &first);
     ~Process(); // kills it
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;
 
-    // A message of the start-up, which the worker waits for.
-    void send(const ipc::Json &body, std::initializer_list<int> fds = {});
-    // A message to a worker that serves commands; taken in its turn.
-    void send_in_turn(const ipc::Json &body, std::initializer_list<int> fds = {});
+    // Before the worker is ready, which then waits for messages only.
+    template <class T> void send(const T &message, std::initializer_list<int> fds = {}) {
+        send_json(ipc::encode(message), fds);
+    }
+    // To a ready worker, which receives the message in order with its commands.
+    template <class T> void send_ordered(const T &message, std::initializer_list<int> fds = {}) {
+        send_json_ordered(ipc::encode(message), fds);
+    }
     void submit(const ipc::Command &command);
 
-    void ask_to_cancel(); // the running call sees host->cancelled
-    // Ends it for a reason that stands in Death::how: SIGABRT, and SIGKILL soon after.
+    void request_cancel(); // the running call sees host->cancelled
+    // Sends SIGABRT, and SIGKILL soon after. `reason` appears in Death::how.
     void end(const std::string &reason);
     bool ending() const { return !end_reason_.empty(); }
     void kill_now();
@@ -64,18 +68,20 @@ public:
     double cpu_seconds() const; // so far
 
 private:
-    void take_messages(int most);
+    void send_json(const ipc::Json &body, std::initializer_list<int> fds);
+    void send_json_ordered(const ipc::Json &body, std::initializer_list<int> fds);
+    void receive_messages(int max_messages);
     void on_doorbell();
-    void take_output(std::size_t max_bytes);
+    void read_output(std::size_t max_bytes);
     void on_death();
-    void take_results();
+    void receive_results();
     void log(arhost_severity severity, const std::string &text);
-    void tell_of_lines_left_out();
-    void remember(const std::string &line);
+    void report_suppressed_lines();
+    void append_to_tail(const std::string &line);
 
     Context &context_;
     std::string name_;
-    Events events_;
+    Callbacks callbacks_;
     Spawned spawned_;
     ipc::SharedMemory host_memory_, worker_memory_;
     ipc::Mapping host_page_, worker_page_;
@@ -84,11 +90,11 @@ private:
     std::string end_reason_, partial_line_;
     std::deque<std::string> tail_;
     ipc::Reactor::Clock::time_point log_second_ends_{};
-    struct Lines { // within the second
-        int said = 0, left_out = 0;
+    struct LineCount { // within the current second
+        int logged = 0, suppressed = 0;
     };
-    Lines chatter_, warnings_;
-    std::uint64_t rings_ = 0, results_taken_ = 0;
+    LineCount other_lines_, warnings_;
+    std::uint64_t rings_ = 0, results_received_ = 0;
     ipc::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
 };
 

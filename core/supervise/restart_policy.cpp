@@ -5,9 +5,9 @@
 
 namespace arhost::supervise {
 
-std::optional<std::chrono::milliseconds> RestartPolicy::died(double jitter) {
-    const bool proven = frames_ever_ >= limits_.proven_after_frames && frames_in_life_ > 0;
-    frames_in_life_ = 0;
+std::optional<std::chrono::milliseconds> RestartPolicy::delay_after_death(double jitter) {
+    const bool proven = frames_total_ >= limits_.proven_after_frames && frames_in_process_ > 0;
+    frames_in_process_ = 0;
     if (proven) {
         failures_ = 0;
         return std::chrono::milliseconds(0);

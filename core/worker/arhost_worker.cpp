@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-worker: started by the host's launcher with its control channel as descriptor 3 and its doorbell as
-// descriptor 4; of no use by hand.
+// descriptor 4.
 #include "worker/session.hpp"
 
 #include <cstdio>
@@ -14,7 +14,7 @@ int main() {
         std::fprintf(stderr, "arhost-worker is started by arhost, not by hand: arhost --config FILE\n");
         return 2;
     }
-    worker::keep_freed_memory();
+    worker::retain_freed_memory();
     worker::Link link{ipc::Channel(base::UniqueFd(control_fd)), base::UniqueFd(doorbell_fd)};
-    return worker::work(link);
+    return worker::run(link);
 }

@@ -1,50 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/devices.hpp"
 
-#include "ipc/json_abi.hpp"
-
 #include <cstddef>
 #include <stdexcept>
-#include <string>
 
 namespace arhost::worker {
 namespace {
 
-using namespace ipc;
-
-// As much as one message holds, however many there are.
-struct Taken {
-    Json devices = Json::array();
-    std::uint64_t left_out = 0;
-    bool broken = false;
+struct Listing {
+    ipc::DeviceList list;
+    bool is_invalid = false;
 };
 
-void take(void *context, const arhost_device *device) noexcept {
-    Taken &taken = *static_cast<Taken *>(context);
-    constexpr std::size_t whole = offsetof(arhost_device, abilities) + sizeof(arhost_device::abilities);
-    if (!device || device->struct_size < whole || !device->name)
-        taken.broken = true;
-    else if (taken.devices.size() < max_devices)
-        taken.devices.push_back(to_json(*device));
+void add_device(void *context, const arhost_device *device) noexcept {
+    Listing &listing = *static_cast<Listing *>(context);
+    constexpr std::size_t min_size = offsetof(arhost_device, abilities) + sizeof(arhost_device::abilities);
+    if (!device || device->struct_size < min_size || !device->name)
+        listing.is_invalid = true;
+    else if (listing.list.devices.size() < ipc::max_devices)
+        listing.list.devices.push_back(ipc::describe(*device));
     else
-        ++taken.left_out;
+        ++listing.list.left_out;
 }
 
 } // namespace
 
-arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host, Json &answer) {
+arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
+                           std::optional<ipc::DeviceList> &list) {
     const auto *extension = static_cast<const arhost_devices *>(plugin.get_extension(ARHOST_DEVICES_EXTENSION));
     if (!extension)
         return ARHOST_STATUS_OK;
-    constexpr std::size_t whole = offsetof(arhost_devices, list) + sizeof(arhost_devices::list);
-    if (extension->struct_size < whole || !extension->list)
-        throw std::runtime_error("its extension " ARHOST_DEVICES_EXTENSION " is too short, or has no 'list'");
-    Taken taken;
-    const arhost_status status = extension->list(&host, take, &taken);
-    if (taken.broken)
-        throw std::runtime_error("it told of a device that has no name, or is too short");
-    answer["devices"] = std::move(taken.devices);
-    answer["left_out"] = taken.left_out;
+    constexpr std::size_t min_size = offsetof(arhost_devices, list) + sizeof(arhost_devices::list);
+    if (extension->struct_size < min_size || !extension->list)
+        throw std::runtime_error("its extension " ARHOST_DEVICES_EXTENSION " is too short or has no 'list'");
+    Listing listing;
+    const arhost_status status = extension->list(&host, add_device, &listing);
+    if (listing.is_invalid)
+        throw std::runtime_error("it reported a device that has no name or whose struct is too short");
+    list = std::move(listing.list);
     return status;
 }
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a plugin tells by the extension of arhost/devices.h.
+// Lists a plugin's devices through the extension of arhost/devices.h.
 #pragma once
 
-#include "ipc/channel.hpp"
+#include "ipc/json_abi.hpp"
 
 #include <arhost/arhost.h>
 
 namespace arhost::worker {
 
-// Asks the plugin, and adds to `answer` what ipc::devices_from_json reads; nothing where it has no such extension.
-// Throws std::runtime_error, with a sentence for the user, where it breaks the extension's contract.
-arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host, ipc::Json &answer);
+// Leaves `list` empty if the plugin lacks the extension. Throws std::runtime_error with a message for the user if the
+// plugin violates the extension's contract.
+arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
+                           std::optional<ipc::DeviceList> &list);
 
 } // namespace arhost::worker

@@ -16,7 +16,7 @@
 namespace arhost::worker {
 namespace {
 
-std::string words(std::span<const std::string_view> list) {
+std::string joined(std::span<const std::string_view> list) {
     std::string text;
     for (const std::string_view word : list)
         text.append(text.empty() ? "" : ", ").append(word);
@@ -27,15 +27,15 @@ std::string words(std::span<const std::string_view> list) {
     throw std::runtime_error(file.string() + ": " + why);
 }
 
-using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // is it there?
+using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // name, is present
 
 void check_functions(const std::filesystem::path &file, NamedFunctions functions, const std::string &owner) {
-    for (const auto &[name, is_there] : functions)
-        if (!is_there)
+    for (const auto &[name, is_present] : functions)
+        if (!is_present)
             refuse(file, "its function '" + std::string(name) + "' is NULL, which " + owner + " must have");
 }
 
-// Where a struct ended in version 1. A plugin that knows no more of it is as good as any (docs/abi.md).
+// Sizes of the structs in ABI version 1, the minimum (docs/abi.md).
 #define ARHOST_SIZE_UP_TO(type, last) (offsetof(type, last) + sizeof(type::last))
 constexpr std::size_t entry_point_size = ARHOST_SIZE_UP_TO(arhost_entry_point, negotiate),
                       plugin_size = ARHOST_SIZE_UP_TO(arhost_plugin, get_extension),
@@ -44,11 +44,11 @@ constexpr std::size_t entry_point_size = ARHOST_SIZE_UP_TO(arhost_entry_point, n
 template <class Functions> constexpr std::size_t functions_size = ARHOST_SIZE_UP_TO(Functions, stop);
 
 template <class Functions, class PerFrame>
-void check_kind(const std::filesystem::path &file, const void *given, PerFrame per_frame, const char *name,
+void check_kind(const std::filesystem::path &file, const void *functions, PerFrame per_frame, const char *name,
                 const std::string &owner) {
-    const auto &f = *static_cast<const Functions *>(given);
+    const auto &f = *static_cast<const Functions *>(functions);
     if (f.struct_size < functions_size<Functions>)
-        refuse(file, "the struct of its functions is shorter than that of " + owner +
+        refuse(file, "its struct of functions is shorter than that of " + owner +
                          "; build it against this arhost's headers");
     check_functions(file, {{"start", f.start}, {name, f.*per_frame}, {"stop", f.stop}}, owner);
 }
@@ -67,7 +67,7 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     case ARHOST_KIND_SINK:
         return check_kind<arhost_sink>(file, plugin.functions, &arhost_sink::write, "write", "a sink");
     default:
-        refuse(file, "its kind is " + std::to_string(plugin.descriptor->kind) + ", which is none");
+        refuse(file, "its kind is " + std::to_string(plugin.descriptor->kind) + ", which is invalid");
     }
 }
 
@@ -77,18 +77,18 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
     void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) {
         const std::string reason = ::dlerror();
-        const auto tells = [&](const char *words) { return reason.find(words) != std::string::npos; };
-        const char *mend = "";
-        if (tells("cannot open shared object file"))
-            mend = " (if it lies where the sandbox may not look: 'reads: [FOLDER]' in the configuration, '--reads "
-                   "FOLDER' of plugins and conform)";
-        else if (tells("failed to map segment") || tells("cannot allocate memory"))
-            mend = " (it gets no more memory: 'memory_mb' may be too small)";
-        refuse(file, "can't be loaded: " + reason + mend);
+        const auto mentions = [&](const char *words) { return reason.find(words) != std::string::npos; };
+        const char *hint = "";
+        if (mentions("cannot open shared object file"))
+            hint = " (if the sandbox hides its folder: 'reads: [FOLDER]' in the configuration, '--reads FOLDER' of "
+                   "plugins and conform)";
+        else if (mentions("failed to map segment") || mentions("cannot allocate memory"))
+            hint = " (out of memory: 'memory_mb' may be too small)";
+        refuse(file, "can't be loaded: " + reason + hint);
     }
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
-        refuse(file, "is no arhost plugin: it exports no symbol 'arhost_entry'");
+        refuse(file, "is not an arhost plugin: it exports no symbol 'arhost_entry'");
     if (entry->struct_size < entry_point_size || !entry->negotiate)
         refuse(file,
                "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
@@ -107,16 +107,18 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
                          ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
     if (!plugin || plugin->struct_size < plugin_size)
-        refuse(file, "its negotiate gave no (whole) arhost_plugin");
+        refuse(file, "its negotiate returned no arhost_plugin or a truncated one");
     if (!plugin->descriptor || plugin->descriptor->struct_size < descriptor_size || !plugin->descriptor->id)
-        refuse(file, "has no (whole) descriptor");
+        refuse(file, "its descriptor is missing or truncated");
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
-        refuse(file, "its id is '" + id + "'; the file must bear that name");
+        refuse(file, "its id is '" + id + "'; rename the file to match");
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
-            refuse(file, std::string("it needs '") + *need + "', which this arhost can't allow; what a plugin may " +
-                             "need is " + words(sandbox::allowances));
+            refuse(file, std::string("it needs '") + *need +
+                             "', which this arhost can't allow; a plugin may "
+                             "need " +
+                             joined(sandbox::allowances));
     check_functions(
         file, {{"create", plugin->create}, {"destroy", plugin->destroy}, {"get_extension", plugin->get_extension}},
         "every plugin");

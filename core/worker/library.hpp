@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin's shared object: opened, asked for its version, its answer checked.
+// Opens a plugin's shared object, negotiates the ABI version and validates the plugin.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -9,7 +9,7 @@
 
 namespace arhost::worker {
 
-// Both throw std::runtime_error with a sentence for the user. The library stays open until the process ends.
+// Both throw std::runtime_error with a message for the user. The library stays open until the process exits.
 const arhost_entry_point &open_library(const std::filesystem::path &file);
 const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry);
 

@@ -2,6 +2,7 @@
 #include "worker/link.hpp"
 
 #include <cerrno>
+#include <cmath>
 #include <poll.h>
 #include <stdexcept>
 #include <unistd.h>
@@ -19,45 +20,46 @@ Message Link::receive() const {
         case ReceiveState::none:
             continue;
         case ReceiveState::closed:
-            throw HostGone("the host has closed the channel");
-        case ReceiveState::breach:
-            throw HostGone("the host sent a malformed message");
+            throw HostLost("the host has closed the channel");
+        case ReceiveState::malformed:
+            throw HostLost("the host sent a malformed message");
         }
     }
 }
 
-void Link::send(const Json &body, std::initializer_list<int> fds) const {
-    // The kernel counts the descriptors that are under way for all processes of a user, and others may have too many.
+void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
+    // The kernel limits the descriptors in flight per user, and other processes may use them up.
     constexpr int max_attempts = 500;
-    for (int tries = 0; !channel_.send(body, fds); ++tries) {
+    for (int attempts = 0; !channel_.send(body, fds); ++attempts) {
         if (errno != ETOOMANYREFS)
-            throw HostGone("the host has closed the channel");
-        if (tries == max_attempts)
-            throw std::runtime_error("this user's processes have too many descriptors under way in messages");
+            throw HostLost("the host has closed the channel");
+        if (attempts == max_attempts)
+            throw std::runtime_error("this user's processes have too many file descriptors in flight (ETOOMANYREFS)");
         ::usleep(10'000);
     }
 }
 
 void Link::log(arhost_severity severity, const std::string &text) const {
-    channel_.send({{"type", "log"}, {"severity", severity}, {"text", text.substr(0, 4000)}}, {}, false);
+    channel_.send(encode(messages::Log{severity, text.substr(0, 4000)}), {}, false);
 }
 
 void Link::progress(double fraction, const char *what) const {
-    channel_.send({{"type", "progress"}, {"fraction", fraction}, {"what", what ? what : ""}}, {}, false);
+    // JSON has no NaN.
+    channel_.send(encode(messages::Progress{std::isfinite(fraction) ? fraction : 0, what ? what : ""}), {}, false);
 }
 
 void Link::map_pages(Message &open) {
     if (open.fds.size() < 2)
-        throw HostGone("the pages did not come with 'open'");
+        throw HostLost("'open' came without the pages");
     host_page_ = SharedMemory::adopt(std::move(open.fds[0])).map(Access::read_only);
     worker_page_ = SharedMemory::adopt(std::move(open.fds[1])).map(Access::read_write);
     if (host_page_.bytes().size() < sizeof(HostPage) || worker_page_.bytes().size() < sizeof(WorkerPage))
-        throw HostGone("a page is too small");
+        throw HostLost("a page is too small");
     commands_.emplace(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands);
     results_.emplace(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results);
 }
 
-std::optional<Command> Link::next(std::chrono::milliseconds timeout) {
+std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
     const WakeWord &word = host_page_.as<HostPage>().wake;
     for (bool waited = false;; waited = true) {
         const std::uint32_t seen = wake_count(word);
@@ -65,25 +67,25 @@ std::optional<Command> Link::next(std::chrono::milliseconds timeout) {
         switch (commands_->pop(command)) {
         case RingResult::done:
             return command;
-        case RingResult::breach:
-            throw HostGone("the host's ring is inconsistent");
+        case RingResult::violation:
+            throw HostLost("the host's ring is inconsistent");
         case RingResult::wait:
             break;
         }
         if (waited) {
             pollfd hang_up{channel_.fd(), POLLHUP, 0};
             if (::poll(&hang_up, 1, 0) > 0 && (hang_up.revents & (POLLHUP | POLLERR)))
-                throw HostGone("the host has closed the channel");
+                throw HostLost("the host has closed the channel");
             return std::nullopt;
         }
         wait_for_wake(word, seen, timeout);
     }
 }
 
-void Link::answer(const Result &result) {
-    // The host never has more commands out than its ring holds, so there is always room.
+void Link::send_result(const Result &result) {
+    // The host never has more commands in flight than the ring holds, so the ring is never full.
     if (results_->push(result) != RingResult::done)
-        throw HostGone("the host does not take results");
+        throw HostLost("the result ring is full or inconsistent");
     ring_doorbell(doorbell_.get());
 }
 

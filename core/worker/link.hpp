@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The worker's end of its link to the host.
+// The worker's end of the link to the host.
 #pragma once
 
-#include "ipc/channel.hpp"
 #include "ipc/memory.hpp"
+#include "ipc/messages.hpp"
 #include "ipc/protocol.hpp"
 
 #include <atomic>
@@ -13,8 +13,8 @@
 
 namespace arhost::worker {
 
-// Thrown where the host is gone or breaks the protocol: the worker ends.
-class HostGone : public std::runtime_error {
+// The host has ended or violates the protocol: the worker ends.
+class HostLost : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
@@ -23,25 +23,27 @@ public:
     Link(ipc::Channel channel, base::UniqueFd doorbell)
         : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
 
-    // Waits for the next control message; throws HostGone.
+    // Waits for the next control message; throws HostLost.
     ipc::Message receive() const;
-    void send(const ipc::Json &body, std::initializer_list<int> fds = {}) const;
+    template <class T> void send(const T &message, std::initializer_list<int> fds = {}) const {
+        send_json(ipc::encode(message), fds);
+    }
     void log(arhost_severity severity, const std::string &text) const; // never blocks
     void progress(double fraction, const char *what) const;            // never blocks
 
-    // Maps the pages that came with `open`; before this, there are no rings.
+    // Maps the pages that came with Open, which hold the rings.
     void map_pages(ipc::Message &open);
     bool cancelled() const {
         return host_page_ && host_page_.as<ipc::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
     }
 
-    // The next command; nullopt after `timeout` without one. Throws HostGone.
-    std::optional<ipc::Command> next(std::chrono::milliseconds timeout);
-    void answer(const ipc::Result &result);
+    // The next command; nullopt after `timeout` without one. Throws HostLost.
+    std::optional<ipc::Command> next_command(std::chrono::milliseconds timeout);
+    void send_result(const ipc::Result &result);
 
-    bool serving = false; // past `ready`: what fails now is no fault of the configuration
+    bool serving = false; // Ready was sent: later failures are not configuration errors
 
-    // Marks which of the plugin's functions runs, for crash reports, while it is alive.
+    // Marks the plugin's function that runs during this object's lifetime, for crash reports.
     class InCall {
     public:
         InCall(const Link &link, ipc::Call call) : link_(link) { link_.mark(call); }
@@ -54,7 +56,8 @@ public:
     };
 
 private:
-    // Relaxed: the host reads it after this process has died.
+    void send_json(const ipc::Json &body, std::initializer_list<int> fds) const;
+    // Relaxed: the host reads it after this process has exited (Process::on_death).
     void mark(ipc::Call call) const {
         if (worker_page_)
             worker_page_.as<ipc::WorkerPage>().call.store(static_cast<std::uint32_t>(call),

@@ -18,25 +18,28 @@ std::uint8_t *as_pixels(std::span<std::byte> bytes) {
 
 void require(bool condition, const char *what) {
     if (!condition)
-        throw HostGone(what);
+        throw HostLost(what);
+}
+
+template <class T> const T &setup_of_kind(const messages::Setup &setup) {
+    const T *found = std::get_if<T>(&setup);
+    require(found, "the setup is for another kind of plugin");
+    return *found;
 }
 
 class SourceService final : public Service {
 public:
     SourceService(const arhost_source &source, arhost_instance *instance) : source_(source), instance_(instance) {}
 
-    arhost_status start(const Message &create, Json &ready) override {
-        const Json &json = create.body.at("setup");
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &,
+                        messages::Ready &ready) override {
+        const auto &message = setup_of_kind<messages::SourceSetup>(any);
         arhost_source_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.first_sequence = next_ = json.at("first_sequence").get<std::uint64_t>();
-        setup.fps = json.at("fps").get<double>();
-        setup.paced = json.at("paced").get<bool>();
-        arhost_intrinsics intrinsics{};
-        if (json.contains("intrinsics")) {
-            intrinsics = intrinsics_from_json(json["intrinsics"]);
-            setup.intrinsics = &intrinsics;
-        }
+        setup.first_sequence = next_ = message.first_sequence;
+        setup.fps = message.fps;
+        setup.paced = message.paced;
+        setup.intrinsics = message.intrinsics ? &*message.intrinsics : nullptr;
         arhost_source_properties properties{};
         properties.struct_size = sizeof properties;
         properties.format.struct_size = sizeof properties.format;
@@ -46,17 +49,16 @@ public:
             return status;
         format_ = properties.format;
         if (!arhost_frame_layout(&format_) || format_.byte_size != properties.format.byte_size)
-            throw std::runtime_error(
-                "the source's frame format is not valid, or not laid out by arhost_frame_layout");
-        ready["format"] = to_json(format_);
-        ready["frame_count"] = properties.frame_count;
+            throw std::runtime_error("the source's frame format is invalid or not laid out by arhost_frame_layout");
+        ready.format = format_;
+        ready.frame_count = properties.frame_count;
         if (properties.has_intrinsics)
-            ready["intrinsics"] = to_json(properties.intrinsics);
+            ready.intrinsics = properties.intrinsics;
         return status;
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &result) override {
-        require(command.kind == CommandKind::read, "a source was asked for something else than to read");
+        require(command.kind == CommandKind::read, "a source got a command other than read");
         const std::span<std::byte> slot = memory.output.slot(command.slot);
         require(slot.size() >= format_.byte_size, "the frame slots are too small");
         arhost_frame_buffer buffer{};
@@ -70,7 +72,7 @@ public:
         const arhost_status status = source_.read(instance_, &buffer, &result.frame);
         if (status == ARHOST_STATUS_OK)
             next_ += std::uint64_t{1} + result.frame.skipped;
-        // Once for all trackers, and out of the host's process.
+        // Here rather than in the host, which should not spend the time.
         if (status == ARHOST_STATUS_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
             fill_grey(format_, buffer.plane, buffer.grey);
         return status;
@@ -82,7 +84,7 @@ private:
     const arhost_source &source_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
-    std::uint64_t next_ = 0; // by the source's count, which has what it skips
+    std::uint64_t next_ = 0; // sequence number including skipped frames
 };
 
 class TrackerService final : public Service {
@@ -90,25 +92,20 @@ public:
     TrackerService(const arhost_tracker &tracker, arhost_instance *instance)
         : tracker_(tracker), instance_(instance) {}
 
-    arhost_status start(const Message &create, Json &) override {
-        const Json &json = create.body.at("setup");
-        format_ = format_from_json(json.at("format"));
-        const arhost_intrinsics intrinsics = intrinsics_from_json(json.at("intrinsics"));
-        std::vector<arhost_marker_config> markers;
-        for (const Json &marker : json.at("markers"))
-            markers.push_back({sizeof(arhost_marker_config), marker.at("id").get<std::int32_t>(),
-                               marker.at("side_mm").get<double>()});
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &, messages::Ready &) override {
+        const auto &message = setup_of_kind<messages::TrackerSetup>(any);
+        format_ = message.format;
         arhost_tracker_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.marker_count = static_cast<std::uint32_t>(markers.size());
+        setup.marker_count = static_cast<std::uint32_t>(message.markers.size());
         setup.format = &format_;
-        setup.intrinsics = &intrinsics;
-        setup.markers = markers.data();
+        setup.intrinsics = &message.intrinsics;
+        setup.markers = message.markers.data();
         return tracker_.start(instance_, &setup);
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &) override {
-        require(command.kind == CommandKind::track, "a tracker was asked for something else than to track");
+        require(command.kind == CommandKind::track, "a tracker got a command other than track");
         const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
         const std::span<std::byte> output = memory.output.slot(command.slot);
         require(input.size() >= format_.byte_size && output.size() >= sizeof(arhost_tracker_result),
@@ -141,25 +138,25 @@ public:
     RaytracerService(const arhost_raytracer &raytracer, arhost_instance *instance)
         : raytracer_(raytracer), instance_(instance) {}
 
-    arhost_status start(const Message &create, Json &) override {
-        const Json &json = create.body.at("setup");
-        require(create.fds.size() == 1, "the scene's arena did not come with 'create'");
-        arena_ = SharedMemory::adopt(base::UniqueFd(::dup(create.fds[0].get()))).map(Access::read_only);
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
+                        messages::Ready &) override {
+        const auto &message = setup_of_kind<messages::RaytracerSetup>(any);
+        require(fds.size() == 1, "'create' came without the scene's arena");
+        arena_ = SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only);
         require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
-        const arhost_intrinsics intrinsics = intrinsics_from_json(json.at("intrinsics"));
         arhost_raytracer_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.width = width_ = json.at("width").get<std::uint32_t>();
-        setup.height = height_ = json.at("height").get<std::uint32_t>();
+        setup.width = width_ = message.width;
+        setup.height = height_ = message.height;
         setup.scene = &arena_.as<arhost_scene>();
-        setup.intrinsics = &intrinsics;
+        setup.intrinsics = &message.intrinsics;
         if (setup.scene->duration_s > 0)
             motion_.emplace(*setup.scene);
         return raytracer_.start(instance_, &setup);
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &result) override {
-        require(command.kind == CommandKind::render, "a ray tracer was asked for something else than to render");
+        require(command.kind == CommandKind::render, "a ray tracer got a command other than render");
         const std::span<std::byte> output = memory.output.slot(command.slot);
         arhost_image image{};
         image.struct_size = sizeof image;
@@ -188,7 +185,7 @@ private:
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
     Mapping arena_;
-    std::optional<scene::MotionEvaluator> motion_; // where things move
+    std::optional<scene::MotionEvaluator> motion_; // of animated scenes
     std::uint32_t width_ = 0, height_ = 0;
 };
 
@@ -196,24 +193,20 @@ class SinkService final : public Service {
 public:
     SinkService(const arhost_sink &sink, arhost_instance *instance) : sink_(sink), instance_(instance) {}
 
-    arhost_status start(const Message &create, Json &) override {
-        const Json &json = create.body.at("setup");
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &, messages::Ready &) override {
+        const auto &message = setup_of_kind<messages::SinkSetup>(any);
         arhost_sink_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.width = width_ = json.at("width").get<std::uint32_t>();
-        setup.height = height_ = json.at("height").get<std::uint32_t>();
-        setup.fps = json.at("fps").get<double>();
-        setup.first_sequence = json.at("first_sequence").get<std::uint64_t>();
-        arhost_intrinsics intrinsics{};
-        if (json.contains("intrinsics")) {
-            intrinsics = intrinsics_from_json(json["intrinsics"]);
-            setup.intrinsics = &intrinsics;
-        }
+        setup.width = width_ = message.width;
+        setup.height = height_ = message.height;
+        setup.fps = message.fps;
+        setup.first_sequence = message.first_sequence;
+        setup.intrinsics = message.intrinsics ? &*message.intrinsics : nullptr;
         return sink_.start(instance_, &setup);
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &) override {
-        require(command.kind == CommandKind::write, "a sink was asked for something else than to write");
+        require(command.kind == CommandKind::write, "a sink got a command other than write");
         const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
         require(input.size() >= OutputSlot::byte_size(width_, height_), "the output slots are too small");
         arhost_output output{};
@@ -239,7 +232,7 @@ private:
 } // namespace
 
 std::span<std::byte> Memory::Region::slot(std::uint32_t index) const {
-    require(mapping && index < layout.count, "a command names a slot that is not there");
+    require(mapping && index < layout.count, "a command names an invalid slot");
     return layout.slot(mapping, index);
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How the worker serves each kind of plugin.
+// Calls the functions of each kind of plugin.
 #pragma once
 
-#include "ipc/json_abi.hpp"
+#include "ipc/messages.hpp"
 #include "ipc/protocol.hpp"
 #include "worker/link.hpp"
 
@@ -17,20 +17,21 @@ struct Memory {
     struct Region {
         ipc::SlotLayout layout;
         ipc::Mapping mapping;
-        std::span<std::byte> slot(std::uint32_t index) const; // throws HostGone where it is out of range
+        std::span<std::byte> slot(std::uint32_t index) const; // throws HostLost if out of range
     };
     std::map<std::uint32_t, Region> inputs; // by generation
     Region output;
 
-    const Region &input(std::uint32_t generation) const; // throws HostGone
+    const Region &input(std::uint32_t generation) const; // throws HostLost
 };
 
 class Service {
 public:
     virtual ~Service() = default;
-    // The kind's start, with the setup of the host's `create`; what it returns goes into `ready`.
-    virtual arhost_status start(const ipc::Message &create, ipc::Json &ready) = 0;
-    // One command of the kind's own.
+    // Calls the plugin's start with `setup` and fills `ready`. `fds` came along with Create.
+    virtual arhost_status start(const ipc::messages::Setup &setup, const std::vector<base::UniqueFd> &fds,
+                                ipc::messages::Ready &ready) = 0;
+    // Calls the plugin's per-frame function.
     virtual arhost_status execute(const ipc::Command &command, const Memory &memory, ipc::Result &result) = 0;
     virtual bool wants_idle() const { return false; }
     virtual arhost_status idle() { return ARHOST_STATUS_OK; }

@@ -17,10 +17,10 @@ namespace {
 
 using namespace ipc;
 
-// The host's callbacks for a plugin, and the last error that it logged, for `failed`.
-class HostSide {
+// The arhost_host that the plugin sees. Keeps the last error that the plugin logged, for Failed.
+class PluginHost {
 public:
-    explicit HostSide(Link &link)
+    explicit PluginHost(Link &link)
         : link_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost",      ARHOST_VERSION, this,
                              &on_log,      &on_progress,       &on_cancelled, &on_extension} {}
     const arhost_host *get() const { return &host_; }
@@ -28,15 +28,14 @@ public:
         std::lock_guard lock(mutex_);
         return last_error_;
     }
-    // The message for a call that the plugin has failed in.
-    Json failed(arhost_status status) const {
+    // For a call of the plugin that returned an error.
+    messages::Failed failed(arhost_status status) const {
         const std::string reason = last_error();
-        return {
-            {"type", "failed"}, {"status", status}, {"text", reason.empty() ? "the plugin gave no reason" : reason}};
+        return {status, reason.empty() ? "the plugin gave no reason" : reason};
     }
 
 private:
-    static HostSide &self(const arhost_host *host) { return *static_cast<HostSide *>(host->context); }
+    static PluginHost &self(const arhost_host *host) { return *static_cast<PluginHost *>(host->context); }
     static void on_log(const arhost_host *host, arhost_severity severity, const char *text) {
         const std::string copy = text ? text : "";
         if (severity == ARHOST_SEVERITY_ERROR) {
@@ -57,10 +56,10 @@ private:
     std::string last_error_;
 };
 
-// One plugin, from `create` to `destroy`.
+// A plugin's instance, from create to destroy.
 class Session {
 public:
-    Session(Link &link, const HostSide &host, const arhost_plugin &plugin)
+    Session(Link &link, const PluginHost &host, const arhost_plugin &plugin)
         : link_(link), host_(host), plugin_(plugin) {}
     ~Session() {
         if (!instance_)
@@ -71,16 +70,16 @@ public:
     Session(const Session &) = delete;
     Session &operator=(const Session &) = delete;
 
-    int run(const Message &create) {
-        if (!make(create))
+    int run(const messages::Create &create, const std::vector<base::UniqueFd> &fds) {
+        if (!start(create, fds))
             return EXIT_FAILURE;
         const auto timeout = std::chrono::milliseconds(service_->wants_idle() ? 33 : 1000);
         while (!stopped_) {
-            const auto command = link_.next(timeout);
+            const auto command = link_.next_command(timeout);
             if (!command)
                 idle();
             else if (command->kind == CommandKind::control)
-                take_message();
+                handle_message();
             else
                 execute(*command);
         }
@@ -88,11 +87,10 @@ public:
     }
 
 private:
-    bool make(const Message &create) {
-        const std::vector<OptionValue> values = options_from_json(create.body.at("options"));
+    bool start(const messages::Create &create, const std::vector<base::UniqueFd> &fds) {
         std::vector<arhost_option> options;
-        options.reserve(values.size());
-        for (const OptionValue &v : values)
+        options.reserve(create.options.size());
+        for (const OptionValue &v : create.options)
             options.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
         arhost_status status;
         {
@@ -102,11 +100,11 @@ private:
         }
         if (status == ARHOST_STATUS_OK && !instance_)
             throw std::runtime_error("the plugin's create succeeded without an instance");
-        Json ready = {{"type", "ready"}};
+        messages::Ready ready;
         if (status == ARHOST_STATUS_OK) {
             service_ = make_service(plugin_, instance_);
             Link::InCall call(link_, Call::start);
-            status = service_->start(create, ready);
+            status = service_->start(create.setup, fds, ready);
         }
         if (status != ARHOST_STATUS_OK) {
             link_.send(host_.failed(status));
@@ -120,7 +118,7 @@ private:
     void idle() {
         Link::InCall call(link_, Call::idle);
         if (service_->wants_idle() && service_->idle() == ARHOST_STATUS_END)
-            link_.send({{"type", "end"}});
+            link_.send(messages::End{});
     }
 
     void execute(const Command &command) {
@@ -132,42 +130,40 @@ private:
             result.status = service_->execute(command, memory_, result);
         }
         result.busy_ns = (std::chrono::steady_clock::now() - begin).count();
-        link_.answer(result);
+        link_.send_result(result);
     }
 
-    void take_message() {
+    void handle_message() {
         Message message = link_.receive();
-        const std::string type = message.body.at("type").get<std::string>();
-        if (type == "attach") {
-            const bool output = message.body.at("role") == "output";
-            const auto generation = message.body.at("generation").get<std::uint32_t>();
-            if (message.fds.size() != 1)
-                throw HostGone("no memory came with 'attach'");
-            const SharedMemory memory = SharedMemory::adopt(std::move(message.fds[0]));
-            Memory::Region region{layout_from_json(message.body.at("layout")),
-                                  memory.map(output ? Access::read_write : Access::read_only)};
-            if (region.layout.byte_size() > memory.size())
-                throw HostGone("the slots do not fit into their memory");
-            (output ? memory_.output : memory_.inputs[generation]) = std::move(region);
-            link_.send({{"type", "attached"}, {"role", message.body.at("role")}, {"generation", generation}});
-        } else if (type == "detach") {
-            const auto generation = message.body.at("generation").get<std::uint32_t>();
+        if (is<messages::Attach>(message)) {
+            attach(parse<messages::Attach>(message), std::move(message.fds));
+        } else if (is<messages::Detach>(message)) {
+            const auto generation = parse<messages::Detach>(message).generation;
             memory_.inputs.erase(generation);
-            link_.send({{"type", "detached"}, {"generation", generation}});
-        } else if (type == "stop") {
+            link_.send(messages::Detached{generation});
+        } else if (is<messages::Stop>(message)) {
             Link::InCall call(link_, Call::stop);
             const arhost_status status = service_->stop();
-            link_.send({{"type", "stopped"},
-                        {"status", status},
-                        {"text", status == ARHOST_STATUS_OK ? std::string() : host_.last_error()}});
+            link_.send(messages::Stopped{status, status == ARHOST_STATUS_OK ? std::string() : host_.last_error()});
             stopped_ = true;
         } else {
-            throw HostGone("the host sent a message of unknown type '" + type + "'");
+            throw HostLost("the host sent a message of unknown type " + message.body["type"].dump());
         }
     }
 
+    void attach(const messages::Attach &attach, std::vector<base::UniqueFd> fds) {
+        if (fds.size() != 1)
+            throw HostLost("'attach' came without memory");
+        const SharedMemory memory = SharedMemory::adopt(std::move(fds[0]));
+        Memory::Region region{attach.layout, memory.map(attach.is_output ? Access::read_write : Access::read_only)};
+        if (region.layout.byte_size() > memory.size())
+            throw HostLost("the slots do not fit into their memory");
+        (attach.is_output ? memory_.output : memory_.inputs[attach.generation]) = std::move(region);
+        link_.send(messages::Attached{attach.is_output, attach.generation});
+    }
+
     Link &link_;
-    const HostSide &host_;
+    const PluginHost &host_;
     const arhost_plugin &plugin_;
     Memory memory_;
     arhost_instance *instance_ = nullptr;
@@ -175,75 +171,83 @@ private:
     bool stopped_ = false;
 };
 
-// Whoever reads the log sees what this machine lacks.
-sandbox::Level tell(const Link &link, sandbox::Level level) {
+sandbox::Level log_level(const Link &link, sandbox::Level level) {
     link.log(sandbox::complete(level) ? ARHOST_SEVERITY_DEBUG : ARHOST_SEVERITY_INFO,
              "sandbox: " + sandbox::to_text(level));
     return level;
 }
 
-Json answer_devices(const Link &link, const HostSide &host, const arhost_plugin &plugin) {
-    Json answer = {{"type", "devices"}};
-    const Link::InCall call(link, Call::devices);
-    const arhost_status status = list_devices(plugin, *host.get(), answer);
-    return status == ARHOST_STATUS_OK ? answer : host.failed(status);
+void send_devices(const Link &link, const PluginHost &host, const arhost_plugin &plugin) {
+    messages::Devices devices;
+    arhost_status status;
+    {
+        const Link::InCall call(link, Call::devices);
+        status = list_devices(plugin, *host.get(), devices.list);
+    }
+    if (status == ARHOST_STATUS_OK)
+        link.send(devices);
+    else
+        link.send(host.failed(status));
 }
 
-int serve(Link &link) {
-    Message open = link.receive();
-    const std::string type = open.body.at("type").get<std::string>();
-    const sandbox::Policy policy = sandbox::policy_from_json(open.body.at("sandbox"));
-    if (type == "load") {
-        tell(link, sandbox::enter(policy));
-        return load_scene_for(link, open);
-    }
-    if (type != "open")
-        throw HostGone("the host's first message is not 'open'");
-    link.map_pages(open);
-    const std::string file = open.body.at("plugin").get<std::string>();
-    // Before anything is opened that nobody vouches for: a library's constructors run when it is loaded.
-    const sandbox::Level level = tell(link, sandbox::enter_for(file, policy));
+int serve_plugin(Link &link, const messages::Open &open) {
+    // Sandboxed before the library is loaded, as its constructors run then.
+    const sandbox::Level level = log_level(link, sandbox::enter_for(open.plugin, open.sandbox));
     const arhost_entry_point *entry = nullptr;
     {
         Link::InCall call(link, Call::load);
-        entry = &open_library(file);
+        entry = &open_library(open.plugin);
     }
     const arhost_plugin *plugin = nullptr;
     {
         Link::InCall call(link, Call::negotiate);
-        plugin = &negotiate(file, *entry);
+        plugin = &negotiate(open.plugin, *entry);
     }
     ::prctl(PR_SET_NAME, plugin->descriptor->id);
-    link.send(
-        {{"type", "hello"}, {"descriptor", to_json(*plugin->descriptor)}, {"sandbox", sandbox::to_text(level)}});
-    HostSide host(link);
+    link.send(messages::Hello{describe(*plugin->descriptor), sandbox::to_text(level)});
+    PluginHost host(link);
     Message next = link.receive();
-    for (; next.body.at("type") == "devices"; next = link.receive())
-        link.send(answer_devices(link, host, *plugin));
-    return Session(link, host, *plugin).run(next);
+    for (; is<messages::ListDevices>(next); next = link.receive())
+        send_devices(link, host, *plugin);
+    if (!is<messages::Create>(next))
+        throw HostLost("the host's message after 'hello' is not 'create'");
+    return Session(link, host, *plugin).run(parse<messages::Create>(next), next.fds);
+}
+
+int serve(Link &link) {
+    Message first = link.receive();
+    if (is<messages::Load>(first)) {
+        const auto load = parse<messages::Load>(first);
+        log_level(link, sandbox::enter(load.sandbox));
+        return load_scene(link, load);
+    }
+    if (!is<messages::Open>(first))
+        throw HostLost("the host's first message is not 'open' or 'load'");
+    link.map_pages(first);
+    return serve_plugin(link, parse<messages::Open>(first));
 }
 
 } // namespace
 
-void keep_freed_memory() {
+void retain_freed_memory() {
 #ifdef __GLIBC__
     constexpr int mib = 1 << 20;
-    ::mallopt(M_MMAP_THRESHOLD, 32 * mib); // the most that it takes
+    ::mallopt(M_MMAP_THRESHOLD, 32 * mib); // glibc's maximum
     ::mallopt(M_TRIM_THRESHOLD, 64 * mib);
 #endif
 }
 
-int work(Link &link) {
+int run(Link &link) {
     try {
         return serve(link);
-    } catch (const HostGone &) {
-        return EXIT_FAILURE; // nobody is left to tell
+    } catch (const HostLost &) {
+        return EXIT_FAILURE;
     } catch (const std::exception &error) {
         try {
             const arhost_status status =
                 link.serving ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CONFIGURATION;
-            link.send({{"type", "failed"}, {"status", status}, {"text", error.what()}});
-        } catch (const HostGone &) {
+            link.send(messages::Failed{status, error.what()});
+        } catch (const HostLost &) {
         }
         return EXIT_FAILURE;
     }

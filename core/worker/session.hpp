@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a worker does from its start to its end: it opens one plugin and serves it, or loads one scene.
+// The main function of a worker: opens and serves one plugin, or loads one scene.
 #pragma once
 
 #include "worker/link.hpp"
 
 namespace arhost::worker {
 
-// What a plugin frees after a frame it wants again with the next one: giving it back to the system in between costs
-// trackers a quarter of their time, in page faults. (glibc raises its thresholds by itself only in processes that
-// have freed something large.) To be called once, before there are threads.
-void keep_freed_memory();
+// Makes malloc keep freed memory. Plugins free and allocate the same memory with each frame; returning it to the
+// system in between costs trackers a quarter of their time in page faults. (glibc raises its thresholds by itself
+// only after a process has freed a large block.) Call once, before starting threads.
+void retain_freed_memory();
 
 // Returns the process's exit status.
-int work(Link &link);
+int run(Link &link);
 
 } // namespace arhost::worker

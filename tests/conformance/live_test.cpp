@@ -98,7 +98,7 @@ public:
         std::set<std::string> names;
         const nlohmann::json report = stats();
         for (const auto &[name, entry] : report.at("conformance").items())
-            if ((entry["broken"] > 0) == broken)
+            if ((entry["violations"] > 0) == broken)
                 names.insert(name);
         return names;
     }
@@ -112,8 +112,8 @@ void expect_broken(const Parts &parts, const std::set<std::string> &promises) {
     for (const std::string &promise : promises) {
         const std::string component = promise.substr(0, promise.find('.'));
         EXPECT_THAT(run.output(),
-                    HasSubstr("warning: " + component + ": breaks the promise " + promise + ": frame "));
-        EXPECT_THAT(run.output(), HasSubstr(promise + ": broken in "));
+                    HasSubstr("warning: " + component + ": violates the contract: " + promise + ": frame "));
+        EXPECT_THAT(run.output(), HasSubstr(promise + ": violated in "));
     }
 }
 
@@ -136,11 +136,11 @@ void expect_kept(const Parts &parts, const std::set<std::string> &promises = all
 TEST(LiveConformance, FindsNothingWrongWithArhostsOwn) {
     LiveRun run((Parts()));
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("conform: 10 of 10 promises kept"));
+    EXPECT_THAT(run.output(), HasSubstr("conform: 10 of 10 contract checks passed"));
     const auto stats = run.stats();
     for (const std::string &promise : all_promises) {
-        EXPECT_EQ(stats["conformance"][promise]["looked"], 40) << promise;
-        EXPECT_EQ(stats["conformance"][promise]["broken"], 0) << promise;
+        EXPECT_EQ(stats["conformance"][promise]["checked"], 40) << promise;
+        EXPECT_EQ(stats["conformance"][promise]["violations"], 0) << promise;
     }
 }
 
@@ -266,7 +266,7 @@ TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
     for (const char *component : {"source", "tracker", "raytracer"})
         EXPECT_EQ(stats["restarts"][component], 1) << component;
     for (const auto &[name, entry] : stats["conformance"].items())
-        EXPECT_GT(entry["looked"], before) << name;
+        EXPECT_GT(entry["checked"], before) << name;
     EXPECT_EQ(run.promises(false), all_promises) << run.output();
     EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
 }

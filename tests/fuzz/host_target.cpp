@@ -9,6 +9,7 @@
 
 #include "host/pipeline.hpp"
 #include "ipc/fd_passing.hpp"
+#include "ipc/messages.hpp"
 
 #include <csignal>
 #include <fcntl.h>
@@ -82,7 +83,7 @@ public:
     void act(Input &input) {
         switch (input.number() % 8) {
         case 3:
-            return send(input.text(input.number()), {}, input);
+            return send_text(input.text(input.number()), {}, input);
         case 4:
             if (worker_page_)
                 input.corrupt(worker_page_.bytes());
@@ -140,27 +141,26 @@ private:
     }
 
     void reply(Message &message, Input &input) {
-        const std::string type = message.body["type"];
-        if (type == "open")
+        if (is<messages::Open>(message))
             say_hello(message, input);
-        else if (type == "load")
-            finish(R"({"type": "loaded"})", scene_memory(), input);
-        else if (type == "create")
-            send(ready().dump(), {}, input);
-        else if (type == "attach")
+        else if (is<messages::Load>(message))
+            finish(messages::Loaded{}, scene_memory(), input);
+        else if (is<messages::Create>(message))
+            send(ready(), {}, input);
+        else if (is<messages::Attach>(message))
             attach(message, input);
-        else if (type == "stop")
-            finish(R"({"type": "stopped", "status": 1, "text": ""})", {}, input);
+        else if (is<messages::Stop>(message))
+            finish(messages::Stopped{}, {}, input);
     }
 
-    void finish(const char *text, base::UniqueFd fd, Input &input) {
-        send(text, std::move(fd), input);
+    template <class T> void finish(const T &message, base::UniqueFd fd, Input &input) {
+        send(message, std::move(fd), input);
         finished_ = true;
     }
 
     void say_hello(Message &open, Input &input) {
         map_pages(open);
-        const std::string name = std::filesystem::path(open.body["plugin"].get<std::string>()).stem();
+        const std::string name = std::filesystem::path(parse<messages::Open>(open).plugin).stem();
         kind_ = name == "source"              ? ARHOST_KIND_SOURCE
                 : name.starts_with("tracker") ? ARHOST_KIND_TRACKER
                 : name == "rt"                ? ARHOST_KIND_RAYTRACER
@@ -178,7 +178,7 @@ private:
                                               0,
                                               nullptr,
                                               nullptr};
-        send(Json{{"type", "hello"}, {"descriptor", to_json(descriptor)}, {"sandbox", ""}}.dump(), {}, input);
+        send(messages::Hello{describe(descriptor), ""}, {}, input);
     }
 
     void map_pages(Message &open) {
@@ -190,9 +190,9 @@ private:
         results_.emplace(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results);
     }
 
-    Json ready() const {
+    messages::Ready ready() const {
         if (kind_ != ARHOST_KIND_SOURCE)
-            return {{"type", "ready"}};
+            return {};
         arhost_frame_format format{};
         format.pixel_format = ARHOST_PIXEL_FORMAT_NV12;
         format.width = 18;
@@ -209,17 +209,16 @@ private:
         camera.distortion = ARHOST_DISTORTION_BROWN;
         camera.coefficient_count = 4;
         camera.coefficients[0] = 0.1;
-        return {{"type", "ready"}, {"format", to_json(format)}, {"frame_count", 0}, {"intrinsics", to_json(camera)}};
+        return {format, 0, camera};
     }
 
     void attach(Message &message, Input &input) {
-        if (message.body["role"] == "output") {
-            layout_ = layout_from_json(message.body["layout"]);
+        const auto attach = parse<messages::Attach>(message);
+        if (attach.is_output) {
+            layout_ = attach.layout;
             output_memory_ = SharedMemory::adopt(std::move(message.fds.at(0))).map(Access::read_write);
         }
-        message.body["type"] = "attached";
-        message.body.erase("layout");
-        send(message.body.dump(), {}, input);
+        send(messages::Attached{attach.is_output, attach.generation}, {}, input);
     }
 
     void answer(const Command &command, Input &input) {
@@ -243,8 +242,12 @@ private:
         ring_doorbell(doorbell_.get());
     }
 
+    template <class T> void send(const T &message, base::UniqueFd fd, Input &input) const {
+        send_text(encode(message).dump(), std::move(fd), input);
+    }
+
     // Sends `fd` and up to four further descriptors, the maximum of a message.
-    void send(std::string text, base::UniqueFd fd, Input &input) const {
+    void send_text(std::string text, base::UniqueFd fd, Input &input) const {
         input.corrupt(std::as_writable_bytes(std::span(text)));
         const unsigned more = input.number() < 200 ? 0 : input.number();
         std::vector<base::UniqueFd> fds;

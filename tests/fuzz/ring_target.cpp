@@ -45,7 +45,7 @@ void take_result(Input &input) {
     const auto bytes = std::as_writable_bytes(std::span(slot.get(), 1));
     input.corrupt(bytes);
     const auto record = std::make_unique<arhost_record>();
-    if (host::take_tracker_result(bytes, {0, 1}, *record))
+    if (host::accept_tracker_result(bytes, {0, 1}, *record))
         return;
     require(record->marker_count <= 2, "more markers than expected");
     for (std::uint32_t i = 0; i < record->marker_count; ++i)
@@ -97,7 +97,7 @@ void run_ring(Bytes bytes) {
             // The peer does not write in the meantime, so at most the ring's capacity can be popped.
             for (std::uint32_t popped = 0; results.pop(result) == RingResult::done; ++popped) {
                 require(popped < ring_capacity, "more entries than the ring's capacity");
-                host::take_frame_info(result.frame, record.capture_ns, 0, record);
+                host::accept_frame_info(result.frame, record.capture_ns, 0, record);
                 overlay(result.render);
                 const std::chrono::nanoseconds busy(result.busy_ns), device = host::device_time(result.render, busy);
                 require(device.count() == 0 || device <= busy, "the device time exceeds the image's time");

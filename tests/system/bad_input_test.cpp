@@ -105,7 +105,7 @@ const std::vector<Case> cases = {
     {"AbiAnswer",
      replaced(good, "rt_counter", "broken_answer"),
      small_scene,
-     {"broken_answer.so", "no (whole) arhost_plugin"}},
+     {"broken_answer.so", "returned no arhost_plugin"}},
     {"AbiShort", replaced(good, "rt_counter", "broken_short"), small_scene, {"broken_short.so", "too short"}},
     {"CrashOnLoad",
      replaced(good, "rt_counter", "broken_constructor"),
@@ -258,7 +258,7 @@ const std::vector<Case> cases = {
     {"SceneLoadsTooSlowly",
      replaced(good, "scene.yaml,", "scene.yaml, start_deadline_ms: 20,"),
      big_scene(),
-     {"scene.yaml: the scene loader was without a word of progress for 20 ms", "raytracer.start_deadline_ms"}},
+     {"scene.yaml: the scene loader failed: made no progress for 20 ms", "raytracer.start_deadline_ms"}},
     {"ZeroAxis",
      good + "coordinates: {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [0, 0, 0]}]}\n",
      small_scene,
@@ -320,7 +320,7 @@ TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
     ArhostRun run(good);
     run.write("scene.yaml", big_scene());
     EXPECT_EQ(run.run({"check", "run.yaml", "--set", "raytracer.start_deadline_ms=20"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader was without a word of progress for 20 ms"));
+    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader failed: made no progress for 20 ms"));
 }
 
 TEST(BadInput, KeepsTheOutputsOfAnEarlierRun) {

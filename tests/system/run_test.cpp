@@ -397,10 +397,11 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     };
     EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(lines_below("lister_none"), what + "no device that it can run on\n");
+    EXPECT_EQ(lines_below("lister_none"), what + "no device that it could run on\n");
     EXPECT_EQ(lines_below("lister_fail"), what + "its devices can't be listed: the driver is too old\n");
-    EXPECT_EQ(lines_below("lister_broken"),
-              what + "its devices can't be listed: it told of a device that has no name, or is too short\n");
+    EXPECT_EQ(
+        lines_below("lister_broken"),
+        what + "its devices can't be listed: it reported a device that has no name or whose struct is too short\n");
     EXPECT_THAT(lines_below("lister_crash"),
                 testing::StartsWith(what + "its devices can't be listed: killed by signal 11 "));
     EXPECT_THAT(lines_below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));

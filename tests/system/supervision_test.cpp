@@ -147,7 +147,7 @@ TEST(Supervision, GivingUpABackendLosesNoFrame) {
         ASSERT_EQ(lines.size(), 60u);
         for (std::uint64_t i = 0; i < 60; ++i)
             EXPECT_EQ(lines[i].overlay == "none", i >= 20) << c.component << " " << i;
-        EXPECT_THAT(run.output(), HasSubstr("the video goes on without it"));
+        EXPECT_THAT(run.output(), HasSubstr("the video continues without it"));
     }
 }
 
@@ -289,7 +289,7 @@ TEST(Supervision, ATrackerThatReportsNanIsEnded) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 30);
-    EXPECT_THAT(run.output(), HasSubstr("broke the contract"));
+    EXPECT_THAT(run.output(), HasSubstr("contract violation"));
     EXPECT_EQ(counted(run)[15].overlay, "none");
 }
 
@@ -385,7 +385,7 @@ TEST(Supervision, ACaptureTimeInTheFutureCausesARestartWithoutLosingFrames) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 30);
-    EXPECT_THAT(run.output(), HasSubstr("broke the contract: a frame's capture time is more than a second ahead"));
+    EXPECT_THAT(run.output(), HasSubstr("contract violation: a frame's capture time is more than a second ahead"));
     EXPECT_EQ(run.stats()["restarts"]["source"], 1);
 }
 
@@ -492,7 +492,7 @@ TEST(Supervision, AKilledLauncherIsReplaced) {
     expect_all_frames_in_order(run, 700);
     EXPECT_TRUE(run.exists("counted.txt.done"));
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 3);
-    EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher is gone, and all workers with it; starting"));
+    EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher has died, and all workers with it; starting"));
 }
 
 // Only the kernel is left to resume the launcher.
@@ -522,7 +522,7 @@ TEST(Supervision, OnlySourcesAndOutputsMayEndTheRun) {
                                "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
         run.write("scene.yaml", small_scene);
         EXPECT_EQ(run.run(), 1) << run.output();
-        EXPECT_THAT(run.output(), HasSubstr(std::string("broke the contract: its status is ") + status));
+        EXPECT_THAT(run.output(), HasSubstr(std::string("contract violation: its status is ") + status));
         expect_all_frames_in_order(run, 30);
     }
 }

@@ -146,7 +146,7 @@ TEST_F(RenderScene, SaysWhatIsWrongWithThePluginAndItsOptions) {
     EXPECT_THAT(refused("--raytracer ./nowhere.so"), HasSubstr("--raytracer: there is no plugin '"));
     EXPECT_THAT(refused("--raytracer sink_null"), HasSubstr("--raytracer: 'sink_null' is a sink, not a ray tracer"));
     EXPECT_THAT(refused("--raytracer " ARHOST_TEST_PLUGIN_DIRECTORY "/no_plugin.so"),
-                HasSubstr("is no arhost plugin"));
+                HasSubstr("is not an arhost plugin"));
     EXPECT_THAT(refused("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
     EXPECT_THAT(refused("--set samples=1000"), HasSubstr("--set: samples: "));
     EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: must be key=value"));

@@ -14,7 +14,7 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
     info.clock = clock;
     info.capture_ns = capture_ns;
     arhost_record record{};
-    const char *problem = take_frame_info(info, previous_capture_ns, now_ns, record);
+    const char *problem = accept_frame_info(info, previous_capture_ns, now_ns, record);
     if (!problem) {
         EXPECT_EQ(record.clock, clock);
         EXPECT_EQ(record.capture_ns, capture_ns);
@@ -24,38 +24,38 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
 
 } // namespace
 
-TEST(DeviceTime, IsLeftOutWhereItIsLongerThanRenderTook) {
+TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {
     using namespace std::chrono_literals;
-    const auto told = [](std::uint64_t ns, std::chrono::nanoseconds busy) {
+    const auto accepted = [](std::uint64_t ns, std::chrono::nanoseconds busy) {
         arhost_render_info info{};
         info.device_time_ns = ns;
         return device_time(info, busy);
     };
-    EXPECT_EQ(told(3'000'000, 5ms), 3ms);
-    EXPECT_EQ(told(5'000'000, 5ms), 5ms);
-    EXPECT_EQ(told(5'000'001, 5ms), 0ns);
-    EXPECT_EQ(told(0, 5ms), 0ns);
-    EXPECT_EQ(told(UINT64_MAX, 5ms), 0ns) << "-1 as a signed number";
-    EXPECT_EQ(told(1, -5ms), 0ns) << "what render took is a worker's word, too";
-    EXPECT_EQ(told(UINT64_MAX, -1ns), 0ns);
+    EXPECT_EQ(accepted(3'000'000, 5ms), 3ms);
+    EXPECT_EQ(accepted(5'000'000, 5ms), 5ms);
+    EXPECT_EQ(accepted(5'000'001, 5ms), 0ns);
+    EXPECT_EQ(accepted(0, 5ms), 0ns);
+    EXPECT_EQ(accepted(UINT64_MAX, 5ms), 0ns) << "-1 as a signed number";
+    EXPECT_EQ(accepted(1, -5ms), 0ns) << "the worker reports the duration, too";
+    EXPECT_EQ(accepted(UINT64_MAX, -1ns), 0ns);
 }
 
-TEST(FrameInfo, IsRefusedWithoutAClock) {
+TEST(FrameInfo, IsRejectedWithoutAClock) {
     EXPECT_STREQ(problem_with(0, now_ns), "a frame's clock is not set");
     EXPECT_STREQ(problem_with(3, now_ns), "a frame's clock is not set");
 }
 
-TEST(FrameInfo, IsRefusedWhereItsTimeRunsBackwards) {
+TEST(FrameInfo, IsRejectedIfItsTimeRunsBackwards) {
     EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 5, now_ns - 5), nullptr);
     EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 6, now_ns - 5),
                  "a frame's capture time runs backwards");
 }
 
-TEST(FrameInfo, IsRefusedWhereACameraTellsOfTheFarFuture) {
-    EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MIN), nullptr) << "how old it is does no harm";
+TEST(FrameInfo, IsRejectedIfALiveTimeIsFarInTheFuture) {
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MIN), nullptr) << "any age is accepted";
     EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns + 1'000'000'000), nullptr);
-    const char *refused = "a frame's capture time is more than a second ahead of the clock";
-    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns + 1'000'000'001), refused);
-    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MAX), refused);
-    EXPECT_EQ(problem_with(ARHOST_CLOCK_MEDIA, INT64_MAX), nullptr) << "a film's times say nothing of now";
+    const char *problem = "a frame's capture time is more than a second ahead of the clock";
+    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns + 1'000'000'001), problem);
+    EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, INT64_MAX), problem);
+    EXPECT_EQ(problem_with(ARHOST_CLOCK_MEDIA, INT64_MAX), nullptr) << "media time is unrelated to the current time";
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Real plugins in real workers, asked what they are and what they could run on.
+// Queries real plugins in real workers.
 #include "host/probe.hpp"
 #include "plugin_under_test.hpp"
 
@@ -14,7 +14,7 @@ using testing::StartsWith;
 namespace {
 
 struct Probe : testing::Test {
-    // Where a GPU's driver would keep its shaders.
+    // The folder of a GPU driver's shader cache.
     void SetUp() override { ::setenv("XDG_CACHE_HOME", scratch.path().c_str(), 1); }
 
     host::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
@@ -46,28 +46,28 @@ struct Probe : testing::Test {
 
 private:
     Reactor reactor_;
-    std::optional<supervise::Launcher> launcher_; // which takes the environment along
+    std::optional<supervise::Launcher> launcher_; // inherits the environment of SetUp
     std::optional<supervise::Context> context_;
 };
 
 } // namespace
 
-TEST_F(Probe, TellsWhoAPluginIsOrWhyItCantBeUsed) {
+TEST_F(Probe, DescribesAPluginOrWhyItIsUnusable) {
     std::string level;
     const host::ProbeResult good = host::probe(context(), file("source_counter"), {}, &level);
     EXPECT_EQ(std::get<PluginDescription>(good).id, "source_counter");
     EXPECT_NE(level, "");
     EXPECT_THAT(std::get<std::string>(host::probe(context(), file("no_plugin"), {})),
-                HasSubstr("is no arhost plugin"));
+                HasSubstr("is not an arhost plugin"));
     EXPECT_THAT(std::get<std::string>(host::probe(context(), file("broken_constructor"), {})),
                 HasSubstr("while its library was loaded"));
 }
 
-TEST_F(Probe, ListsDevicesAsThePluginTellsOfThem) {
-    const DeviceList told = list("source_counter");
-    ASSERT_EQ(told.devices.size(), 2u);
-    EXPECT_EQ(told.left_out, 0u);
-    const DeviceDescription &first = told.devices[0], &second = told.devices[1];
+TEST_F(Probe, ListsDevices) {
+    const DeviceList listed = list("source_counter");
+    ASSERT_EQ(listed.devices.size(), 2u);
+    EXPECT_EQ(listed.left_out, 0u);
+    const DeviceDescription &first = listed.devices[0], &second = listed.devices[1];
     EXPECT_EQ(first.index, 0u);
     EXPECT_EQ(first.kind, ARHOST_DEVICE_DISCRETE_GPU);
     EXPECT_FALSE(first.is_default);
@@ -80,27 +80,27 @@ TEST_F(Probe, ListsDevicesAsThePluginTellsOfThem) {
     EXPECT_EQ(list("lister_none").devices.size(), 0u);
 }
 
-TEST_F(Probe, KnowsWhichPluginTellsOfNoDevices) {
+TEST_F(Probe, ReportsAPluginWithoutTheDevicesExtension) {
     EXPECT_EQ(std::get<std::optional<DeviceList>>(devices("tracker_counter")), std::nullopt);
 }
 
-TEST_F(Probe, TakesNoMoreThanAMessageHolds) {
-    const DeviceList told = list("lister_many");
-    EXPECT_EQ(told.devices.size(), max_devices);
-    EXPECT_EQ(told.left_out, 10'000 - max_devices);
-    EXPECT_EQ(told.devices.back().name, std::string(max_device_text_size, '"') + "…");
+TEST_F(Probe, LimitsDevicesToTheSizeOfAMessage) {
+    const DeviceList listed = list("lister_many");
+    EXPECT_EQ(listed.devices.size(), max_devices);
+    EXPECT_EQ(listed.left_out, 10'000 - max_devices);
+    EXPECT_EQ(listed.devices.back().name, std::string(max_device_text_size, '"') + "…");
 }
 
-TEST_F(Probe, TellsWhyDevicesCantBeListed) {
+TEST_F(Probe, ReportsWhyDevicesCantBeListed) {
     EXPECT_EQ(reason("lister_fail"), "the driver is too old");
-    EXPECT_EQ(reason("lister_broken"), "it told of a device that has no name, or is too short");
+    EXPECT_EQ(reason("lister_broken"), "it reported a device that has no name or whose struct is too short");
     EXPECT_THAT(reason("lister_crash"), testing::ContainsRegex("killed by signal 11 .* while it listed its devices"));
     EXPECT_THAT(reason("lister_hang", std::chrono::seconds(1)),
                 StartsWith("no answer within 1 s; killed by signal 6 "));
-    EXPECT_THAT(reason("no_plugin"), HasSubstr("is no arhost plugin"));
+    EXPECT_THAT(reason("no_plugin"), HasSubstr("is not an arhost plugin"));
 }
 
-TEST_F(Probe, GivesTheDevicesThatAPluginNeedsAndNoNetwork) {
+TEST_F(Probe, GrantsDevicesButNoNetwork) {
     std::string level;
     host::probe(context(), file("lister_gpu"), {}, &level);
     if (level.substr(0, level.find("MISSING")).find("seccomp") == std::string::npos)
@@ -111,19 +111,19 @@ TEST_F(Probe, GivesTheDevicesThatAPluginNeedsAndNoNetwork) {
     EXPECT_EQ(without.devices.at(0).name, "without its shaders");
 }
 
-TEST(DevicesFromJson, RefusesWhatNoWorkerOfOursSends) {
+TEST(DevicesFromJson, RejectsMalformedLists) {
     const Json device = {{"index", 0}, {"kind", 1},  {"is_default", false},
                          {"name", ""}, {"uuid", ""}, {"abilities", ""}};
-    const auto message = [](const Json &devices) { return Json{{"devices", devices}, {"left_out", 0}}; };
-    EXPECT_EQ(devices_from_json(message(Json::array({device}))).devices.size(), 1u);
-    EXPECT_THROW(devices_from_json(message(Json(max_devices + 1, device))), std::runtime_error);
-    EXPECT_THROW(devices_from_json(message(5)), std::exception);
+    const auto list = [](const Json &devices) { return Json{{"devices", devices}, {"left_out", 0}}; };
+    EXPECT_EQ(devices_from_json(list(Json::array({device}))).devices.size(), 1u);
+    EXPECT_THROW(devices_from_json(list(Json(max_devices + 1, device))), std::runtime_error);
+    EXPECT_THROW(devices_from_json(list(5)), std::exception);
     for (const auto &[key, value] : {std::pair<const char *, Json>{"name", std::string(1000, 'x')},
                                      {"uuid", nullptr},
                                      {"index", "first"},
                                      {"is_default", 2}}) {
         Json wrong = device;
         wrong[key] = value;
-        EXPECT_THROW(devices_from_json(message(Json::array({wrong}))), std::exception) << key;
+        EXPECT_THROW(devices_from_json(list(Json::array({wrong}))), std::exception) << key;
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A loader that is played by the test, which says what a taken-over one could.
+// The test plays a compromised scene loader.
 #include "host/scene_loading.hpp"
 #include "plugin_under_test.hpp"
 
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct PlayedLoader final : supervise::Starter {
+struct FakeLoader final : supervise::Starter {
     Channel channel;
     base::UniqueFd death;
 
@@ -35,7 +35,7 @@ struct PlayedLoader final : supervise::Starter {
 };
 
 struct SceneLoadingTest : testing::Test {
-    // Why it fails where the loader says all this and ends.
+    // The failure after the loader has sent these messages and exited.
     std::string reason_after(const std::vector<Json> &messages) {
         run_config::FilesInUse files;
         for (const char *name : {"a.mp4", "b.mp4"})
@@ -53,28 +53,35 @@ struct SceneLoadingTest : testing::Test {
     }
     Json reads(const fs::path &file) const {
         const arhost::base::FileIdentity identity = arhost::base::identity_of(folder / file);
-        return {{"type", "reads"}, {"path", identity.path}, {"node", identity.node}};
+        return encode(messages::Reads{identity.path, identity.node});
     }
     arhost::test::ScratchFolder scratch;
     const fs::path folder = fs::canonical(scratch.path());
     Reactor reactor;
-    PlayedLoader loader;
+    FakeLoader loader;
     supervise::Context context{reactor, loader, "", [](arhost_severity, const std::string &, const std::string &) {}};
 };
 
 } // namespace
 
-TEST_F(SceneLoadingTest, FailsForTheFirstReason) {
-    const Json failed = {{"type", "failed"}, {"text", "broken mesh"}};
+TEST_F(SceneLoadingTest, ReportsTheFirstFailure) {
+    const Json failed = encode(messages::Failed{ARHOST_STATUS_ERROR_IO, "broken mesh"});
     EXPECT_THAT(reason_after({reads("a.mp4"), failed}), HasSubstr("a.mp4' is a file that this run reads"));
     EXPECT_THAT(reason_after({reads("a.mp4"), reads("b.mp4")}), HasSubstr("a.mp4' is a file that this run reads"));
     EXPECT_EQ(reason_after({failed, reads("a.mp4")}), "broken mesh");
 }
 
-TEST_F(SceneLoadingTest, LooksAtNoFileThatTheLoaderNames) {
+TEST_F(SceneLoadingTest, DoesNotAccessFilesThatTheLoaderNames) {
     std::ofstream(folder / "a.mp4") << "x";
     fs::create_symlink("a.mp4", folder / "link.mp4");
     for (const char *name : {"link.mp4", "%d.mp4"})
-        EXPECT_THAT(reason_after({{{"type", "reads"}, {"path", folder / name}, {"node", "0:0"}}}),
-                    HasSubstr("exited"));
+        EXPECT_THAT(reason_after({encode(messages::Reads{folder / name, "0:0"})}), HasSubstr("exited"));
+}
+
+TEST_F(SceneLoadingTest, FailsIfTheLoaderViolatesTheProtocol) {
+    EXPECT_THAT(reason_after({{{"type", "reads"}, {"path", 5}, {"node", "0:0"}}}),
+                HasSubstr("protocol violation: malformed message 'reads'"));
+    EXPECT_THAT(reason_after({{{"type", "log"}, {"text", "no severity"}}}),
+                HasSubstr("protocol violation: malformed message 'log'"));
+    EXPECT_THAT(reason_after({{{"kind", "untyped"}}}), HasSubstr("protocol violation: malformed message"));
 }

@@ -7,7 +7,7 @@
 
 using namespace arhost::host;
 
-TEST(Timing, GivesNearestRanksWithinHalfAPercent) {
+TEST(Timing, ReturnsNearestRanksWithinHalfAPercent) {
     Timing timing;
     for (int ms = 1000; ms >= 1; --ms)
         timing.add(std::chrono::milliseconds(ms));
@@ -19,7 +19,7 @@ TEST(Timing, GivesNearestRanksWithinHalfAPercent) {
     EXPECT_LE(timing.percentile_ms(1), timing.max_ms());
 }
 
-TEST(Timing, TellsARareLongFrameFromTheUsualOnes) {
+TEST(Timing, KeepsRareLongDurationsApart) {
     Timing timing;
     for (int i = 0; i < 995; ++i)
         timing.add(std::chrono::microseconds(10));
@@ -30,16 +30,16 @@ TEST(Timing, TellsARareLongFrameFromTheUsualOnes) {
     EXPECT_DOUBLE_EQ(json["max_ms"], 2000);
 }
 
-TEST(Timing, OfNothingOrNoTimeIsHarmless) {
+TEST(Timing, HandlesNoSamplesAndNonPositiveDurations) {
     Timing timing;
     EXPECT_EQ(timing.percentile_ms(0.5), 0);
     timing.add(std::chrono::nanoseconds(0));
-    timing.add(std::chrono::nanoseconds(-5)); // a clock that was set back
+    timing.add(std::chrono::nanoseconds(-5)); // a clock that ran backwards
     EXPECT_EQ(timing.count(), 2u);
     EXPECT_LE(timing.percentile_ms(0.99), 1e-5);
 }
 
-TEST(Timeline, HasALineForEachFrame) {
+TEST(Timeline, HasOneLinePerFrame) {
     using namespace std::chrono_literals;
     Statistics statistics;
     statistics.first_frame = std::chrono::steady_clock::time_point(10s);
@@ -59,7 +59,7 @@ TEST(Timeline, HasALineForEachFrame) {
               "8,1.500000,0.000000,0.000000,0.000000,0.000000,0.000000,0.000000\n");
 }
 
-TEST(Timeline, HoldsTheLongestTimesThatAWorkerCanTell) {
+TEST(Timeline, FormatsTheLongestDurationsAWorkerCanReport) {
     Statistics statistics;
     const auto longest = std::chrono::nanoseconds::min(); // with its sign
     statistics.timeline = {{UINT64_MAX, std::chrono::steady_clock::time_point(longest), longest, longest, longest,
@@ -69,7 +69,7 @@ TEST(Timeline, HoldsTheLongestTimesThatAWorkerCanTell) {
     EXPECT_TRUE(text.ends_with(",-9223372036854.775391\n")) << text;
 }
 
-TEST(Statistics, CountFramesASecondBetweenTheFirstAndTheLast) {
+TEST(Statistics, ComputeFpsBetweenTheFirstAndTheLastFrame) {
     Statistics statistics;
     EXPECT_EQ(statistics.fps(), 0);
     statistics.composited = 31;

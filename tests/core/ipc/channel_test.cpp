@@ -24,19 +24,19 @@ TEST(Channel, CarriesMessagesAndDescriptors) {
     EXPECT_EQ(::read(read_end.get(), &byte, 1), 1);
 }
 
-TEST(Channel, RefusesWhatIsNoMessage) {
+TEST(Channel, RejectsMalformedMessages) {
     auto [host, worker] = Channel::make_pair();
     Message message;
     for (const std::string text : {"{", "[1]", "{\"kind\": 1}", "{\"type\": 3}", "\xff\xfe"}) {
         ASSERT_GT(::send(worker.fd(), text.data(), text.size(), 0), 0);
-        EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach) << text;
+        EXPECT_EQ(host.receive(message, 1000), ReceiveState::malformed) << text;
     }
     const std::string deep(100'000, '[');
     ASSERT_GT(::send(worker.fd(), deep.data(), deep.size(), 0), 0);
-    EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach);
+    EXPECT_EQ(host.receive(message, 1000), ReceiveState::malformed);
 }
 
-TEST(Channel, RefusesAMessageWithTooManyDescriptorsAndKeepsNone) {
+TEST(Channel, RejectsAMessageWithTooManyDescriptors) {
     auto [host, worker] = Channel::make_pair();
     std::vector<int> fds(8, STDERR_FILENO);
     char text[] = "{\"type\": \"log\"}";
@@ -54,10 +54,10 @@ TEST(Channel, RefusesAMessageWithTooManyDescriptorsAndKeepsNone) {
     std::copy(fds.begin(), fds.end(), reinterpret_cast<int *>(CMSG_DATA(control)));
     ASSERT_GT(::sendmsg(worker.fd(), &header, 0), 0);
     Message message;
-    EXPECT_EQ(host.receive(message, 1000), ReceiveState::breach);
+    EXPECT_EQ(host.receive(message, 1000), ReceiveState::malformed);
 }
 
-TEST(Channel, DoesNotWaitForAPeerThatTakesNothing) {
+TEST(Channel, DoesNotBlockIfThePeerDoesNotReceive) {
     auto [host, worker] = Channel::make_pair();
     const Json body = {{"type", "log"}, {"text", std::string(10'000, 'x')}};
     int sent = 0;
@@ -67,7 +67,7 @@ TEST(Channel, DoesNotWaitForAPeerThatTakesNothing) {
     EXPECT_EQ(errno, EAGAIN);
 }
 
-TEST(Channel, TellsThatThePeerIsGone) {
+TEST(Channel, ReportsAClosedPeer) {
     auto [host, worker] = Channel::make_pair();
     worker.close();
     Message message;
@@ -75,7 +75,7 @@ TEST(Channel, TellsThatThePeerIsGone) {
     EXPECT_FALSE(host.send({{"type", "stop"}}));
 }
 
-TEST(JsonAbi, KeepsIntrinsicsToTheLastBit) {
+TEST(JsonAbi, PreservesIntrinsicsExactly) {
     arhost_intrinsics lens{};
     lens.struct_size = sizeof lens;
     lens.width = 641;
@@ -92,7 +92,7 @@ TEST(JsonAbi, KeepsIntrinsicsToTheLastBit) {
     EXPECT_EQ(std::memcmp(&lens, &back, sizeof lens), 0);
 }
 
-TEST(JsonAbi, RefusesFormatsAndIntrinsicsOutOfRange) {
+TEST(JsonAbi, RejectsInvalidFormatsAndIntrinsics) {
     Json format = {{"pixel_format", ARHOST_PIXEL_FORMAT_YUYV},
                    {"width", 640},
                    {"height", 480},

@@ -8,14 +8,14 @@
 
 using namespace arhost::ipc;
 
-TEST(SharedMemory, CanNotBeResizedOnceMade) {
+TEST(SharedMemory, CanNotBeResized) {
     const SharedMemory memory = SharedMemory::create("test", 8192);
     EXPECT_NE(::ftruncate(memory.fd(), 4096), 0);
     EXPECT_NE(::ftruncate(memory.fd(), 16384), 0);
     EXPECT_EQ(memory.size(), 8192u);
 }
 
-TEST(SharedMemory, KeepsItsWriterAndLetsNoOtherWriteAfterTheSeal) {
+TEST(SharedMemory, AllowsOnlyTheExistingWriterAfterTheSeal) {
     const SharedMemory memory = SharedMemory::create("test", 4096);
     const Mapping writer = memory.map(Access::read_write);
     memory.seal_future_writes();
@@ -26,18 +26,20 @@ TEST(SharedMemory, KeepsItsWriterAndLetsNoOtherWriteAfterTheSeal) {
     const Mapping reader = memory.map(Access::read_only);
     writer.bytes()[7] = std::byte(42);
     EXPECT_EQ(reader.bytes()[7], std::byte(42));
-    EXPECT_NE(::mprotect(reader.bytes().data(), 4096, PROT_READ | PROT_WRITE), 0) << "a reader made itself a writer";
-    EXPECT_NE(::fcntl(memory.fd(), F_ADD_SEALS, F_SEAL_WRITE), 0) << "a peer could seal the writer out";
+    EXPECT_NE(::mprotect(reader.bytes().data(), 4096, PROT_READ | PROT_WRITE), 0)
+        << "a reader made its mapping writable";
+    EXPECT_NE(::fcntl(memory.fd(), F_ADD_SEALS, F_SEAL_WRITE), 0)
+        << "a peer could seal the memory against its writer";
 }
 
-TEST(SharedMemory, IsNotTakenFromAPeerThatCouldResizeIt) {
+TEST(SharedMemory, RejectsMemoryThatThePeerCouldResize) {
     arhost::base::UniqueFd resizable(::memfd_create("test", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     ASSERT_EQ(::ftruncate(resizable.get(), 4096), 0);
     EXPECT_THROW(SharedMemory::adopt(std::move(resizable)), std::runtime_error);
     EXPECT_THROW(SharedMemory::adopt(arhost::base::UniqueFd(::open("/dev/null", O_RDWR))), std::system_error);
 }
 
-TEST(SharedMemory, IsFrozenOnlyWhenNobodyMapsItWritable) {
+TEST(SharedMemory, FreezesOnlyWithoutWritableMappings) {
     const SharedMemory memory = SharedMemory::create("test", 4096);
     {
         const Mapping writer = memory.map(Access::read_write);
@@ -48,7 +50,7 @@ TEST(SharedMemory, IsFrozenOnlyWhenNobodyMapsItWritable) {
     EXPECT_THROW(frozen.map(Access::read_write), std::system_error);
 }
 
-TEST(SlotLayout, AlignsSlotsAndCutsThemToTheirSize) {
+TEST(SlotLayout, AlignsSlotsAndLimitsThemToTheirSize) {
     const SlotLayout layout{100'000, 3};
     EXPECT_EQ(layout.stride(), 131'072u);
     const SharedMemory memory = SharedMemory::create("test", layout.byte_size());

@@ -36,7 +36,7 @@ TEST(Reactor, CallsBackWhileADescriptorIsReadable) {
     EXPECT_EQ(calls, 2);
 }
 
-TEST(Reactor, CallsDeadlinesInTheirOrderAndOnce) {
+TEST(Reactor, CallsDeadlinesOnceAndInOrder) {
     Reactor reactor;
     std::string order;
     const auto now = Reactor::Clock::now();
@@ -49,7 +49,7 @@ TEST(Reactor, CallsDeadlinesInTheirOrderAndOnce) {
     EXPECT_EQ(order, "12");
 }
 
-TEST(Reactor, LetsACallbackEndItsOwnWatchAndAnother) {
+TEST(Reactor, LetsACallbackCancelItsOwnWatchAndAnother) {
     Reactor reactor;
     const Pipe one, two;
     int calls = 0;
@@ -59,10 +59,10 @@ TEST(Reactor, LetsACallbackEndItsOwnWatchAndAnother) {
     one.put();
     two.put();
     reactor.run_once();
-    EXPECT_EQ(calls, 1) << "the other watch was called after its end";
+    EXPECT_EQ(calls, 1) << "a cancelled watch was called";
 }
 
-TEST(Reactor, TakesWhatHasComeBeforeADeadline) {
+TEST(Reactor, HandlesEventsBeforeExpiredDeadlines) {
     Reactor reactor;
     const Pipe pipe;
     bool missed = false;
@@ -71,7 +71,7 @@ TEST(Reactor, TakesWhatHasComeBeforeADeadline) {
     watch = reactor.watch(pipe.read.get(), [&] { deadline.cancel(), watch.cancel(); });
     const Pipe busy;
     delay = reactor.watch(busy.read.get(), [&] {
-        std::this_thread::sleep_for(10ms); // the answer comes while this process is busy
+        std::this_thread::sleep_for(10ms); // the event arrives while this process is busy
         pipe.put();
         delay.cancel();
     });
@@ -81,7 +81,7 @@ TEST(Reactor, TakesWhatHasComeBeforeADeadline) {
     EXPECT_FALSE(missed);
 }
 
-TEST(Reactor, DoesNotCountTimeInWhichThisProcessDidNotRun) {
+TEST(Reactor, ExtendsDeadlinesByTimeInWhichTheProcessDidNotRun) {
     Reactor reactor;
     const Pipe pipe;
     bool missed = false;

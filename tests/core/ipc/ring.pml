@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A model of the link between the host and one worker (core/ipc/ring.hpp, core/supervise): the command
- * ring, the result ring, the slots, and the worker's death at any point. Sequentially consistent: what
- * the orderings in ring.hpp must provide is taken as given here, and tested under the thread sanitizer.
+ * A model of the link between the host and one worker (core/ipc/ring.hpp, core/supervise): the command ring, the result
+ * ring, the slots, and the death of the worker at any point. The model is sequentially consistent; the memory orderings
+ * of ring.hpp are tested with the thread sanitizer.
  *
- * Checked for every interleaving: frames come back in order, none lost, none twice, none torn; a slot is
- * never written while the host reads it; positions stay within capacity; the host always gets done.
+ * Checked for every interleaving: frames return in order, none lost, duplicated or torn; a slot is never written while
+ * the host reads it; positions stay within capacity; the host always finishes.
  *
- * The macros FAULT… plant a fault each; `check-model --faults` sees that the model catches it.
+ * Each macro FAULT… plants a fault; `check-model --faults` verifies that the model detects it.
  */
 #define CAPACITY 2  /* of both rings */
 #define SLOTS    2
 #define FRAMES   4
-#define DEATHS   2  /* at most */
+#define DEATHS   2  /* maximum */
 #define NOBODY   255
 
 /* Written by the host. */
@@ -21,15 +21,15 @@ byte command_slot[CAPACITY], command_frame[CAPACITY];
 /* Written by the worker. */
 byte result_published, command_consumed;
 byte result_frame[CAPACITY];
-/* The slots' two halves: a frame number each, so that a torn frame shows. */
+/* The two halves of each slot hold a frame number, which reveals torn frames. */
 byte low[SLOTS], high[SLOTS];
-/* The slot that the host reads at the moment. */
+/* The slot that the host is reading. */
 byte reading = NOBODY;
 
 bool alive = true, done;
 byte deaths;
 
-/* Every step of the worker may be its last. */
+/* The worker may die at every step. */
 #define may_die  if :: deaths < DEATHS -> deaths++; goto dead :: true fi
 
 proctype worker() {
@@ -47,7 +47,7 @@ end_waiting:
     results++;
     result_published = results;
 #endif
-    assert(reading != slot);          /* the host has let go of it */
+    assert(reading != slot);          /* the host has released it */
     low[slot] = frame;
     may_die;
     assert(reading != slot);
@@ -55,7 +55,7 @@ end_waiting:
     may_die;
 #ifndef FAULT_PUBLISH_FIRST
 #ifndef FAULT_NO_FULL_CHECK
-    assert(results - result_consumed < CAPACITY); /* the host has never more in flight than fit */
+    assert(results - result_consumed < CAPACITY); /* the host limits the frames in flight */
 #endif
     result_frame[results % CAPACITY] = frame;
     may_die;
@@ -67,16 +67,16 @@ dead:
     alive = false
 }
 
-/* Takes one result if there is one. */
+/* Receives one result, if available. */
 inline take_result() {
     if
     :: result_published != result_position ->
         assert(result_published - result_position <= CAPACITY);
-        assert(result_frame[result_position % CAPACITY] == expected); /* in order, once */
+        assert(result_frame[result_position % CAPACITY] == expected); /* in order, not duplicated */
         slot = expected % SLOTS;
         reading = slot;
         assert(low[slot] == expected);
-        assert(high[slot] == expected);                               /* whole */
+        assert(high[slot] == expected);                               /* not torn */
         reading = NOBODY;
         result_position++;
         result_consumed = result_position;
@@ -86,8 +86,8 @@ inline take_result() {
 }
 
 active proctype host() {
-    byte submitted = 0;        /* frames given out */
-    byte expected = 0;         /* the next frame to come back */
+    byte submitted = 0;        /* frames submitted */
+    byte expected = 0;         /* the next frame to return */
     byte position = 0, result_position = 0, slot;
     run worker();
     do
@@ -106,12 +106,12 @@ active proctype host() {
         command_published = position
     :: result_published != result_position -> take_result()
     :: !alive ->
-        /* What it had finished counts. */
+        /* Results that it published before its death are valid. */
         do
         :: result_published != result_position -> take_result()
         :: else -> break
         od;
-        /* New memory, a new worker; the unanswered frames again. */
+        /* New memory and a new worker; unanswered frames are submitted again. */
         atomic {
             command_published = 0; command_consumed = 0; result_published = 0; result_consumed = 0;
             low[0] = NOBODY; low[1] = NOBODY; high[0] = NOBODY; high[1] = NOBODY;
@@ -126,5 +126,5 @@ active proctype host() {
     done = true
 }
 
-/* Whatever happens, the host gets done (as long as each process that can take a step does, in time). */
+/* The host always finishes, given weak fairness. */
 ltl finishes { <> done }

@@ -10,15 +10,15 @@ using namespace arhost::ipc;
 namespace {
 
 struct Fixture {
-    std::unique_ptr<ProducerSide<int, 4>> entries = std::make_unique<ProducerSide<int, 4>>();
-    std::unique_ptr<ConsumerSide> taken = std::make_unique<ConsumerSide>();
-    Producer<int, 4> producer{*entries, *taken};
-    Consumer<int, 4> consumer{*entries, *taken};
+    std::unique_ptr<ProducerSide<int, 4>> producer_side = std::make_unique<ProducerSide<int, 4>>();
+    std::unique_ptr<ConsumerSide> consumer_side = std::make_unique<ConsumerSide>();
+    Producer<int, 4> producer{*producer_side, *consumer_side};
+    Consumer<int, 4> consumer{*producer_side, *consumer_side};
 };
 
 } // namespace
 
-TEST(Ring, GivesEntriesInTheirOrder) {
+TEST(Ring, ReturnsEntriesInOrder) {
     Fixture ring;
     int value = 0;
     EXPECT_EQ(ring.consumer.pop(value), RingResult::wait);
@@ -32,7 +32,7 @@ TEST(Ring, GivesEntriesInTheirOrder) {
     }
 }
 
-TEST(Ring, HoldsItsCapacityAndNoMore) {
+TEST(Ring, HoldsExactlyItsCapacity) {
     Fixture ring;
     for (int i = 0; i < 4; ++i)
         EXPECT_EQ(ring.producer.push(i), RingResult::done);
@@ -42,28 +42,28 @@ TEST(Ring, HoldsItsCapacityAndNoMore) {
     EXPECT_EQ(ring.producer.push(4), RingResult::done);
 }
 
-TEST(Ring, NoticesAConsumerThatClaimsMoreThanWasPublished) {
+TEST(Ring, DetectsAConsumerAheadOfTheProducer) {
     Fixture ring;
-    ring.taken->consumed = 1;
-    EXPECT_EQ(ring.producer.push(1), RingResult::breach);
+    ring.consumer_side->consumed = 1;
+    EXPECT_EQ(ring.producer.push(1), RingResult::violation);
 }
 
-TEST(Ring, NoticesAConsumerThatGoesBack) {
+TEST(Ring, DetectsAConsumerThatMovesBackwards) {
     Fixture ring;
     int value = 0;
     for (int i = 0; i < 6; ++i) {
         EXPECT_EQ(ring.producer.push(i), RingResult::done);
         EXPECT_EQ(ring.consumer.pop(value), RingResult::done);
     }
-    ring.taken->consumed = 0;
-    EXPECT_EQ(ring.producer.push(1), RingResult::breach);
+    ring.consumer_side->consumed = 0;
+    EXPECT_EQ(ring.producer.push(1), RingResult::violation);
 }
 
-TEST(Ring, NoticesAProducerThatClaimsMoreThanFits) {
+TEST(Ring, DetectsAProducerThatPublishesMoreThanTheCapacity) {
     Fixture ring;
     int value = 0;
-    ring.entries->published = 5;
-    EXPECT_EQ(ring.consumer.pop(value), RingResult::breach);
-    ring.entries->published = ~std::uint64_t(0); // behind the consumer
-    EXPECT_EQ(ring.consumer.pop(value), RingResult::breach);
+    ring.producer_side->published = 5;
+    EXPECT_EQ(ring.consumer.pop(value), RingResult::violation);
+    ring.producer_side->published = ~std::uint64_t(0); // before the consumer's position
+    EXPECT_EQ(ring.consumer.pop(value), RingResult::violation);
 }

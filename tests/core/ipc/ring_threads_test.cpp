@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two threads on one ring with slots, as the thread sanitizer sees it: a payload outside the ring is
-// published by the entry that names it, and its slot is written again only once it has come back.
+// Two threads on one ring with slots, for the thread sanitizer: an entry publishes the payload in its slot, and the
+// slot is overwritten only after the consumer has returned it.
 #include "ipc/ring.hpp"
 #include "ipc/wake.hpp"
 
@@ -26,20 +26,20 @@ struct Entry {
 
 struct Shared {
     ProducerSide<Entry, capacity> full;
-    ConsumerSide full_taken;
+    ConsumerSide full_consumed;
     ProducerSide<std::uint32_t, capacity> free;
-    ConsumerSide free_taken;
+    ConsumerSide free_consumed;
     WakeWord to_consumer, to_producer;
-    std::array<std::array<std::uint64_t, 64>, capacity> slots; // plain memory: a race would be seen
+    std::array<std::array<std::uint64_t, 64>, capacity> slots; // plain memory, so that the sanitizer detects races
 };
 
 } // namespace
 
-TEST(RingThreads, HandSlotsOverWithoutARace) {
+TEST(RingThreads, HandOverSlotsWithoutARace) {
     const auto shared = std::make_unique<Shared>();
     std::thread producer([&] {
-        Producer<Entry, capacity> full(shared->full, shared->full_taken);
-        Consumer<std::uint32_t, capacity> free(shared->free, shared->free_taken);
+        Producer<Entry, capacity> full(shared->full, shared->full_consumed);
+        Consumer<std::uint32_t, capacity> free(shared->free, shared->free_consumed);
         for (std::uint64_t sequence = 0; sequence < frames; ++sequence) {
             std::uint32_t slot = static_cast<std::uint32_t>(sequence);
             for (std::uint32_t seen = 0; sequence >= capacity;) {
@@ -54,8 +54,8 @@ TEST(RingThreads, HandSlotsOverWithoutARace) {
             wake(shared->to_consumer);
         }
     });
-    Consumer<Entry, capacity> full(shared->full, shared->full_taken);
-    Producer<std::uint32_t, capacity> free(shared->free, shared->free_taken);
+    Consumer<Entry, capacity> full(shared->full, shared->full_consumed);
+    Producer<std::uint32_t, capacity> free(shared->free, shared->free_consumed);
     for (std::uint64_t expected = 0; expected < frames; ++expected) {
         Entry entry{};
         for (;;) {

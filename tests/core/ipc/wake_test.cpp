@@ -20,14 +20,14 @@ TEST(Wake, ReachesAnotherProcessThroughAReadOnlyMapping) {
         const Mapping reader = memory.map(Access::read_only);
         ::_exit(wait_for_wake(reader.as<WakeWord>(), 0, 20s) ? 0 : 1);
     }
-    ::usleep(20'000); // asleep by now, most times; the test holds either way
+    ::usleep(20'000); // usually asleep by now; the test passes either way
     wake(writer.as<WakeWord>());
     int status = -1;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     EXPECT_EQ(status, 0);
 }
 
-TEST(Wake, IsNotLostWhenItComesBeforeTheWait) {
+TEST(Wake, IsNotLostIfItPrecedesTheWait) {
     WakeWord word{};
     const std::uint32_t seen = wake_count(word);
     wake(word);
@@ -35,7 +35,7 @@ TEST(Wake, IsNotLostWhenItComesBeforeTheWait) {
     EXPECT_FALSE(wait_for_wake(word, wake_count(word), 1ms));
 }
 
-TEST(Doorbell, CountsItsRings) {
+TEST(Doorbell, CountsRings) {
     const DoorbellPair bell = make_doorbell();
     EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
     for (int i = 0; i < 3; ++i)
@@ -44,20 +44,20 @@ TEST(Doorbell, CountsItsRings) {
     EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
 }
 
-TEST(Doorbell, NeverBlocksTheHostWhateverTheWorkerDoesToItsEnd) {
+TEST(Doorbell, DoesNotBlockTheHostIfTheWorkerClearsONonblock) {
     const DoorbellPair bell = make_doorbell();
-    ::fcntl(bell.worker.get(), F_SETFL, 0); // clears O_NONBLOCK, were it there and shared
+    ::fcntl(bell.worker.get(), F_SETFL, 0); // clears O_NONBLOCK, if it were shared
     EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
 }
 
-TEST(Doorbell, SurvivesAFlood) {
+TEST(Doorbell, HandlesAFloodOfRings) {
     const DoorbellPair bell = make_doorbell();
     for (int i = 0; i < 1'000'000; ++i)
-        ring_doorbell(bell.worker.get()); // never blocks the worker either
+        ring_doorbell(bell.worker.get()); // does not block the worker either
     EXPECT_LE(drain_doorbell(bell.host.get()), 4096);
 }
 
-TEST(Doorbell, TellsThatTheOtherEndIsShut) {
+TEST(Doorbell, ReportsAClosedOtherEnd) {
     DoorbellPair bell = make_doorbell();
     bell.worker.reset();
     EXPECT_EQ(drain_doorbell(bell.host.get()), -1);

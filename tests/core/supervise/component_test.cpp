@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A component without a pipeline around it: start, commands, death, end.
+// A component without a pipeline: start, commands, death, stop.
 #include "supervise/component.hpp"
 
 #include <gtest/gtest.h>
@@ -24,9 +24,9 @@ struct Bench {
     std::vector<std::string> events;
     std::unique_ptr<Component> component;
 
-    void make(const std::string &plugin, Limits limits = {}, Json options = Json::object()) {
-        Component::Hooks hooks;
-        hooks.hello = [this, options](const PluginDescription &description, std::size_t) {
+    void make(const std::string &plugin, arhost::base::Limits limits = {}, Json options = Json::object()) {
+        Component::Callbacks callbacks;
+        callbacks.hello = [this, options](const PluginDescription &description, std::size_t) {
             events.push_back("hello " + description.id);
             std::vector<OptionValue> values;
             for (const OptionDeclaration &o : description.options)
@@ -36,36 +36,34 @@ struct Bench {
             for (OptionValue &value : values)
                 if (value.key == "width" || value.key == "height")
                     value.integer = 8;
-            return Component::Create{
-                {{"options", to_json(values)}, {"setup", {{"first_sequence", 0}, {"fps", 0.0}, {"paced", false}}}},
-                {}};
+            return Component::Create{{std::move(values), messages::SourceSetup{}}, {}};
         };
-        hooks.ready = [this](const Json &ready) {
+        callbacks.ready = [this](const messages::Ready &ready) {
             events.push_back("ready");
-            return SlotLayout{format_from_json(ready.at("format")).byte_size, 4};
+            return SlotLayout{ready.format.value().byte_size, 4};
         };
-        hooks.running = [this] { events.push_back("running"); };
-        hooks.result = [this](const Command &command, const Result &result) {
+        callbacks.running = [this] { events.push_back("running"); };
+        callbacks.result = [this](const Command &command, const Result &result) {
             events.push_back("result " + std::to_string(command.sequence) +
                              (result.status == ARHOST_STATUS_OK ? "" : " failed"));
         };
-        hooks.lost = [this](const std::vector<Command> &unanswered) {
+        callbacks.lost = [this](const std::vector<Command> &unanswered) {
             events.push_back("lost " + std::to_string(unanswered.size()));
         };
-        hooks.given_up = [this](const std::string &, bool by_configuration) {
-            events.push_back(by_configuration ? "misconfigured" : "given up");
+        callbacks.disabled = [this](const std::string &, bool is_configuration_error) {
+            events.push_back(is_configuration_error ? "misconfigured" : "disabled");
         };
-        hooks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
+        callbacks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
         component = std::make_unique<Component>(
             context, "source", std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
-            limits, arhost::sandbox::Policy{}, std::move(hooks));
+            limits, arhost::sandbox::Policy{}, std::move(callbacks));
         component->start();
     }
-    // Runs until the event has come, or the time is over.
+    // Runs until the event has occurred so many times; false after 20 s.
     bool until(const std::string &event, std::size_t times = 1) {
-        bool over = false;
-        const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { over = true; });
-        while (!over) {
+        bool timed_out = false;
+        const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { timed_out = true; });
+        while (!timed_out) {
             if (static_cast<std::size_t>(std::count(events.begin(), events.end(), event)) >= times)
                 return true;
             reactor.run_once();
@@ -91,7 +89,7 @@ TEST(Component, StartsServesAndStops) {
     bench.read(1);
     ASSERT_TRUE(bench.until("result 1")) << bench.log;
     const RegionPointer &output = bench.component->output();
-    EXPECT_EQ(output->layout.slot(output->mapping, 1)[0], std::byte(1)) << "the frame's first pixel is its number";
+    EXPECT_EQ(output->layout.slot(output->mapping, 1)[0], std::byte(1)) << "the first pixel of a frame is its number";
     bench.component->stop();
     ASSERT_TRUE(bench.until("stopped"));
     EXPECT_EQ(bench.events, (std::vector<std::string>{"hello source_counter", "ready", "running", "result 0",
@@ -99,7 +97,7 @@ TEST(Component, StartsServesAndStops) {
     EXPECT_EQ(bench.component->restarts(), 0u);
 }
 
-TEST(Component, ReturnsWhatWasLostAndGetsNewMemoryAfterADeath) {
+TEST(Component, ReportsLostCommandsAndGetsNewMemoryAfterADeath) {
     Bench bench;
     bench.make("source_counter", {.restart = {.first_delay = 1ms}}, {{"frames", 100}, {"crash_at", 2}});
     ASSERT_TRUE(bench.until("running"));
@@ -114,7 +112,7 @@ TEST(Component, ReturnsWhatWasLostAndGetsNewMemoryAfterADeath) {
     EXPECT_EQ(bench.component->crashes()[0].frame, 2u);
 }
 
-TEST(Component, IsEndedWhenItIsStoppedForLongerThanItsDeadline) {
+TEST(Component, IsRestartedIfItsProcessIsStoppedBeyondTheDeadline) {
     Bench bench;
     bench.make("source_counter", {.frame = 200ms, .restart = {.first_delay = 1ms}},
                {{"frames", 100}, {"crash_at", -1}});
@@ -126,12 +124,12 @@ TEST(Component, IsEndedWhenItIsStoppedForLongerThanItsDeadline) {
     ASSERT_TRUE(bench.until("running", 2));
 }
 
-TEST(Component, IsNotTriedAgainWhenItsLibraryCanNotBeUsed) {
+TEST(Component, IsDisabledIfItsLibraryIsUnusable) {
     for (const char *plugin : {"broken_constructor", "none"}) {
         Bench bench;
         bench.make(plugin);
         ASSERT_TRUE(bench.until("misconfigured")) << bench.log;
-        EXPECT_EQ(bench.component->state(), Component::State::given_up);
+        EXPECT_EQ(bench.component->state(), Component::State::disabled);
         EXPECT_EQ(bench.component->restarts(), 0u);
     }
 }

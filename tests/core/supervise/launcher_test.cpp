@@ -44,7 +44,7 @@ pid_t parent_of(pid_t pid) {
 
 } // namespace
 
-TEST(Launcher, ReportsHowAProcessEnded) {
+TEST(Launcher, ReportsTheExitOfAProcess) {
     Launcher launcher(program);
     const Spawned spawned = launcher.spawn("/bin/true", no_log);
     wait_dead(spawned);
@@ -54,7 +54,7 @@ TEST(Launcher, ReportsHowAProcessEnded) {
     EXPECT_GE(exit.cpu_seconds, 0.0);
 }
 
-TEST(Launcher, KeepsTheExitsOfSeveralApart) {
+TEST(Launcher, DistinguishesTheExitsOfSeveralProcesses) {
     Launcher launcher(program);
     const Spawned good = launcher.spawn("/bin/true", no_log), bad = launcher.spawn("/bin/false", no_log);
     wait_dead(good);
@@ -63,7 +63,7 @@ TEST(Launcher, KeepsTheExitsOfSeveralApart) {
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(good.pid).wait_status), 0);
 }
 
-TEST(Launcher, SaysSoWhereTheProgramIsMissing) {
+TEST(Launcher, ReportsAMissingProgram) {
     Launcher launcher(program);
     const Spawned spawned = launcher.spawn("/no/such/program", no_log);
     wait_dead(spawned);
@@ -71,7 +71,7 @@ TEST(Launcher, SaysSoWhereTheProgramIsMissing) {
     EXPECT_NE(all_output(spawned).find("can't be executed"), std::string::npos);
 }
 
-TEST(Launcher, IsReplacedWhenItIsKilledAsOftenAsItTakes) {
+TEST(Launcher, IsReplacedEachTimeItIsKilled) {
     Launcher launcher(program);
     std::string log;
     const LogFunction note = [&](arhost_severity, const std::string &, const std::string &text) {
@@ -85,7 +85,7 @@ TEST(Launcher, IsReplacedWhenItIsKilledAsOftenAsItTakes) {
         const pid_t pid = first.pid;
         first = launcher.spawn("/usr/bin/yes", note);
         EXPECT_EQ(WTERMSIG(launcher.wait_exit(pid).wait_status), SIGKILL);
-        EXPECT_EQ(log, "the launcher is gone, and all workers with it; starting another\n");
+        EXPECT_EQ(log, "the launcher has died, and all workers with it; starting a new one\n");
         log.clear();
     }
     const Spawned last = launcher.spawn("/bin/true", note);
@@ -93,8 +93,8 @@ TEST(Launcher, IsReplacedWhenItIsKilledAsOftenAsItTakes) {
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(last.pid).wait_status), 0);
 }
 
-TEST(Launcher, LeavesAloneWhatIsNoWorkersWhenItIsReplaced) {
-    const pid_t other = ::fork(); // as of a shell that has become this program by exec
+TEST(Launcher, DoesNotKillUnrelatedChildrenWhenItIsReplaced) {
+    const pid_t other = ::fork(); // as if inherited from a shell that started this program with exec
     if (other == 0)
         for (;;)
             ::pause();
@@ -108,7 +108,7 @@ TEST(Launcher, LeavesAloneWhatIsNoWorkersWhenItIsReplaced) {
     ::waitpid(other, nullptr, 0);
 }
 
-TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
+TEST(Launcher, ReportsThatItCanNotBeStarted) {
     const auto reason = [](const char *wrong) -> std::string {
         try {
             Launcher launcher(wrong);
@@ -118,14 +118,14 @@ TEST(Launcher, SaysSoWhereItCanNotBeStarted) {
         }
         return "";
     };
-    EXPECT_EQ(reason("/no/such/program"),
-              "/no/such/program can't be started: No such file or directory; is it installed beside arhost?");
+    EXPECT_EQ(reason("/no/such/program"), "/no/such/program can't be started: No such file or directory; is it "
+                                          "installed in the same folder as arhost?");
     EXPECT_EQ(reason("/bin/true"),
-              "no process can be started: /bin/true was started 5 times, and ended or did not answer each time");
+              "no process can be started: /bin/true was started 5 times and exited or did not respond each time");
 }
 
-// A debugger has it: it does not answer, and its end is the debugger's to see first.
-TEST(Launcher, IsReplacedWhereADebuggerHoldsIt) {
+// It does not respond, and the debugger collects its exit first.
+TEST(Launcher, IsReplacedIfADebuggerHoldsIt) {
     Launcher launcher(program, std::chrono::milliseconds(500));
     const Spawned first = launcher.spawn("/usr/bin/yes", no_log);
     const pid_t held = parent_of(first.pid);
@@ -152,42 +152,42 @@ TEST(Launcher, IsReplacedWhereADebuggerHoldsIt) {
     ::close(ends[0]);
     ::close(ends[1]);
     if (!holds)
-        GTEST_SKIP() << "this machine lets no process hold another";
+        GTEST_SKIP() << "ptrace is not permitted on this machine";
 }
 
-TEST(Launcher, IsReplacedWhereItDoesNotAnswer) {
+TEST(Launcher, IsReplacedIfItDoesNotRespond) {
     const arhost::test::ScratchFolder scratch;
-    const std::string deaf = scratch.path() / "deaf";
-    std::ofstream(deaf) << "#!/bin/sh\nif mkdir " << deaf << ".once; then sleep 1000 & echo $! > " << deaf
-                        << ".pid; wait; fi\nexec " << program << "\n";
-    std::filesystem::permissions(deaf, std::filesystem::perms::owner_all);
-    Launcher launcher(deaf, std::chrono::seconds(2));
+    const std::string silent = scratch.path() / "silent";
+    std::ofstream(silent) << "#!/bin/sh\nif mkdir " << silent << ".once; then sleep 1000 & echo $! > " << silent
+                          << ".pid; wait; fi\nexec " << program << "\n";
+    std::filesystem::permissions(silent, std::filesystem::perms::owner_all);
+    Launcher launcher(silent, std::chrono::seconds(2));
     const Spawned spawned = launcher.spawn("/bin/true", no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 0);
     pid_t child = 0;
-    std::ifstream(deaf + ".pid") >> child;
+    std::ifstream(silent + ".pid") >> child;
     EXPECT_GT(child, 0);
-    EXPECT_FALSE(is_alive(child)) << "what it had started goes on";
+    EXPECT_FALSE(is_alive(child)) << "its child process survived";
 }
 
-TEST(Launcher, DoesNotHoldUpTheEndWhereItDoesNotEnd) {
+TEST(Launcher, DoesNotBlockTheDestructorIfItDoesNotExit) {
     const arhost::test::ScratchFolder scratch;
-    const std::string deaf = scratch.path() / "deaf";
-    std::ofstream(deaf) << "#!/bin/sh\necho $$ > " << deaf << ".pid\n" << program << "\nexec sleep 1000\n";
-    std::filesystem::permissions(deaf, std::filesystem::perms::owner_all);
+    const std::string silent = scratch.path() / "silent";
+    std::ofstream(silent) << "#!/bin/sh\necho $$ > " << silent << ".pid\n" << program << "\nexec sleep 1000\n";
+    std::filesystem::permissions(silent, std::filesystem::perms::owner_all);
     {
-        Launcher launcher(deaf, std::chrono::milliseconds(500));
+        Launcher launcher(silent, std::chrono::milliseconds(500));
         wait_dead(launcher.spawn("/bin/true", no_log));
     }
     pid_t pid = 0;
-    std::ifstream(deaf + ".pid") >> pid;
+    std::ifstream(silent + ".pid") >> pid;
     EXPECT_GT(pid, 0);
     EXPECT_FALSE(is_alive(pid));
 }
 
-// What PR_SET_PDEATHSIG alone would not: it goes on, and has the workers' own processes ended too.
-TEST(Launcher, EndsWithItsHostThoughItIsStopped) {
+// SIGCONT as PR_SET_PDEATHSIG makes it continue, and it kills the workers.
+TEST(Launcher, ExitsWithItsHostEvenIfStopped) {
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
     const pid_t host = ::fork();
@@ -213,11 +213,11 @@ TEST(Launcher, EndsWithItsHostThoughItIsStopped) {
     ::close(ends[1]);
 }
 
-TEST(Launcher, TakesItsChildrenAlongWhenItEnds) {
+TEST(Launcher, KillsItsChildrenWhenItExits) {
     Spawned spawned;
     {
         Launcher launcher(program);
-        spawned = launcher.spawn("/bin/cat", no_log); // stdin is /dev/null, but descriptors 3 and 4 are ours
+        spawned = launcher.spawn("/bin/cat", no_log);
         spawned = launcher.spawn("/usr/bin/yes", no_log);
     }
     wait_dead(spawned);

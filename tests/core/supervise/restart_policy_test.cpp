@@ -6,46 +6,46 @@
 using namespace arhost::supervise;
 using namespace std::chrono_literals;
 
-TEST(RestartPolicy, DoublesItsDelayAndThenGivesUp) {
+TEST(RestartPolicy, DoublesTheDelayAndThenQuarantines) {
     RestartPolicy policy(
         {.proven_after_frames = 10, .quarantine_after = 5, .first_delay = 250ms, .longest_delay = 1500ms});
-    EXPECT_EQ(policy.died(0), 250ms);
-    EXPECT_EQ(policy.died(0), 500ms);
-    EXPECT_EQ(policy.died(0), 1000ms);
-    EXPECT_EQ(policy.died(0), 1500ms) << "not longer than the longest";
-    EXPECT_EQ(policy.died(0), std::nullopt);
+    EXPECT_EQ(policy.delay_after_death(0), 250ms);
+    EXPECT_EQ(policy.delay_after_death(0), 500ms);
+    EXPECT_EQ(policy.delay_after_death(0), 1000ms);
+    EXPECT_EQ(policy.delay_after_death(0), 1500ms) << "at most longest_delay";
+    EXPECT_EQ(policy.delay_after_death(0), std::nullopt);
 }
 
-TEST(RestartPolicy, RestartsAProvenComponentAtOnceHoweverOftenItDies) {
+TEST(RestartPolicy, AlwaysRestartsAProvenComponentAtOnce) {
     RestartPolicy policy({});
     for (int i = 0; i < 10; ++i)
         policy.frame_done();
     for (int death = 0; death < 100; ++death) {
-        EXPECT_EQ(policy.died(1), 0ms);
+        EXPECT_EQ(policy.delay_after_death(1), 0ms);
         policy.frame_done();
     }
 }
 
-TEST(RestartPolicy, CountsDeathsBeforeTheFirstFrameOfALifeEvenOfAProvenComponent) {
+TEST(RestartPolicy, CountsDeathsBeforeTheFirstFrameOfAProcessAsFailures) {
     RestartPolicy policy({});
     for (int i = 0; i < 50; ++i)
         policy.frame_done();
-    EXPECT_EQ(policy.died(0), 0ms);
+    EXPECT_EQ(policy.delay_after_death(0), 0ms);
     for (int i = 0; i < 4; ++i)
-        EXPECT_GE(policy.died(0), 250ms);
-    EXPECT_EQ(policy.died(0), std::nullopt);
+        EXPECT_GE(policy.delay_after_death(0), 250ms);
+    EXPECT_EQ(policy.delay_after_death(0), std::nullopt);
 }
 
-TEST(RestartPolicy, CountsDeathsWithinTheFirstTenFrames) {
+TEST(RestartPolicy, CountsDeathsOfAnUnprovenComponentAsFailures) {
     RestartPolicy policy({});
     for (int death = 0; death < 2; ++death) {
         policy.frame_done();
-        EXPECT_GE(policy.died(0), 250ms);
+        EXPECT_GE(policy.delay_after_death(0), 250ms);
     }
     EXPECT_EQ(policy.failures(), 2u);
 }
 
 TEST(RestartPolicy, AddsUpToAQuarterOfJitter) {
     RestartPolicy policy({});
-    EXPECT_EQ(policy.died(1), 312ms);
+    EXPECT_EQ(policy.delay_after_death(1), 312ms);
 }

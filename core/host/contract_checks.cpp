@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/contract_checks.hpp"
+
+#include "camera/lens.hpp"
+#include "camera/mapping.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+namespace arhost::host {
+namespace {
+
+constexpr std::uint32_t sample_step = 16; // checks one of 16 rows, or blocks of bytes, of a frame
+
+// The first one. Different for each frame, also if only every fourth frame is checked.
+std::uint32_t first_of(std::uint64_t frame) {
+    return static_cast<std::uint32_t>((frame + frame / sample_step) % sample_step);
+}
+
+double seconds(std::int64_t ns) {
+    return 1e-9 * static_cast<double>(ns);
+}
+
+std::string name_of(const arhost_marker &marker) {
+    return fmt::format("marker {}", marker.id);
+}
+
+std::string problem_with_order(std::span<const arhost_marker> markers, std::span<const arhost_marker_config> listed) {
+    auto next = listed.begin();
+    for (const arhost_marker &marker : markers) {
+        next = std::find_if(next, listed.end(), [&](const auto &one) { return one.id == marker.id; });
+        if (next == listed.end())
+            return name_of(marker) + " is not in the order of the configuration's list";
+    }
+    return {};
+}
+
+std::string problem_with_numbers(const arhost_marker &marker) {
+    if (!(marker.ambiguity >= 0 && marker.ambiguity <= 1))
+        return fmt::format("{} has the ambiguity {:g}, which must be 0 to 1", name_of(marker), marker.ambiguity);
+    if (!(marker.reprojection_px >= 0))
+        return fmt::format("{} has the reprojection error {:g} px, which must not be negative", name_of(marker),
+                           marker.reprojection_px);
+    if (marker.state == ARHOST_MARKER_DETECTED && marker.age_frames != 0)
+        return fmt::format("{} is detected, but its age is {} frames", name_of(marker), marker.age_frames);
+    const bool none = std::all_of(std::begin(marker.mt_alternative), std::end(marker.mt_alternative),
+                                  [](double number) { return number == 0; });
+    if (const char *problem = none ? nullptr : camera::problem_with(marker.mt_alternative))
+        return fmt::format("{}'s alternative: {}", name_of(marker), problem);
+    return {};
+}
+
+// RMS over the corners in px; nullopt if a corner is behind the camera.
+std::optional<double> reprojection_px(const arhost_marker &marker, const arhost_intrinsics &intrinsics,
+                                      double side_mm) {
+    const double s = side_mm / 2;
+    const glm::dvec2 corners[] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}}; // arhost/tracker.h
+    const double(&m)[16] = marker.mt;
+    double sum = 0;
+    for (int i = 0; i < 4; ++i) {
+        const glm::dvec2 &p = corners[i];
+        const glm::dvec3 eye_space(m[0] * p.x + m[4] * p.y + m[12], m[1] * p.x + m[5] * p.y + m[13],
+                                   m[2] * p.x + m[6] * p.y + m[14]);
+        const auto projected = camera::project(intrinsics, {eye_space.x, -eye_space.y, -eye_space.z}); // GL → OpenCV
+        if (!projected)
+            return std::nullopt;
+        sum +=
+            std::pow(projected->x - marker.corners_px[i][0], 2) + std::pow(projected->y - marker.corners_px[i][1], 2);
+    }
+    return std::sqrt(sum / 4);
+}
+
+std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsics &intrinsics, double side_mm) {
+    const auto error_px = reprojection_px(marker, intrinsics, side_mm);
+    if (!error_px)
+        return name_of(marker) + " is detected, but its pose is behind the camera";
+    if (!(std::abs(*error_px - marker.reprojection_px) <= 0.05 + 0.02 * marker.reprojection_px)) // also if NaN
+        return fmt::format("{}: its reprojection error is reported as {:.3f} px and is {:.3f} px", name_of(marker),
+                           marker.reprojection_px, *error_px);
+    return {};
+}
+
+// The box's bounds in a pinhole's image; nullopt if a part of the box is not in front of the camera.
+struct Rectangle {
+    glm::dvec2 min{1e30}, max{-1e30};
+};
+std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera &camera) {
+    Rectangle bounds;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::vec3 part(corner & 1, corner >> 1 & 1, corner >> 2);
+        const auto at =
+            camera::project(camera.intrinsics, camera::in_camera(camera, glm::mix(box.min, box.max, part)));
+        if (!at)
+            return std::nullopt;
+        bounds.min = glm::min(bounds.min, *at);
+        bounds.max = glm::max(bounds.max, *at);
+    }
+    constexpr double margin = 1.5; // px: samples are spread around the pixel's centre
+    return Rectangle{bounds.min - margin, bounds.max + margin};
+}
+
+} // namespace
+
+void ContractChecks::add(const std::string &name, std::uint64_t frame, const std::string &problem) {
+    ContractCheck &check = all_[name];
+    ++check.checked;
+    if (problem.empty() || check.violations++ > 0)
+        return;
+    check.first_violation = fmt::format("frame {}: {}", frame, problem);
+    if (on_first_)
+        on_first_(name, check.first_violation);
+}
+
+void SourceChecks::check(ContractChecks &checks, const arhost_record &record, std::uint32_t skipped,
+                         std::int64_t now_ns) {
+    const bool is_first = clock_ == 0;
+    if (is_first)
+        clock_ = record.clock;
+    checks.add("source.clock", record.sequence,
+               record.clock == clock_ ? ""
+                                      : fmt::format("has the clock {}, earlier frames had {}", record.clock, clock_));
+
+    // In floating point, which can't overflow: a source may report any time.
+    const double capture_s = seconds(record.capture_ns), age_s = seconds(now_ns) - capture_s;
+    std::string problem;
+    if (record.clock == ARHOST_CLOCK_MONOTONIC && age_s < 0)
+        problem = fmt::format("was captured {:.3f} s after its arrival", -age_s);
+    if (record.clock == ARHOST_CLOCK_MEDIA && capture_s < 0)
+        problem = fmt::format("has the media time {:.3f} s, which must not be negative", capture_s);
+    checks.add("source.capture-time", record.sequence, problem);
+
+    if (is_first)
+        first_s_ = last_s_ = capture_s;
+    if (rate_.fps > 0 && record.clock == clock_ && clock_ == ARHOST_CLOCK_MEDIA)
+        checks.add("source.rate", record.sequence,
+                   is_first ? "" : problem_with_rate(capture_s - first_s_, capture_s - last_s_, skipped, now_ns));
+    last_s_ = capture_s;
+}
+
+std::string SourceChecks::problem_with_rate(double since_first_s, double since_last_s, std::uint32_t skipped,
+                                            std::int64_t now_ns) const {
+    // The resolution of media clocks; and how far a source may run ahead before its start returns.
+    constexpr double tolerance_s = 0.001, head_start_s = 1;
+    const double step_s = (1.0 + skipped) / rate_.fps;
+    if (rate_.is_configured && std::abs(since_last_s - step_s) > tolerance_s)
+        return fmt::format("is {:.3f} s after the previous frame; {:g} fps and {} skipped frames require {:.3f} s",
+                           since_last_s, rate_.fps, skipped, step_s);
+    const double elapsed_s = seconds(now_ns) - seconds(started_ns_);
+    if (rate_.is_paced && since_first_s > elapsed_s + head_start_s)
+        return fmt::format("is {:.3f} s after the first frame, but arrived {:.3f} s after the start", since_first_s,
+                           elapsed_s);
+    return {};
+}
+
+void check_markers(ContractChecks &checks, const arhost_record &record, const arhost_intrinsics &intrinsics,
+                   std::span<const arhost_marker_config> listed) {
+    const std::span markers(record.markers, record.marker_count);
+    checks.add("tracker.order", record.sequence, problem_with_order(markers, listed));
+    std::string numbers, pose;
+    for (const arhost_marker &marker : markers) {
+        if (numbers.empty())
+            numbers = problem_with_numbers(marker);
+        const auto known =
+            std::find_if(listed.begin(), listed.end(), [&](const auto &one) { return one.id == marker.id; });
+        if (pose.empty() && marker.state == ARHOST_MARKER_DETECTED && known != listed.end())
+            pose = problem_with_pose(marker, intrinsics, known->side_mm);
+    }
+    checks.add("tracker.numbers", record.sequence, numbers);
+    checks.add("tracker.pose", record.sequence, pose);
+}
+
+std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame) {
+    const std::size_t block = std::max<std::size_t>(bytes.size() / (16 * sample_step), 1);
+    const std::string_view all(reinterpret_cast<const char *>(bytes.data()), bytes.size());
+    std::size_t hash = 0;
+    for (std::size_t at = first_of(frame) * block; at < all.size(); at += sample_step * block)
+        hash = hash * 31 + std::hash<std::string_view>()(all.substr(at, block));
+    return hash;
+}
+
+OverlayChecks::OverlayChecks(const arhost_scene &scene) {
+    const auto is_opaque = [](float alpha) { return alpha * 255 >= 254.5f; };
+    checks_place_ =
+        scene.duration_s == 0 && !is_opaque(scene.shadow_alpha_opaque) && !is_opaque(scene.shadow_alpha_translucent);
+    if (!checks_place_)
+        return;
+    const auto array = [&]<class T>(const arhost_buffer &buffer, const T *) {
+        return std::span(reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset),
+                         buffer.count);
+    };
+    const auto geometries = array(scene.geometries, static_cast<const arhost_geometry *>(nullptr));
+    std::map<std::uint32_t, scene::Box> boxes; // by geometry, which objects may share
+    for (const arhost_object &object : array(scene.objects, static_cast<const arhost_object *>(nullptr))) {
+        const arhost_geometry &geometry = geometries[object.geometry];
+        if (object.role != ARHOST_ROLE_VIRTUAL || geometry.positions.count == 0)
+            continue;
+        const auto [box, is_new] = boxes.try_emplace(object.geometry);
+        if (is_new)
+            box->second = geometry.type == ARHOST_GEOMETRY_SPHERES
+                              ? scene::box_of(array(geometry.positions, static_cast<const glm::vec4 *>(nullptr)))
+                              : scene::box_of(array(geometry.positions, static_cast<const glm::vec3 *>(nullptr)));
+        if (!virtual_box_)
+            virtual_box_.emplace();
+        virtual_box_->include(scene::transformed(object.world_from_object, box->second));
+    }
+}
+
+void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera,
+                          const Region &region, const ImageView &overlay) const {
+    // A distorted lens may map points far outside the image into it (camera/lens.hpp).
+    const bool is_pinhole = camera.intrinsics.distortion == ARHOST_DISTORTION_NONE;
+    const std::optional<Rectangle> rectangle = virtual_box_ ? rectangle_of(*virtual_box_, camera) : Rectangle();
+    const bool can_check_place = checks_place_ && is_pinhole && rectangle;
+    std::string outside_region, misplaced;
+    for (std::uint32_t y = first_of(frame); y < camera.intrinsics.height; y += sample_step) {
+        const std::uint8_t *alpha = overlay.rgba + y * overlay.stride + 3;
+        for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x, alpha += 4) {
+            if (*alpha == 0)
+                continue;
+            const bool in_region = x - region.x < region.width && y - region.y < region.height; // unsigned
+            if (outside_region.empty() && !in_region)
+                outside_region =
+                    fmt::format("pixel ({}, {}): alpha is {} outside the region, which is {} x {} px from "
+                                "({}, {})",
+                                x, y, *alpha, region.width, region.height, region.x, region.y);
+            if (misplaced.empty() && can_check_place && *alpha == 255 && in_region &&
+                (x < rectangle->min.x || x > rectangle->max.x || y < rectangle->min.y || y > rectangle->max.y))
+                misplaced = fmt::format("pixel ({}, {}): alpha is 255, but {}", x, y,
+                                        virtual_box_ ? fmt::format("all virtual objects are between ({:.0f}, {:.0f}) "
+                                                                   "and ({:.0f}, {:.0f})",
+                                                                   rectangle->min.x, rectangle->min.y,
+                                                                   rectangle->max.x, rectangle->max.y)
+                                                     : std::string("there is no virtual object"));
+        }
+    }
+    checks.add("raytracer.region", frame, outside_region);
+    if (can_check_place)
+        checks.add("raytracer.place", frame, misplaced);
+}
+
+} // namespace arhost::host

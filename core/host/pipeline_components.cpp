@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Creates the components of a pipeline: what each is created with, and how the pipeline reacts to its state.
+#include "host/pipeline.hpp"
+
+#include "camera/calibration.hpp"
+
+#include <algorithm>
+
+namespace arhost::host {
+
+using namespace ipc;
+using supervise::Component;
+
+namespace {
+
+constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
+constexpr std::size_t live_sink_depth = 3;
+
+std::shared_ptr<SlotPool> pool_of(const Component &component) {
+    return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
+}
+
+} // namespace
+
+Component::Callbacks Pipeline::common_callbacks(const std::string &name, const yaml::Node &node) {
+    Component::Callbacks callbacks;
+    callbacks.ready = [](const messages::Ready &) { return SlotLayout{}; };
+    callbacks.running = [] {};
+    callbacks.end_requested = [] {};
+    callbacks.stopped = [this, name](arhost_status status, const std::string &text) {
+        if (status != ARHOST_STATUS_OK)
+            fail(name + ": " + (text.empty() ? status_text(status) : text), false);
+    };
+    callbacks.disabled = [this, name, node](const std::string &reason, bool is_configuration_error) {
+        on_disabled(name, node, reason, is_configuration_error);
+    };
+    return callbacks;
+}
+
+void Pipeline::make_source() {
+    const run_config::SourceConfiguration &source = *configuration_.source;
+    Component::Callbacks callbacks = common_callbacks("source", source.node);
+    callbacks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &plugin,
+                                                             std::size_t candidate) mutable {
+        if (std::exchange(last, candidate) != candidate)
+            source_checks_.reset(); // another plugin
+        return Component::Create{
+            {run_config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate),
+             messages::SourceSetup{next_read_ + skipped_, source.fps, live_, configuration_.camera}},
+            {}};
+    };
+    callbacks.ready = [this, &source](const messages::Ready &ready) {
+        if (!ready.format)
+            throw ProtocolViolation("the source's 'ready' lacks the frame format");
+        const arhost_frame_format &format = *ready.format;
+        if (format_ && (format.pixel_format != format_->pixel_format || format.width != format_->width ||
+                        format.height != format_->height))
+            throw std::runtime_error("the frame format differs after the restart");
+        format_ = format;
+        frame_count_ = ready.frame_count;
+        const bool is_live = (source_->description().capabilities & ARHOST_CAPABILITY_LIVE) != 0;
+        if (source.conform && !source_checks_)
+            source_checks_.emplace(SourceChecks::Rate{is_live ? 0 : format.fps, source.fps > 0, live_},
+                                   monotonic_ns());
+        if (configuration_.camera)
+            intrinsics_ = *configuration_.camera;
+        else if (ready.intrinsics)
+            intrinsics_ = *ready.intrinsics;
+        else if (configuration_.tracker)
+            source.node.fail(
+                "this source does not report its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
+        if (configuration_.tracker || configuration_.trajectory) {
+            try {
+                camera::check_size(intrinsics_, format.width, format.height);
+            } catch (const std::runtime_error &error) {
+                configuration_.camera_node.value_or(source.node).fail(error.what());
+            }
+        }
+        return SlotLayout{format.byte_size, source_slot_count};
+    };
+    callbacks.running = [this] { source_slots_ = pool_of(*source_); };
+    callbacks.result = [this](const Command &command, const Result &result) { on_read(command, result); };
+    callbacks.lost = [this](const std::vector<Command> &unanswered) {
+        reads_.clear();
+        source_slots_.reset();
+        for (const Command &command : unanswered)
+            next_read_ = std::min(next_read_, command.sequence);
+        const PluginDescription &plugin = source_->description(); // empty if it died before hello
+        if (next_read_ > 0 && !plugin.id.empty() &&
+            !(plugin.capabilities & (ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE)) && !input_ended_) {
+            input_ended_ = true;
+            fail("source: " + plugin.id + " died, and can't continue at a later frame", false);
+        }
+    };
+    source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, source.policy,
+                                          std::move(callbacks));
+}
+
+// The background of a trajectory without a source.
+void Pipeline::make_black_frames() {
+    intrinsics_ = *configuration_.camera;
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
+    format.width = intrinsics_.width;
+    format.height = intrinsics_.height;
+    format.fps = configuration_.trajectory->fps;
+    arhost_frame_layout(&format); // the configuration has validated the size
+    format_ = format;
+    source_slots_ = std::make_shared<SlotPool>(
+        supervise::make_host_region("arhost-black", {format.byte_size, source_slot_count}));
+}
+
+void Pipeline::load_scene() {
+    const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
+    SceneLoading::Callbacks callbacks;
+    callbacks.loaded = [this](SharedMemory arena) {
+        arena_ = std::move(arena);
+        if (configuration_.raytracer->conform)
+            overlay_checks_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
+        scene_loading_.reset();
+    };
+    callbacks.failed = [this](const std::string &reason) {
+        fail(reason, true);
+        scene_loading_.reset();
+    };
+    scene_loading_ =
+        std::make_unique<SceneLoading>(context_, raytracer.scene, configuration_.sandbox, raytracer.limits.start,
+                                       configuration_.files, std::move(callbacks));
+}
+
+void Pipeline::make_tracker() {
+    const run_config::TrackerConfiguration &tracker = *configuration_.tracker;
+    for (const arhost_marker_config &marker : tracker.markers)
+        marker_ids_.insert(marker.id);
+    Component::Callbacks callbacks = common_callbacks("tracker", tracker.node);
+    callbacks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
+        return Component::Create{{run_config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate),
+                                  messages::TrackerSetup{*format_, intrinsics_, tracker.markers}},
+                                 {}};
+    };
+    callbacks.ready = [](const messages::Ready &) {
+        return SlotLayout{sizeof(arhost_tracker_result), stage_slot_count};
+    };
+    callbacks.running = [this] { tracker_slots_ = pool_of(*tracker_); };
+    callbacks.result = [this](const Command &command, const Result &result) { on_tracked(command, result); };
+    callbacks.lost = [this](const std::vector<Command> &unanswered) {
+        on_stage_lost(unanswered, Frame::Stage::to_track);
+    };
+    tracker_ = std::make_unique<Component>(context_, "tracker", tracker.plugins, tracker.limits, tracker.policy,
+                                           std::move(callbacks));
+}
+
+void Pipeline::make_raytracer() {
+    const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
+    Component::Callbacks callbacks = common_callbacks("raytracer", raytracer.node);
+    callbacks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
+        std::vector<OptionValue> options =
+            run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate);
+        warp_.reset();
+        if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
+            !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION)) {
+            warp_ = std::make_shared<LensWarp>(intrinsics_);
+            context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
+                         plugin.id + " does not support lens distortion: the host distorts its images, which costs "
+                                     "sharpness and time");
+        }
+        const arhost_intrinsics &traced = warp_ ? warp_->pinhole() : intrinsics_;
+        return Component::Create{
+            {std::move(options), messages::RaytracerSetup{format_->width, format_->height, traced}}, arena_.fd()};
+    };
+    callbacks.ready = [this](const messages::Ready &) {
+        return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
+    };
+    callbacks.running = [this] { raytracer_slots_ = pool_of(*raytracer_); };
+    callbacks.result = [this](const Command &command, const Result &result) { on_rendered(command, result); };
+    callbacks.lost = [this](const std::vector<Command> &unanswered) {
+        on_stage_lost(unanswered, Frame::Stage::to_render);
+    };
+    raytracer_ = std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits,
+                                             raytracer.policy, std::move(callbacks));
+}
+
+void Pipeline::make_outputs() {
+    output_slots_ = std::make_shared<SlotPool>(supervise::make_host_region(
+        "arhost-outputs", {OutputSlot::byte_size(format_->width, format_->height),
+                           // Sinks that lag differently hold different frames: enough slots for each of them.
+                           static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
+    for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
+        const run_config::ComponentConfiguration &output = configuration_.outputs[i];
+        std::string name = output.plugins.front().stem().string();
+        if (std::any_of(sinks_.begin(), sinks_.end(),
+                        [&](const auto &sink) { return sink->component->name() == name; }))
+            name += "#" + std::to_string(i);
+        make_sink(output, name);
+    }
+}
+
+void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const std::string &name) {
+    sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
+    SinkQueue *sink = sinks_.back().get();
+    sink->max_waiting = live_ ? live_sink_depth : 0;
+    Component::Callbacks callbacks = common_callbacks(name, output.node);
+    callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
+        if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
+            sink->max_waiting = live_sink_depth; // a window must not delay a video file
+        messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {}};
+        if (configuration_.source && configuration_.source->fps > 0)
+            setup.fps = configuration_.source->fps;
+        if (intrinsics_.width > 0)
+            setup.intrinsics = intrinsics_;
+        return Component::Create{
+            {run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate), std::move(setup)}, {}};
+    };
+    callbacks.result = [this, sink, name](const Command &command, const Result &result) {
+        sink->on_result(command, result);
+        if (result.status == ARHOST_STATUS_END)
+            end_run();
+        if (result.status >= 0 || sink->failed)
+            return;
+        // A retry would not help, e.g. with a full disk: keep the complete files, and continue with the other
+        // outputs.
+        const std::string reason = "can't write frame " + std::to_string(command.sequence) + ": " +
+                                   status_text(result.status) + "; see its messages above";
+        context_.log(ARHOST_SEVERITY_ERROR, name, reason);
+        fail(name + ": " + reason, false);
+        disable_sink(*sink);
+        sink->component->stop();
+    };
+    callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
+    callbacks.end_requested = [this] { end_run(); };
+    callbacks.disabled = [this, sink, name, &output](const std::string &reason, bool is_configuration_error) {
+        on_disabled(name, output.node, reason, is_configuration_error);
+        disable_sink(*sink);
+    };
+    sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, output.policy,
+                                                  std::move(callbacks));
+    sink->component->start();
+}
+
+void Pipeline::disable_sink(SinkQueue &sink) {
+    sink.failed = true;
+    sink.clear();
+    if (phase_ == Phase::running &&
+        std::all_of(sinks_.begin(), sinks_.end(), [](const auto &other) { return other->failed; }))
+        end_run();
+}
+
+void Pipeline::on_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
+                           bool is_configuration_error) {
+    // Errors from the configuration already start with their place in the file.
+    const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--");
+    fail(located ? reason : node.where() + ": " + name + ": " + reason, is_configuration_error);
+    if (phase_ != Phase::running)
+        return;
+    context_.log(ARHOST_SEVERITY_ERROR, name, reason + "; the video continues without it");
+    if (name == "source")
+        input_ended_ = true;
+}
+
+} // namespace arhost::host

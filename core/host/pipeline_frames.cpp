@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Moves frames through the stages of a pipeline: read, track, render, composite.
+#include "host/pipeline.hpp"
+
+#include "camera/mapping.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace arhost::host {
+
+using namespace ipc;
+using supervise::Component;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr std::size_t max_reads_in_flight = 2;
+constexpr std::uint32_t max_attempts = 2; // for a frame whose worker dies
+
+const char *name_of_stage(Frame::Stage waiting) {
+    return waiting == Frame::Stage::to_track ? "tracker" : "raytracer";
+}
+
+} // namespace
+
+bool Pipeline::read() {
+    if (!source_)
+        return read_from_trajectory();
+    if (no_more_frames() || !source_->running() || reads_.size() >= max_reads_in_flight)
+        return false;
+    std::optional<Lease> slot = source_slots_->acquire();
+    if (!slot)
+        return false;
+    Command command{};
+    command.kind = CommandKind::read;
+    command.slot = slot->index();
+    command.sequence = next_read_++;
+    reads_.push_back(std::move(*slot));
+    source_->submit(command);
+    return true;
+}
+
+// Without a source, the frames are those of the trajectory; frames that the recorded run dropped are not traced.
+bool Pipeline::read_from_trajectory() {
+    if (no_more_frames())
+        return false;
+    std::optional<Lease> slot = source_slots_->acquire();
+    if (!slot)
+        return false;
+    const camera::Trajectory &trajectory = *configuration_.trajectory;
+    const camera::TrajectoryFrame *recorded = trajectory.at_or_after(next_read_);
+    if (recorded->frame >= configuration_.frames) { // the configured limit lies within the trajectory
+        input_ended_ = true;
+        return false;
+    }
+    auto frame = std::make_unique<Frame>(recorded->frame);
+    frame->record.clock = trajectory.clock.value_or(ARHOST_CLOCK_MEDIA);
+    frame->record.capture_ns = recorded->capture_ns;
+    frame->pixels = std::move(*slot);
+    next_read_ = recorded->frame + 1;
+    start_frame(std::move(frame));
+    return true;
+}
+
+void Pipeline::on_read(const Command &command, const Result &result) {
+    Lease pixels = std::move(reads_.front());
+    reads_.pop_front();
+    if (command.sequence >= next_read_) // read ahead of a failed frame, which is read again first
+        return;
+    if (result.status == ARHOST_STATUS_END_TRUNCATED && !input_ended_)
+        fail(configuration_.source->node.where() + ": source: its input is truncated; the frames before are kept",
+             false);
+    if (result.status >= ARHOST_STATUS_END || (input_ended_ && result.status < 0)) {
+        input_ended_ = true;
+        return;
+    }
+    if (input_ended_ && interrupted_ && live_)
+        return;
+    if (result.status < 0) {
+        next_read_ = command.sequence; // read again after the restart
+        return source_->end_process(std::string("read failed: ") + status_text(result.status));
+    }
+    auto frame = std::make_unique<Frame>(command.sequence);
+    const std::int64_t arrival_ns = monotonic_ns();
+    if (const char *problem = accept_frame_info(result.frame, last_capture_ns_, arrival_ns, frame->record)) {
+        next_read_ = command.sequence;
+        return source_->end_process(std::string("contract violation: ") + problem);
+    }
+    last_capture_ns_ = result.frame.capture_ns;
+    frame->pixels = std::move(pixels);
+    if (configuration_.source->conform) {
+        source_checks_->check(statistics_.contract_checks, frame->record, result.frame.skipped, arrival_ns);
+        frame->pixels_sample = sample_hash(frame->pixels.bytes(), frame->record.sequence);
+    }
+    frame->times.source = std::chrono::nanoseconds(result.busy_ns);
+    skipped_ += result.frame.skipped;
+    statistics_.dropped["source"] = skipped_;
+    statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
+    start_frame(std::move(frame));
+}
+
+void Pipeline::start_frame(std::unique_ptr<Frame> frame) {
+    frame->received = Clock::now();
+    if (statistics_.frames_in++ == 0)
+        statistics_.first_frame = frame->received;
+    Frame &added = *(frames_[frame->record.sequence] = std::move(frame));
+    if (configuration_.trajectory)
+        set_camera_from_trajectory(added);
+    if (live_ && is_behind())
+        skip(added, "latency");
+    else if (tracker_)
+        enqueue(added, Frame::Stage::to_track);
+    else
+        on_camera_known(added);
+}
+
+bool Pipeline::track() {
+    Frame *frame = next_waiting(Frame::Stage::to_track);
+    if (!frame)
+        return false;
+    if (may_skip(tracker_.get())) {
+        skip(*frame, "tracker");
+        return true;
+    }
+    if (!tracker_->running() || tracker_->in_flight() >= (live_ ? 1u : 2u))
+        return false;
+    std::optional<Lease> slot = tracker_slots_->acquire();
+    if (!slot)
+        return false;
+    frame->result = std::move(*slot);
+    frame->stage = Frame::Stage::tracking;
+    Command command{};
+    command.kind = CommandKind::track;
+    command.slot = frame->result.index();
+    command.input_slot = frame->pixels.index();
+    command.sequence = frame->record.sequence;
+    command.capture_ns = frame->record.capture_ns;
+    command.clock = frame->record.clock;
+    tracker_->submit(command, frame->pixels.region());
+    return true;
+}
+
+// Counts a stage's result and returns its frame, or null if the frame was overtaken or the stage failed.
+Frame *Pipeline::accept_result(const Command &command, const Result &result, const char *stage) {
+    statistics_.stages[stage].add(std::chrono::nanoseconds(result.busy_ns));
+    const auto found = frames_.find(command.sequence);
+    if (found == frames_.end())
+        return nullptr;
+    Frame &frame = *found->second;
+    if (frame.overtaken) {
+        ++statistics_.dropped["late"];
+        frames_.erase(found);
+        return nullptr;
+    }
+    if (result.status < 0) {
+        context_.log(ARHOST_SEVERITY_WARNING, stage,
+                     "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        skip(frame, stage);
+        return nullptr;
+    }
+    return &frame;
+}
+
+void Pipeline::on_tracked(const Command &command, const Result &result) {
+    Frame *accepted = accept_result(command, result, "tracker");
+    if (!accepted)
+        return;
+    Frame &frame = *accepted;
+    frame.attempts = 0;
+    const char *problem = accept_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
+    frame.result = Lease();
+    if (problem) {
+        skip(frame, "tracker");
+        return tracker_->end_process(std::string("contract violation: ") + problem);
+    }
+    if (configuration_.tracker->conform)
+        check_markers(statistics_.contract_checks, frame.record, intrinsics_, configuration_.tracker->markers);
+    frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
+    set_camera_from_markers(frame);
+    on_camera_known(frame);
+}
+
+void Pipeline::set_camera_from_markers(Frame &frame) {
+    // The first visible marker in the order of the configuration, in which trackers report them.
+    const std::span markers(frame.record.markers, frame.record.marker_count);
+    const auto anchor = std::find_if(markers.begin(), markers.end(),
+                                     [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
+    statistics_.tracked += anchor != markers.end();
+    if (configuration_.trajectory)
+        return;
+    const std::uint64_t sequence = frame.record.sequence;
+    if (anchor != markers.end())
+        last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
+    if (!last_camera_ || sequence - last_camera_->first > configuration_.tracker->hold_frames)
+        return;
+    frame.held = last_camera_->first != sequence;
+    frame.record.camera = last_camera_->second;
+    frame.record.has_camera = 1;
+}
+
+// Also restores the recorded time, which determines the positions of animated objects. A frame that the recorded run
+// dropped has no camera.
+void Pipeline::set_camera_from_trajectory(Frame &frame) const {
+    const camera::Trajectory &trajectory = *configuration_.trajectory;
+    const camera::TrajectoryFrame *recorded = trajectory.at_or_after(frame.record.sequence);
+    if (!recorded || recorded->frame != frame.record.sequence)
+        return;
+    if (trajectory.clock) {
+        frame.record.clock = *trajectory.clock;
+        frame.record.capture_ns = recorded->capture_ns;
+    }
+    if (recorded->view) {
+        frame.record.camera = camera::camera_of(*recorded->view, intrinsics_);
+        frame.record.has_camera = 1;
+    }
+}
+
+void Pipeline::on_camera_known(Frame &frame) {
+    if (raytracer_ && frame.record.has_camera)
+        enqueue(frame, Frame::Stage::to_render);
+    else
+        frame.stage = Frame::Stage::done;
+}
+
+bool Pipeline::render() {
+    Frame *frame = next_waiting(Frame::Stage::to_render);
+    if (!frame)
+        return false;
+    if (may_skip(raytracer_.get())) {
+        skip(*frame, "raytracer");
+        return true;
+    }
+    if (!raytracer_->running() || raytracer_->in_flight() >= (live_ ? 1u : 2u))
+        return false;
+    std::optional<Lease> slot = raytracer_slots_->acquire();
+    if (!slot)
+        return false;
+    frame->overlay = std::move(*slot);
+    frame->stage = Frame::Stage::rendering;
+    Command command{};
+    command.kind = CommandKind::render;
+    command.slot = frame->overlay.index();
+    command.sequence = frame->record.sequence;
+    command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
+    command.camera = frame->record.camera;
+    if (warp_)
+        command.camera.intrinsics = warp_->pinhole();
+    frame->warp = warp_;
+    raytracer_->submit(command);
+    return true;
+}
+
+void Pipeline::on_rendered(const Command &command, const Result &result) {
+    const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
+    if (device.count())
+        statistics_.stages["device"].add(device);
+    Frame *accepted = accept_result(command, result, "raytracer");
+    if (!accepted)
+        return;
+    Frame &frame = *accepted;
+    frame.render = result.render;
+    frame.times.raytracer = busy;
+    frame.times.device = device;
+    frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
+    frame.stage = Frame::Stage::done;
+    if (overlay_checks_) {
+        overlay_checks_->check(statistics_.contract_checks, command.sequence, command.camera,
+                               region_of(frame.render, format_->width, format_->height), overlay_of(frame));
+        frame.overlay_sample = sample_hash(frame.overlay.bytes(), command.sequence);
+    }
+}
+
+ImageView Pipeline::overlay_of(const Frame &frame) const {
+    return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
+}
+
+// Buffers must not change after hand-over.
+void Pipeline::check_buffers_unmodified(const Frame &frame) {
+    const std::uint64_t sequence = frame.record.sequence;
+    if (frame.pixels_sample)
+        statistics_.contract_checks.add("source.frame-stays", sequence,
+                                        sample_hash(frame.pixels.bytes(), sequence) == frame.pixels_sample
+                                            ? ""
+                                            : "the frame changed after hand-over");
+    if (frame.overlay_sample && frame.overlay)
+        statistics_.contract_checks.add("raytracer.image-stays", sequence,
+                                        sample_hash(frame.overlay.bytes(), sequence) == frame.overlay_sample
+                                            ? ""
+                                            : "the image changed after hand-over");
+}
+
+void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stage waiting) {
+    (waiting == Frame::Stage::to_track ? tracker_slots_ : raytracer_slots_).reset();
+    for (const Command &command : unanswered) {
+        const auto found = frames_.find(command.sequence);
+        if (found == frames_.end())
+            continue;
+        Frame &frame = *found->second;
+        frame.result = Lease();
+        frame.overlay = Lease();
+        // The worker was executing the oldest command when it died.
+        const bool was_executing = &command == &unanswered.front();
+        if (frame.overtaken)
+            frames_.erase(found);
+        else if (live_ || (was_executing && ++frame.attempts >= max_attempts))
+            skip(frame, name_of_stage(waiting));
+        else
+            frame.stage = waiting;
+    }
+}
+
+bool Pipeline::may_skip(const Component *stage) const {
+    return live_ ? !stage->running() : stage->state() == Component::State::disabled;
+}
+
+bool Pipeline::is_behind() const {
+    const Clock::time_point limit = Clock::now() - configuration_.max_latency;
+    return std::any_of(frames_.begin(), frames_.end(), [&](const auto &entry) {
+        return entry.second->in_worker() && entry.second->received < limit;
+    });
+}
+
+void Pipeline::skip(Frame &frame, const char *stage) {
+    frame.result = Lease();
+    frame.overlay = Lease();
+    frame.record.overlay = ARHOST_OVERLAY_NONE;
+    frame.stage = Frame::Stage::done;
+    ++statistics_.skipped[stage];
+}
+
+// In mode live, a frame replaces an older one that waits for the same stage.
+void Pipeline::enqueue(Frame &frame, Frame::Stage stage) {
+    if (live_)
+        for (auto it = frames_.begin(); it != frames_.end();) {
+            const bool replaced = it->second->stage == stage && it->second.get() != &frame;
+            if (replaced)
+                ++statistics_.dropped[name_of_stage(stage)];
+            it = replaced ? frames_.erase(it) : std::next(it);
+        }
+    frame.stage = stage;
+}
+
+Frame *Pipeline::next_waiting(Frame::Stage stage) {
+    for (const auto &[sequence, frame] : frames_)
+        if (frame->stage == stage)
+            return frame.get();
+    return nullptr;
+}
+
+bool Pipeline::compose() {
+    // The oldest frame; in mode live the newest one that is done.
+    auto ready = frames_.begin();
+    if (live_)
+        for (auto it = frames_.begin(); it != frames_.end(); ++it)
+            if (it->second->stage == Frame::Stage::done)
+                ready = it;
+    if (ready == frames_.end() || ready->second->stage != Frame::Stage::done)
+        return false;
+    const bool has_sink = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->failed; });
+    bool is_shown = true;
+    if (has_sink) {
+        std::optional<Lease> slot = output_slots_->acquire();
+        if (!slot && !live_)
+            return false; // waits for the outputs, and so does the source
+        is_shown = slot.has_value();
+        if (slot) {
+            auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
+            compose(*ready->second, output->slot.bytes());
+            for (const auto &sink : sinks_)
+                sink->offer(output);
+            for (const auto &sink : sinks_)
+                sink->pump();
+        } else {
+            ++statistics_.dropped["output"];
+        }
+    }
+    const std::uint64_t sequence = ready->first;
+    statistics_.composited += is_shown;
+    statistics_.augmented += is_shown && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
+    statistics_.last_frame = Clock::now();
+    const Clock::duration latency = statistics_.last_frame - ready->second->received;
+    statistics_.stages["latency"].add(latency);
+    if (configuration_.timeline && is_shown) {
+        FrameTimes &times = statistics_.timeline.emplace_back(ready->second->times);
+        times.frame = sequence;
+        times.shown = statistics_.last_frame;
+        times.latency = latency;
+    }
+    frames_.erase(ready);
+    if (live_)
+        drop_overtaken(sequence);
+    on_progress_({statistics_.composited, configuration_.frames ? configuration_.frames : frame_count_, false});
+    return true;
+}
+
+void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
+    check_buffers_unmodified(frame);
+    const Clock::time_point begin = Clock::now();
+    const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
+    const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
+    for (std::uint32_t i = 0; i < format_->plane_count; ++i)
+        planes[i] = pixels + format_->offset[i];
+    ImageView overlay;
+    Region region;
+    if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
+        overlay = overlay_of(frame);
+        region = region_of(frame.render, format_->width, format_->height);
+        if (frame.warp) {
+            overlay = frame.warp->bend(overlay, region);
+            region = {0, 0, format_->width, format_->height};
+        }
+    }
+    // Copies only the used markers.
+    const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
+    std::memcpy(slot.data(), &frame.record, used);
+    composite(*format_, planes, overlay, region,
+              {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
+               OutputSlot::stride(format_->width)});
+    frame.times.composite = Clock::now() - begin;
+    statistics_.stages["composite"].add(frame.times.composite);
+}
+
+void Pipeline::drop_overtaken(std::uint64_t shown) {
+    for (auto it = frames_.begin(); it != frames_.end() && it->first < shown;) {
+        it->second->overtaken = it->second->in_worker();
+        statistics_.dropped["late"] += !it->second->in_worker();
+        it = it->second->in_worker() ? std::next(it) : frames_.erase(it);
+    }
+}
+
+} // namespace arhost::host

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/contract_checks.hpp"
+
+#include "camera/lens.hpp"
+#include "scene/arena.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <vector>
+
+using namespace arhost;
+using namespace arhost::host;
+using testing::HasSubstr;
+
+namespace {
+
+constexpr arhost_intrinsics lens{
+    sizeof(arhost_intrinsics), 640, 480, ARHOST_DISTORTION_NONE, 600, 610, 330, 235, 0, 0, {}};
+constexpr arhost_marker_config listed[] = {{sizeof(arhost_marker_config), 4, 80},
+                                           {sizeof(arhost_marker_config), 7, 40}};
+
+// Seen from the front, half a metre away.
+arhost_marker marker(int id, double side_mm) {
+    arhost_marker m{};
+    m.id = id;
+    m.state = ARHOST_MARKER_DETECTED;
+    m.mt[0] = m.mt[5] = m.mt[10] = m.mt[15] = 1;
+    m.mt[12] = 20;
+    m.mt[14] = -500;
+    const double s = side_mm / 2, corners[4][2] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}};
+    for (int i = 0; i < 4; ++i) {
+        const auto at = camera::project(lens, {corners[i][0] + 20, -corners[i][1], 500});
+        m.corners_px[i][0] = at->x;
+        m.corners_px[i][1] = at->y;
+    }
+    return m;
+}
+
+arhost_record record(std::initializer_list<arhost_marker> markers) {
+    arhost_record r{};
+    r.sequence = 12;
+    for (const arhost_marker &m : markers)
+        r.markers[r.marker_count++] = m;
+    return r;
+}
+
+std::string violations(const ContractChecks &checks) {
+    std::string text;
+    for (const auto &[name, check] : checks.all())
+        if (check.violations > 0)
+            text += name + ": " + check.first_violation;
+    return text;
+}
+
+std::string violations_of(std::initializer_list<arhost_marker> markers) {
+    ContractChecks checks;
+    check_markers(checks, record(markers), lens, listed);
+    return violations(checks);
+}
+
+constexpr std::int64_t ms = 1'000'000;
+struct Time {
+    std::int64_t capture_ns;
+    std::uint32_t skipped = 0;
+};
+// Frames from 0 on that come at `now_ns`, of a source that was started at 0.
+std::string violations_of_times(const SourceChecks::Rate &rate, arhost_clock clock, const std::vector<Time> &times,
+                                std::int64_t now_ns) {
+    SourceChecks source(rate, 0);
+    ContractChecks checks;
+    arhost_record r{};
+    r.clock = clock;
+    for (const Time &time : times) {
+        r.capture_ns = time.capture_ns;
+        source.check(checks, r, time.skipped, now_ns);
+        ++r.sequence;
+    }
+    return violations(checks);
+}
+
+arhost_marker altered(void (*alter)(arhost_marker &)) {
+    arhost_marker m = marker(4, 80);
+    alter(m);
+    return m;
+}
+
+// A ball of 10 mm radius at the origin, seen from 200 mm in front of it.
+struct View {
+    explicit View(std::optional<arhost_role> role = ARHOST_ROLE_VIRTUAL)
+        : scene(scene_with(role)), pixels(640 * 480 * 4) {}
+    static scene::Arena scene_with(std::optional<arhost_role> role) {
+        scene::ArenaBuilder builder;
+        if (role)
+            builder.add_object("ball", builder.add_spheres({{0, 0, 0, 10}}), builder.add_material(arhost_material{}),
+                               *role);
+        return std::move(builder).build();
+    }
+    arhost_camera camera{sizeof(arhost_camera), 0, {0, -200, 0}, {0, 0, 0}, {0, 0, 1}, lens};
+    scene::Arena scene;
+    std::vector<std::uint8_t> pixels;
+
+    void set(std::uint32_t x, std::uint32_t y, int alpha) {
+        pixels[4 * (640 * y + x) + 3] = static_cast<std::uint8_t>(alpha);
+    }
+    std::string violations(const Region &region = {0, 0, 640, 480}) const {
+        const OverlayChecks overlay(scene.scene());
+        ContractChecks checks;
+        for (std::uint64_t frame = 0; frame < 16; ++frame) // each row once
+            overlay.check(checks, frame, camera, region, {pixels.data(), 640 * 4});
+        return ::violations(checks);
+    }
+};
+
+} // namespace
+
+TEST(ContractChecks, CountFramesAndReportTheFirstViolation) {
+    std::vector<std::string> reported;
+    ContractChecks checks(
+        [&](const std::string &name, const std::string &sentence) { reported.push_back(name + " " + sentence); });
+    checks.add("a.b", 1, "");
+    checks.add("a.b", 2, "is wrong");
+    checks.add("a.b", 3, "is wrong again");
+    EXPECT_EQ(checks.all().at("a.b").checked, 3u);
+    EXPECT_EQ(checks.all().at("a.b").violations, 2u);
+    EXPECT_EQ(checks.all().at("a.b").first_violation, "frame 2: is wrong");
+    EXPECT_THAT(reported, testing::ElementsAre("a.b frame 2: is wrong"));
+}
+
+TEST(MarkerChecks, PassForACorrectTracker) {
+    EXPECT_EQ(violations_of({}), "");
+    EXPECT_EQ(violations_of({marker(4, 80), marker(7, 40)}), "");
+    EXPECT_EQ(violations_of({marker(7, 40)}), "");
+    // An error of a tenth of a pixel, reported as such.
+    EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
+                  m.corners_px[0][0] += 0.2;
+                  m.reprojection_px = 0.1;
+              })}),
+              "");
+    // A predicted marker has no detected corners.
+    EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
+                  m.state = ARHOST_MARKER_PREDICTED;
+                  m.age_frames = 2;
+                  m.mt[12] += 100;
+              })}),
+              "");
+}
+
+TEST(MarkerChecks, FailForAWrongTracker) {
+    EXPECT_EQ(violations_of({marker(7, 40), marker(4, 80)}),
+              "tracker.order: frame 12: marker 4 is not in the order of the configuration's list");
+    const auto expect = [](void (*alter)(arhost_marker &), const char *expected) {
+        EXPECT_THAT(violations_of({altered(alter)}), HasSubstr(expected));
+    };
+    expect([](arhost_marker &m) { m.ambiguity = 1.5; }, "tracker.numbers: frame 12: marker 4 has the ambiguity 1.5");
+    expect([](arhost_marker &m) { m.reprojection_px = -1; }, "which must not be negative");
+    expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is detected, but its age is 3 frames");
+    expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
+    expect([](arhost_marker &m) { m.mt[14] = -0.5; },
+           "tracker.pose: frame 12: marker 4: its reprojection error is reported as 0.000 px"); // metres
+    expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
+    expect([](arhost_marker &m) { m.reprojection_px = 1; },
+           "its reprojection error is reported as 1.000 px and is 0.000 px");
+    expect([](arhost_marker &m) { m.corners_px[1][0] = 1e200; },
+           "its reprojection error is reported as 0.000 px and is inf px");
+    EXPECT_THAT(violations_of({marker(4, 40)}), HasSubstr("its reprojection error is reported as 0.000 px and is "))
+        << "half the side";
+}
+
+TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
+    const auto captured = [](arhost_clock clock, std::int64_t capture_ns) {
+        return violations_of_times({}, clock, {{capture_ns}}, 100'000'000'000);
+    };
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 99'990'000'000), "");
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
+              "source.capture-time: frame 0: was captured 0.250 s after its arrival");
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "any delay is allowed";
+    EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, INT64_MIN), "");
+    EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "media time is unrelated to the current time";
+    EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, -500'000'000),
+              "source.capture-time: frame 0: has the media time -0.500 s, which must not be negative");
+}
+
+TEST(SourceChecks, RequireASingleClock) {
+    SourceChecks source({}, 0);
+    ContractChecks checks;
+    for (const arhost_clock clock : {ARHOST_CLOCK_MEDIA, ARHOST_CLOCK_MONOTONIC, ARHOST_CLOCK_MEDIA}) {
+        arhost_record r = record({});
+        r.clock = clock;
+        source.check(checks, r, 0, 0);
+    }
+    EXPECT_EQ(violations(checks), "source.clock: frame 12: has the clock 1, earlier frames had 2");
+    EXPECT_EQ(checks.all().at("source.clock").violations, 1u);
+}
+
+TEST(SourceChecks, RequireTheConfiguredRate) {
+    const auto configured = [](std::initializer_list<Time> times) {
+        return violations_of_times({10, true, false}, ARHOST_CLOCK_MEDIA, times, 0);
+    };
+    EXPECT_EQ(configured({{0}, {100 * ms}, {200 * ms}}), "");
+    EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "it may start at any time";
+    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count";
+    EXPECT_EQ(
+        configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
+        "source.rate: frame 2: is 0.400 s after the previous frame; 10 fps and 0 skipped frames require 0.100 s");
+    EXPECT_THAT(configured({{0}, {0}}), HasSubstr("is 0.000 s after the previous frame"));
+    EXPECT_THAT(configured({{0}, {100 * ms, 1}}), HasSubstr("1 skipped frames require 0.200 s"));
+}
+
+TEST(SourceChecks, AllowUnevenTimesOfAFilm) {
+    EXPECT_EQ(violations_of_times({10, false, false}, ARHOST_CLOCK_MEDIA, {{0}, {1}, {60'000 * ms}}, 0), "");
+}
+
+TEST(SourceChecks, RequireRealTimeInModeLive) {
+    const auto live = [](std::initializer_list<Time> times) {
+        return violations_of_times({10, false, true}, ARHOST_CLOCK_MEDIA, times, 2000 * ms);
+    };
+    EXPECT_EQ(live({{0}, {100 * ms}, {1000 * ms}}), "");
+    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}),
+              "source.rate: frame 2: is 10.000 s after the first frame, but arrived 2.000 s after the start");
+}
+
+TEST(SourceChecks, DoNotCheckTheRateOfALiveSource) {
+    EXPECT_EQ(violations_of_times({}, ARHOST_CLOCK_MEDIA, {{0}, {1}, {3'600'000 * ms}}, 0), "");
+}
+
+TEST(SampleHash, DetectsAnyChangeWithinSixteenFrames) {
+    std::vector<std::byte> bytes(300'000);
+    const auto samples = [&] {
+        std::vector<std::size_t> all;
+        for (std::uint64_t frame = 0; frame < 16; ++frame)
+            all.push_back(sample_hash(bytes, frame));
+        return all;
+    };
+    const auto before = samples();
+    EXPECT_EQ(samples(), before);
+    for (const std::size_t at : {std::size_t{0}, std::size_t{123'456}, bytes.size() - 1}) {
+        bytes[at] ^= std::byte{1};
+        EXPECT_NE(samples(), before) << at;
+        bytes[at] ^= std::byte{1};
+    }
+}
+
+TEST(OverlayChecks, PassForACorrectRayTracer) {
+    View view;
+    view.set(330, 235, 255); // the ball's centre
+    view.set(330, 206, 90);  // its edge: 10 mm are 30 px
+    view.set(10, 10, 153);   // a shadow somewhere else
+    EXPECT_EQ(view.violations(), "");
+}
+
+TEST(OverlayChecks, FailOutsideTheRegionAndTheObjects) {
+    View view;
+    view.set(100, 50, 255);
+    EXPECT_EQ(view.violations({300, 200, 60, 70}),
+              "raytracer.region: frame 2: pixel (100, 50): alpha is 255 outside the region, which is 60 x 70 px from "
+              "(300, 200)");
+    EXPECT_EQ(view.violations(),
+              "raytracer.place: frame 2: pixel (100, 50): alpha is 255, but all virtual objects are "
+              "between (297, 201) and (363, 269)");
+}
+
+TEST(OverlayChecks, DoNotTreatACatcherAsAVirtualObject) {
+    View view(ARHOST_ROLE_CATCHER);
+    view.set(330, 235, 255);
+    EXPECT_THAT(view.violations(), HasSubstr("alpha is 255, but there is no virtual object"));
+    View empty(std::nullopt);
+    empty.set(330, 235, 153);
+    EXPECT_EQ(empty.violations(), "");
+}
+
+TEST(OverlayChecks, SkipPlacesBehindTheCamera) {
+    View view;
+    view.camera.eye[1] = -5; // inside the ball
+    view.set(1, 1, 255);
+    EXPECT_EQ(view.violations(), "");
+}

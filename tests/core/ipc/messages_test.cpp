@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/messages.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost;
+using namespace arhost::ipc;
+using testing::HasSubstr;
+
+namespace {
+
+// As if sent through the channel.
+template <class T> T sent(const T &message) {
+    const Message received{Json::parse(encode(message).dump()), {}};
+    EXPECT_TRUE(is<T>(received));
+    return parse<T>(received);
+}
+
+template <class T> std::string violation(Json body) {
+    body["type"] = T::type;
+    try {
+        parse<T>(Message{body, {}});
+        return "none";
+    } catch (const ProtocolViolation &error) {
+        return error.what();
+    }
+}
+
+arhost_intrinsics lens() {
+    arhost_intrinsics intrinsics{};
+    intrinsics.struct_size = sizeof intrinsics;
+    intrinsics.width = 64;
+    intrinsics.height = 48;
+    intrinsics.fx = intrinsics.fy = 60;
+    intrinsics.distortion = ARHOST_DISTORTION_NONE;
+    return intrinsics;
+}
+
+arhost_frame_format format() {
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
+    format.width = 64;
+    format.height = 48;
+    arhost_frame_layout(&format);
+    return format;
+}
+
+} // namespace
+
+TEST(Messages, PreserveTheSetupOfEachKind) {
+    const std::vector<OptionValue> options = {{"gain", ARHOST_OPTION_REAL, 0, 0.1, ""},
+                                              {"name", ARHOST_OPTION_TEXT, 0, 0, "ä\"\n"}};
+    const auto source = sent(messages::Create{options, messages::SourceSetup{7, 29.97, true, lens()}});
+    EXPECT_EQ(source.options.at(0).real, 0.1);
+    EXPECT_EQ(source.options.at(1).text, "ä\"\n");
+    const auto &source_setup = std::get<messages::SourceSetup>(source.setup);
+    EXPECT_EQ(source_setup.first_sequence, 7u);
+    EXPECT_EQ(source_setup.fps, 29.97);
+    EXPECT_TRUE(source_setup.paced);
+    EXPECT_EQ(source_setup.intrinsics.value().fx, 60);
+    const auto tracker =
+        sent(messages::Create{{}, messages::TrackerSetup{format(), lens(), {{sizeof(arhost_marker_config), 3, 80}}}});
+    const auto &tracker_setup = std::get<messages::TrackerSetup>(tracker.setup);
+    EXPECT_EQ(tracker_setup.format.byte_size, 64u * 48);
+    EXPECT_EQ(tracker_setup.markers.at(0).id, 3);
+    EXPECT_EQ(tracker_setup.markers.at(0).side_mm, 80);
+    const auto raytracer = sent(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}});
+    EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).height, 48u);
+    const auto sink = sent(messages::Create{{}, messages::SinkSetup{64, 48, 25, 12, {}}});
+    EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).first_sequence, 12u);
+    EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).intrinsics, std::nullopt);
+}
+
+TEST(Messages, PreserveThePolicyAndTheSlotLayout) {
+    sandbox::Policy policy;
+    policy.mode = sandbox::Mode::strict;
+    policy.allow = {"gpu"};
+    policy.memory_bytes = 1 << 20;
+    const auto open = sent(messages::Open{"plugin.so", policy});
+    EXPECT_EQ(open.plugin, "plugin.so");
+    EXPECT_EQ(open.sandbox.mode, sandbox::Mode::strict);
+    EXPECT_TRUE(open.sandbox.allows("gpu"));
+    EXPECT_EQ(open.sandbox.memory_bytes, 1u << 20);
+    const auto attach = sent(messages::Attach{true, 5, {1000, 4}});
+    EXPECT_TRUE(attach.is_output);
+    EXPECT_EQ(attach.generation, 5u);
+    EXPECT_EQ(attach.layout.slot_size, 1000u);
+    EXPECT_EQ(attach.layout.count, 4u);
+}
+
+TEST(Messages, PreserveWhatAWorkerReports) {
+    messages::Hello hello;
+    hello.descriptor.kind = ARHOST_KIND_TRACKER;
+    hello.descriptor.id = "tracker_x";
+    hello.descriptor.options = {{"a", ARHOST_OPTION_TEXT, "x", 0, 0, {"x", "y"}, "help"},
+                                {"b", ARHOST_OPTION_INTEGER, std::nullopt, 1, 9, {}, ""}};
+    hello.sandbox = "level";
+    const auto received = sent(hello);
+    EXPECT_EQ(received.descriptor.id, "tracker_x");
+    EXPECT_EQ(received.descriptor.options.at(0).default_value, "x");
+    EXPECT_EQ(received.descriptor.options.at(0).choices.size(), 2u);
+    EXPECT_EQ(received.descriptor.options.at(1).default_value, std::nullopt);
+    EXPECT_EQ(received.sandbox, "level");
+    EXPECT_EQ(sent(messages::Ready{format(), 30, lens()}).format.value().width, 64u);
+    EXPECT_EQ(sent(messages::Ready{}).format, std::nullopt);
+    EXPECT_EQ(sent(messages::Devices{}).list.has_value(), false);
+    EXPECT_EQ(sent(messages::Devices{DeviceList{{{1, ARHOST_DEVICE_CPU, true, "n", "u", "a"}}, 2}}).list->left_out,
+              2u);
+    EXPECT_EQ(sent(messages::Stopped{ARHOST_STATUS_ERROR_IO, "disk"}).status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(sent(messages::Failed{ARHOST_STATUS_ERROR_CONFIGURATION, "why"}).text, "why");
+    EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
+}
+
+TEST(Messages, WithMissingOrMistypedFieldsViolateTheProtocol) {
+    EXPECT_THAT(violation<messages::Log>({{"severity", 1}}), HasSubstr("malformed message 'log': "));
+    EXPECT_THAT(violation<messages::Log>({{"severity", "high"}, {"text", ""}}), HasSubstr("malformed message 'log'"));
+    EXPECT_THAT(violation<messages::Hello>({{"descriptor", 5}, {"sandbox", ""}}), HasSubstr("'hello'"));
+    EXPECT_THAT(violation<messages::Ready>(Json::object()), HasSubstr("'ready'"));
+    EXPECT_THAT(violation<messages::Attached>({{"is_output", "yes"}, {"generation", 1}}), HasSubstr("'attached'"));
+    EXPECT_THAT(violation<messages::Stopped>({{"status", 1}}), HasSubstr("'stopped'"));
+    EXPECT_THAT(violation<messages::Reads>({{"path", 7}, {"node", "1:2"}}), HasSubstr("'reads'"));
+    Json create = encode(messages::Create{{}, messages::SinkSetup{}});
+    create["kind"] = 4;
+    EXPECT_EQ(violation<messages::Create>(create), "unknown kind of setup");
+}
