@@ -183,7 +183,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
 }
 
 void Pipeline::set_camera_from_markers(Frame &frame) {
-    // The first visible marker in the order of the configuration, in which trackers report them.
+    // The first marker that is not lost, in the order of the configuration, in which trackers report them.
     const std::span markers(frame.record.markers, frame.record.marker_count);
     const auto anchor = std::find_if(markers.begin(), markers.end(),
                                      [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });

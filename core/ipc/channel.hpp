@@ -29,7 +29,7 @@ enum class ReceiveState {
     malformed // too large, not a JSON object, or without "type"
 };
 
-// Each call chooses whether it blocks. O_NONBLOCK would not do: it is a flag of one end only.
+// Each call chooses whether it blocks, with MSG_DONTWAIT instead of O_NONBLOCK.
 class Channel {
 public:
     static constexpr std::size_t max_message_size = 128 * 1024;

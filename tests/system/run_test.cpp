@@ -434,6 +434,6 @@ TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {
                  "0, 0]}}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("rt_counter can't trace through a distorted lens: its images are bent"));
+    EXPECT_THAT(run.output(), HasSubstr("rt_counter does not support lens distortion: the host distorts its images"));
     expect_every_frame_augmented(run, 5);
 }

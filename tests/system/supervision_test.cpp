@@ -266,9 +266,9 @@ TEST_P(FatalError, RestartsTheWorker) {
     ASSERT_EQ(run.run(), 0) << run.output();
     expect_all_frames_in_order(run, 40);
     EXPECT_THAT(run.output(),
-                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 15; starting it")));
+                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 15; restarting it")));
     EXPECT_THAT(run.output(),
-                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 25; starting it")));
+                testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 25; restarting it")));
     for (const CountedLine &line : counted(run))
         EXPECT_EQ(line.overlay == "none", line.sequence == 15 || line.sequence == 25) << line.sequence;
     for (const char *component : {"tracker", "raytracer"})

@@ -42,6 +42,14 @@ struct Conversation {
     }
 };
 
+// Of source_counter, whose options are integers.
+std::vector<OptionValue> default_options(const messages::Hello &hello) {
+    std::vector<OptionValue> values;
+    for (const OptionDeclaration &o : hello.descriptor.options)
+        values.push_back({o.key, o.type, std::atoi(o.default_value->c_str()), 0.0, ""});
+    return values;
+}
+
 } // namespace
 
 TEST(Worker, ListsDevicesRepeatedlyBeforeCreate) {
@@ -52,10 +60,7 @@ TEST(Worker, ListsDevicesRepeatedlyBeforeCreate) {
         worker.process.send(messages::ListDevices{});
         EXPECT_EQ(worker.next<messages::Devices>().value().list.value().devices.size(), 2u);
     }
-    std::vector<OptionValue> values;
-    for (const OptionDeclaration &o : hello->descriptor.options)
-        values.push_back({o.key, o.type, std::atoi(o.default_value->c_str()), 0.0, ""});
-    worker.process.send(messages::Create{std::move(values), messages::SourceSetup{}});
+    worker.process.send(messages::Create{default_options(*hello), messages::SourceSetup{}});
     EXPECT_TRUE(worker.next<messages::Ready>().value().format);
 }
 
@@ -81,7 +86,8 @@ TEST(Worker, ReportsACrashWhileListingDevices) {
 
 TEST(Worker, ExitsIfTheSetupIsForAnotherKind) {
     Conversation worker("source_counter");
-    ASSERT_TRUE(worker.next<messages::Hello>());
-    worker.process.send(messages::Create{{}, messages::SinkSetup{}});
+    const auto hello = worker.next<messages::Hello>();
+    ASSERT_TRUE(hello);
+    worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{}});
     EXPECT_FALSE(worker.next<messages::Ready>());
 }

@@ -91,7 +91,7 @@ static inline void misbehave_message(uint32_t seed, int with_descriptors) {
                                         "{\"type\": \"log\", \"severity\": [], \"text\": {}}",
                                         "{\"type\": \"hello\", \"descriptor\": 7}",
                                         "{\"type\": \"ready\"}",
-                                        "{\"type\": \"attached\", \"role\": \"output\", \"generation\": 99}",
+                                        "{\"type\": \"attached\", \"is_output\": true, \"generation\": 99}",
                                         "{\"type\": \"stopped\", \"status\": 1, \"text\": \"\"}",
                                         "[[[[[[[[[[[[[[[["};
     const size_t count = sizeof texts / sizeof *texts;

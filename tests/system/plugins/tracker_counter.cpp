@@ -91,7 +91,7 @@ private:
     void seal_output() const {
         constexpr int control = 3;
         const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
-        say(R"({"type": "ready"})");
+        say(R"({"type": "ready", "format": null, "frame_count": 0, "intrinsics": null})");
         char text[4096];
         iovec part{text, sizeof text};
         alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))];
@@ -105,7 +105,7 @@ private:
             std::memcpy(&memory, CMSG_DATA(CMSG_FIRSTHDR(&message)), sizeof memory);
         if (::fcntl(memory, F_ADD_SEALS, seal_ == "seal" ? F_SEAL_SEAL : F_SEAL_WRITE) != 0)
             std::abort();
-        say(R"({"type": "attached", "role": "output", "generation": 1})");
+        say(R"({"type": "attached", "is_output": true, "generation": 1})");
     }
 
     Host host_;
