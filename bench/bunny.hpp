@@ -3,6 +3,7 @@
 // What the ray tracer's benchmarks share: the mesh, and a host that only prints.
 #pragma once
 
+#include "scene/arena.hpp"
 #include "scene/mesh_loader.hpp"
 
 #include <arhost/plugin.h>
