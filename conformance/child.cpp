@@ -6,11 +6,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <system_error>
 #include <unistd.h>
 
@@ -105,6 +108,43 @@ Result run(const Test &test, const Subject &subject, Context &context) {
 std::filesystem::path default_reference() {
     const std::filesystem::path own_folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
     return (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+}
+
+Pipe::Pipe() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0)
+        base::throw_errno("pipe2");
+    read_end.reset(ends[0]);
+    write_end.reset(ends[1]);
+}
+
+pid_t start_process(std::vector<std::string> arguments, const std::vector<std::pair<int, int>> &descriptors,
+                    const std::function<void()> &prepare) {
+    std::vector<char *> argv;
+    argv.reserve(arguments.size() + 1);
+    for (std::string &argument : arguments)
+        argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    std::array<int, 8> high{};
+    const pid_t parent = ::getpid();
+    const pid_t pid = ::fork();
+    if (pid < 0)
+        base::throw_errno("fork");
+    if (pid > 0)
+        return pid;
+    // A plugin may have started threads: only async-signal-safe calls until exec.
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) // the parent died before prctl
+        ::_exit(127);
+    // Move the descriptors out of the way of their numbers first; dup2 clears close-on-exec.
+    for (std::size_t i = 0; i < descriptors.size(); ++i)
+        high.at(i) = ::fcntl(descriptors[i].first, F_DUPFD_CLOEXEC, 10);
+    for (std::size_t i = 0; i < descriptors.size(); ++i)
+        if (high.at(i) < 0 || ::dup2(high.at(i), descriptors[i].second) < 0)
+            ::_exit(127);
+    prepare();
+    ::execv("/proc/self/exe", argv.data());
+    ::_exit(127);
 }
 
 int run_child(const std::string &name, const Subject &subject) {

@@ -82,52 +82,15 @@ private:
     std::filesystem::path path_;
 };
 
-// A pipe: its end to read from, which does not wait, and its end to write to.
-struct Pipe {
-    Pipe() {
-        int ends[2];
-        if (::pipe2(ends, O_CLOEXEC) != 0)
-            base::throw_errno("pipe2");
-        to_read.reset(ends[0]);
-        to_write.reset(ends[1]);
-        ::fcntl(to_read.get(), F_SETFL, O_NONBLOCK);
-    }
-    UniqueFd to_read, to_write;
-};
-
-// In the child, after fork.
-[[noreturn]] void become(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
+// A test's process leads its own process group and inherits no signal mask and no descriptor but those mapped.
+void prepare_process() {
     ::setpgid(0, 0);
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) // it died before the line above
-        ::_exit(127);
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    // First out of the way of 0 to 4, then into place; dup2 clears close-on-exec. Nothing else of whoever started
-    // this comes along: no terminal, and no descriptor that a plugin could write to.
-    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    const std::pair<int, int> places[] = {{nothing, STDIN_FILENO},
-                                          {output, STDOUT_FILENO},
-                                          {output, STDERR_FILENO},
-                                          {pipe, result_fd},
-                                          {page, call_page_fd}};
-    std::array<int, std::size(places)> high;
-    std::ranges::transform(places, high.begin(),
-                           [](auto place) { return ::fcntl(place.first, F_DUPFD_CLOEXEC, 10); });
-    for (std::size_t i = 0; i < high.size(); ++i)
-        if (high[i] < 0 || ::dup2(high[i], places[i].second) < 0)
-            ::_exit(127);
     ::syscall(SYS_close_range, call_page_fd + 1u, ~0u, 0u);
-    std::vector<char *> argv;
-    argv.reserve(arguments.size() + 1);
-    for (const std::string &argument : arguments)
-        argv.push_back(const_cast<char *>(argument.c_str()));
-    argv.push_back(nullptr);
-    ::execv("/proc/self/exe", argv.data());
-    ::_exit(127);
 }
 
 // What a plugin prints: no part of the report, and shown as lines that can't steer a terminal, as many as one reads.
@@ -186,14 +149,19 @@ public:
         for (const auto &[id, file] : subject.prints)
             arguments.insert(arguments.end(), {"--print", std::to_string(id) + "=" + file.string()});
         arguments.insert(arguments.end(), subject.policy_options.begin(), subject.policy_options.end());
-        const pid_t parent = ::getpid();
-        pid_ = ::fork();
-        if (pid_ == 0)
-            become(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
-        if (pid_ < 0)
-            base::throw_errno("fork");
-        result_.to_write.reset();
-        output_.to_write.reset();
+        ::fcntl(result_.read_end.get(), F_SETFL, O_NONBLOCK);
+        ::fcntl(output_.read_end.get(), F_SETFL, O_NONBLOCK);
+        const UniqueFd no_input = base::checked(::open("/dev/null", O_RDONLY | O_CLOEXEC), "open /dev/null");
+        const int output = output_.write_end.get();
+        pid_ = start_process(std::move(arguments),
+                             {{no_input.get(), STDIN_FILENO},
+                              {output, STDOUT_FILENO},
+                              {output, STDERR_FILENO},
+                              {result_.write_end.get(), result_fd},
+                              {memory_.fd(), call_page_fd}},
+                             prepare_process);
+        result_.write_end.reset();
+        output_.write_end.reset();
         ::setpgid(pid_, pid_); // here too: who comes first is open
         alive_.insert(pid_);
     }
@@ -205,7 +173,7 @@ public:
     Child &operator=(const Child &) = delete;
 
     // To be waited for; -1: closed, which poll passes over.
-    std::array<int, 2> fds() const { return {result_.to_read.get(), output_.to_read.get()}; }
+    std::array<int, 2> fds() const { return {result_.read_end.get(), output_.read_end.get()}; }
     Clock::time_point deadline() const { return deadline_; }
 
     // Takes what has come. True once the test is over: it ended, or its time is up, or it tells more than a test can.
@@ -266,8 +234,8 @@ private:
     }
     // Not all, of who writes without end: others are waited for, and time goes by.
     void take() {
-        take(result_.to_read, [&](std::string_view bytes) { text_ += bytes; });
-        take(output_.to_read, [&](std::string_view bytes) { printed_.take(bytes); });
+        take(result_.read_end, [&](std::string_view bytes) { text_ += bytes; });
+        take(output_.read_end, [&](std::string_view bytes) { printed_.take(bytes); });
     }
     static void take(UniqueFd &from, const std::function<void(std::string_view)> &to) {
         char buffer[1 << 16];
