@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What plugins of every kind promise.
-#include "conformance/elf.hpp"
 #include "conformance/process_usage.hpp"
 #include "conformance/test.hpp"
 #include "ipc/json_abi.hpp"
@@ -11,6 +10,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <elf.h>
+#include <fstream>
+#include <iterator>
 #include <set>
 
 namespace arhost::conformance {
@@ -31,6 +33,38 @@ void load(Context &context) {
     } catch (const std::exception &error) { // what arhost-worker or the host would say
         throw Failure(error.what());
     }
+}
+
+// Defined symbols that other libraries could bind to, from the file's .dynsym. abi.load has opened the file, so it is
+// an ELF file of this machine's class; its section headers may still be damaged.
+std::vector<std::string> exported_symbols(const std::filesystem::path &file) {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+    const auto at = [&]<class T>(std::size_t offset, T value) { // copied, because offsets need not be aligned
+        if (offset > bytes.size() || bytes.size() - offset < sizeof value)
+            throw std::runtime_error(file.string() + " has section headers beyond its end");
+        std::memcpy(&value, bytes.data() + offset, sizeof value);
+        return value;
+    };
+    const auto header = at(0, Elf64_Ehdr{});
+    const auto section = [&](std::size_t i) { return at(header.e_shoff + i * sizeof(Elf64_Shdr), Elf64_Shdr{}); };
+    std::vector<std::string> exported;
+    for (std::size_t i = 0; i < header.e_shnum; ++i) {
+        const Elf64_Shdr symbols = section(i);
+        if (symbols.sh_type != SHT_DYNSYM)
+            continue;
+        const Elf64_Shdr names = section(symbols.sh_link);
+        for (std::size_t k = 0; k < symbols.sh_size / sizeof(Elf64_Sym); ++k) {
+            const auto symbol = at(symbols.sh_offset + k * sizeof(Elf64_Sym), Elf64_Sym{});
+            const bool defined = symbol.st_shndx != SHN_UNDEF && symbol.st_shndx != SHN_ABS;
+            const int visibility = ELF64_ST_VISIBILITY(symbol.st_other);
+            if (defined && ELF64_ST_BIND(symbol.st_info) != STB_LOCAL &&
+                (visibility == STV_DEFAULT || visibility == STV_PROTECTED))
+                exported.emplace_back(bytes.c_str() + // ends with NUL at the latest at the file's end
+                                      std::min<std::size_t>(names.sh_offset + symbol.st_name, bytes.size()));
+        }
+    }
+    return exported;
 }
 
 void exports(Context &context) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/child.hpp"
 
+#include "base/exec.hpp"
 #include "conformance/test.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
@@ -105,6 +108,33 @@ Result run(const Test &test, const Subject &subject, Context &context) {
 std::filesystem::path default_reference() {
     const std::filesystem::path own_folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
     return (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+}
+
+Pipe::Pipe() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0)
+        base::throw_errno("pipe2");
+    read_end.reset(ends[0]);
+    write_end.reset(ends[1]);
+}
+
+pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors, bool own_group) {
+    std::vector<char *> argv;
+    argv.reserve(arguments.size() + 1);
+    for (std::string &argument : arguments)
+        argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    const pid_t parent = ::getpid();
+    const pid_t pid = ::fork();
+    if (pid < 0)
+        base::throw_errno("fork");
+    if (pid > 0)
+        return pid;
+    // A plugin may have started threads: only async-signal-safe calls until exec.
+    if (own_group)
+        ::setpgid(0, 0);
+    base::exec_child("/proc/self/exe", argv.data(), {descriptors.begin(), descriptors.size()}, parent);
+    ::_exit(127);
 }
 
 int run_child(const std::string &name, const Subject &subject) {

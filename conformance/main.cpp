@@ -132,10 +132,15 @@ struct PolicyOptions {
     }
 };
 
-std::string list(const std::string &pattern) {
+bool matches(const std::vector<std::string> &patterns, const char *test) {
+    return std::any_of(patterns.begin(), patterns.end(),
+                       [&](const std::string &pattern) { return ::fnmatch(pattern.c_str(), test, 0) == 0; });
+}
+
+std::string list(const std::vector<std::string> &patterns) {
     std::string text;
     for (const Test &test : all_tests())
-        if (::fnmatch(pattern.c_str(), test.name, 0) == 0)
+        if (matches(patterns, test.name))
             text += fmt::format("{:<34} {}\n", test.name, test.promise);
     return text;
 }
@@ -187,9 +192,9 @@ void print(const std::string &text, int signals = -1) {
     }
 }
 
-Report run(const RunSettings &settings, const std::string &pattern, bool quiet) {
+Report run(const RunSettings &settings, const std::vector<std::string> &patterns, bool quiet) {
     Report report{settings, all_tests(), {}, {}};
-    const auto wanted = [&](const char *test) { return ::fnmatch(pattern.c_str(), test, 0) == 0; };
+    const auto wanted = [&](const char *test) { return matches(patterns, test); };
     const auto is_fine = [](const Result &result) {
         return result.verdict == Verdict::pass || result.verdict == Verdict::skip;
     };
@@ -320,14 +325,17 @@ int main(int argc, char **argv) {
         "128 and a signal's number: interrupted.",
         "arhost conform");
     RunSettings settings;
-    std::vector<std::string> option_texts, print_texts;
-    std::string plugin, pattern = "*", json, junit, html, child_test;
+    std::vector<std::string> option_texts, print_texts, patterns = {"*"};
+    std::string plugin, json, junit, html, child_test;
     std::string reference = default_reference();
     bool only_list = false, quiet = false;
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
     app.option("PLUGIN", plugin, "The plugin's shared object");
     app.flag("--list", only_list, "Print the tests' names and what each promises");
-    app.option("--only", pattern, "Only tests whose name matches, as 'raytracer.*'").type_name("PATTERN");
+    app.option("--only", patterns, "Only tests whose name matches, as 'raytracer.*' (again for more)")
+        .type_name("PATTERN")
+        .separator(',')
+        .one_value_each();
     app.option("--set", option_texts, "An option of the plugin (again for more)")
         .type_name("KEY=VALUE")
         .one_value_each();
@@ -361,7 +369,7 @@ int main(int argc, char **argv) {
     base::UniqueFd signals;
     try {
         if (only_list) {
-            print(list(pattern));
+            print(list(patterns));
             return 0;
         }
         if (!fs::is_regular_file(plugin))
@@ -382,10 +390,11 @@ int main(int argc, char **argv) {
         settings.signals = signals.get();
         base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
-        const Report report = run(settings, pattern, quiet);
+        const Report report = run(settings, patterns, quiet);
         print(as_summary(report), settings.signals);
         if (report.results.empty())
-            throw std::runtime_error("--only " + pattern + ": no test of this kind of plugin has such a name");
+            throw std::runtime_error(
+                fmt::format("--only {}: no test of this kind of plugin has such a name", fmt::join(patterns, ",")));
         json_file.write(as_json(report));
         junit_file.write(as_junit(report));
         html_file.write(as_html(report));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/runner.hpp"
 
-#include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "base/text.hpp"
 #include "ipc/memory.hpp"
@@ -60,32 +59,6 @@ private:
     std::filesystem::path path_;
 };
 
-// A pipe: its end to read from, which does not wait, and its end to write to.
-struct Pipe {
-    Pipe() {
-        int ends[2];
-        if (::pipe2(ends, O_CLOEXEC) != 0)
-            base::throw_errno("pipe2");
-        to_read.reset(ends[0]);
-        to_write.reset(ends[1]);
-        ::fcntl(to_read.get(), F_SETFL, O_NONBLOCK);
-    }
-    UniqueFd to_read, to_write;
-};
-
-// In the child, after fork.
-[[noreturn]] void exec_test(const std::vector<std::string> &arguments, int pipe, int page, int output, pid_t parent) {
-    const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    static_assert(result_fd == 3 && call_page_fd == 4);
-    std::vector<char *> argv;
-    argv.reserve(arguments.size() + 1);
-    for (const std::string &argument : arguments)
-        argv.push_back(const_cast<char *>(argument.c_str()));
-    argv.push_back(nullptr);
-    base::exec_child("/proc/self/exe", argv.data(), std::array{null, output, output, pipe, page}, parent);
-    ::_exit(127);
-}
-
 // What a plugin prints: no part of the report, and shown as lines that can't steer a terminal, as many as one reads.
 class Printed {
 public:
@@ -142,14 +115,14 @@ public:
         for (const auto &[id, file] : subject.prints)
             arguments.insert(arguments.end(), {"--print", std::to_string(id) + "=" + file.string()});
         arguments.insert(arguments.end(), subject.policy_options.begin(), subject.policy_options.end());
-        const pid_t parent = ::getpid();
-        pid_ = ::fork();
-        if (pid_ == 0)
-            exec_test(arguments, result_.to_write.get(), memory_.fd(), output_.to_write.get(), parent);
-        if (pid_ < 0)
-            base::throw_errno("fork");
-        result_.to_write.reset();
-        output_.to_write.reset();
+        ::fcntl(result_.read_end.get(), F_SETFL, O_NONBLOCK);
+        ::fcntl(output_.read_end.get(), F_SETFL, O_NONBLOCK);
+        const UniqueFd no_input = base::checked(::open("/dev/null", O_RDONLY | O_CLOEXEC), "open /dev/null");
+        const int output = output_.write_end.get();
+        pid_ = start_process(std::move(arguments),
+                             {no_input.get(), output, output, result_.write_end.get(), memory_.fd()}, true);
+        result_.write_end.reset();
+        output_.write_end.reset();
         ::setpgid(pid_, pid_); // here too: who comes first is open
         alive_.insert(pid_);
     }
@@ -161,7 +134,7 @@ public:
     Child &operator=(const Child &) = delete;
 
     // To be waited for; -1: closed, which poll passes over.
-    std::array<int, 2> fds() const { return {result_.to_read.get(), output_.to_read.get()}; }
+    std::array<int, 2> fds() const { return {result_.read_end.get(), output_.read_end.get()}; }
     Clock::time_point deadline() const { return deadline_; }
 
     // Takes what has come. True once the test is over: it ended, or its time is up, or it tells more than a test can.
@@ -222,8 +195,8 @@ private:
     }
     // Not all, of who writes without end: others are waited for, and time goes by.
     void take() {
-        take(result_.to_read, [&](std::string_view bytes) { text_ += bytes; });
-        take(output_.to_read, [&](std::string_view bytes) { printed_.take(bytes); });
+        take(result_.read_end, [&](std::string_view bytes) { text_ += bytes; });
+        take(output_.read_end, [&](std::string_view bytes) { printed_.take(bytes); });
     }
     static void take(UniqueFd &from, const std::function<void(std::string_view)> &to) {
         char buffer[1 << 16];

@@ -9,24 +9,12 @@
 #include <deque>
 #include <fcntl.h>
 #include <iostream>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
 
 namespace arhost::conformance {
 namespace {
-
-struct Pipe {
-    Pipe() {
-        int ends[2];
-        if (::pipe2(ends, O_CLOEXEC) != 0)
-            base::throw_errno("pipe2");
-        read_end.reset(ends[0]);
-        write_end.reset(ends[1]);
-    }
-    base::UniqueFd read_end, write_end;
-};
 
 constexpr const char *helper = "sink.process";
 
@@ -63,30 +51,11 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
                                           library.scratch(), "--sandbox",    "none" /* it is in this one's */};
     for (const auto &[key, value] : library.settings())
         arguments.insert(arguments.end(), {"--set", key + "=" + value});
-    std::vector<char *> argv;
-    argv.reserve(arguments.size() + 1);
-    for (std::string &argument : arguments)
-        argv.push_back(argument.data());
-    argv.push_back(nullptr);
 
     Pipe orders, written;
     const ipc::SharedMemory call_page = ipc::SharedMemory::create("arhost-conform-call", sizeof(ipc::Call));
-    const pid_t parent = ::getpid();
-    pid_ = ::fork();
-    if (pid_ < 0)
-        base::throw_errno("fork");
-    if (pid_ == 0) { // only what a thread of many may do, until execv
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (::getppid() != parent)
-            ::_exit(127);
-        const int high_written = ::fcntl(written.write_end.get(), F_DUPFD_CLOEXEC, 10),
-                  high_page = ::fcntl(call_page.fd(), F_DUPFD_CLOEXEC, 10);
-        ::dup2(orders.read_end.get(), STDIN_FILENO);
-        ::dup2(high_written, result_fd);
-        ::dup2(high_page, call_page_fd);
-        ::execv("/proc/self/exe", argv.data());
-        ::_exit(127);
-    }
+    pid_ = start_process(std::move(arguments), {orders.read_end.get(), STDOUT_FILENO, STDERR_FILENO,
+                                                written.write_end.get(), call_page.fd()});
     orders_ = std::move(orders.write_end);
     written_ = std::move(written.read_end);
     const std::string order =

@@ -8,8 +8,6 @@
 #include <fstream>
 #include <random>
 #include <sstream>
-#include <sys/mman.h>
-#include <unistd.h>
 
 namespace arhost::conformance {
 
@@ -19,11 +17,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double fps = 25;
-
-std::size_t whole_pages(std::size_t size) {
-    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
-    return (size + page - 1) / page * page;
-}
 
 arhost_intrinsics lens(const Size &size) {
     arhost_intrinsics in{};
@@ -56,26 +49,19 @@ arhost_marker marker(double z_mm) {
 
 } // namespace
 
-SealedOutput::SealedOutput(const Look &look) {
+SealedOutput::SealedOutput(const Look &look)
+    : stride_(ipc::OutputSlot::stride(look.size.width) + look.padding), record_(sizeof(arhost_record)),
+      pixels_(std::size_t{stride_} * look.size.height) {
     const Size &size = look.size;
-    const std::uint32_t stride = ipc::OutputSlot::stride(size.width) + look.padding;
-    const std::size_t pixels = std::size_t{stride} * size.height, page = whole_pages(1);
-    size_ = whole_pages(sizeof(arhost_record)) + whole_pages(pixels);
-    memory_ = ::mmap(nullptr, size_ + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (memory_ == MAP_FAILED)
-        base::throw_errno("mmap of a frame");
-    auto *bytes = static_cast<std::uint8_t *>(memory_);
-    ::mprotect(bytes + size_, page, PROT_NONE);
-
-    std::uint8_t *bgr = bytes + size_ - pixels;
+    auto *bgr = reinterpret_cast<std::uint8_t *>(pixels_.data());
     std::mt19937 noise(static_cast<std::uint32_t>(2 * look.sequence + look.other));
     for (std::uint32_t y = 0; y < size.height; ++y) {
-        std::uint8_t *row = bgr + std::size_t{stride} * y;
-        std::memset(row, look.in_padding, stride);
+        std::uint8_t *row = bgr + std::size_t{stride_} * y;
+        std::memset(row, look.in_padding, stride_);
         std::generate_n(row, 3 * size.width, [&] { return static_cast<std::uint8_t>(noise() >> 24); });
     }
 
-    arhost_record &r = record();
+    arhost_record &r = *new (record_.data()) arhost_record{};
     r.struct_size = sizeof r;
     r.clock = ARHOST_CLOCK_MEDIA;
     r.sequence = look.sequence;
@@ -90,19 +76,9 @@ SealedOutput::SealedOutput(const Look &look) {
     r.camera.intrinsics = lens(size);
     r.marker_count = 1;
     r.markers[0] = marker(-eye[2]);
-    output_ = {sizeof output_, stride, size.width, size.height, bgr, &r};
-    seal();
-}
-
-SealedOutput::~SealedOutput() {
-    ::munmap(memory_, size_ + whole_pages(1));
-}
-
-void SealedOutput::seal() {
-    ::mprotect(memory_, size_, PROT_READ);
-}
-void SealedOutput::unseal() {
-    ::mprotect(memory_, size_, PROT_READ | PROT_WRITE);
+    output_ = {sizeof output_, stride_, size.width, size.height, bgr, &r};
+    record_.seal();
+    pixels_.seal();
 }
 
 Files files_in(const fs::path &folder) {

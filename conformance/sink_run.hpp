@@ -3,6 +3,7 @@
 // A sink at work in a folder, the frames that it is given, and what lies in the folder then.
 #pragma once
 
+#include "conformance/guarded_memory.hpp"
 #include "conformance/plugin_library.hpp"
 #include "conformance/test.hpp"
 
@@ -29,25 +30,20 @@ public:
         bool other = false;          // another frame of that number
     };
     explicit SealedOutput(const Look &look);
-    ~SealedOutput();
-    SealedOutput(const SealedOutput &) = delete;
-    SealedOutput &operator=(const SealedOutput &) = delete;
 
-    // While no sink has it.
+    // Only while no sink reads it.
     template <class Change> void change(Change &&change) {
-        unseal();
+        record_.unseal();
         change(record());
-        seal();
+        record_.seal();
     }
     const arhost_output &output() const { return output_; }
 
 private:
-    void seal();
-    void unseal();
-    arhost_record &record() { return *static_cast<arhost_record *>(memory_); }
+    arhost_record &record() { return *reinterpret_cast<arhost_record *>(record_.data()); }
 
-    void *memory_;
-    std::size_t size_; // without what can't be read
+    std::uint32_t stride_;
+    GuardedMemory record_, pixels_;
     arhost_output output_{};
 };
 

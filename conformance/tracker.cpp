@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/tracker.hpp"
 
-#include "base/unique_fd.hpp"
-
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -10,33 +8,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <sys/mman.h>
-#include <unistd.h>
 
 namespace arhost::conformance {
 
 using ipc::Call;
-
-GuardedMemory::GuardedMemory(std::size_t size) {
-    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
-    byte_size_ = (size + page - 1) / page * page + 2 * page;
-    void *address = ::mmap(nullptr, byte_size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (address == MAP_FAILED)
-        base::throw_errno("mmap");
-    pages_ = static_cast<std::byte *>(address);
-    data_ = pages_ + byte_size_ - page - size;
-    ::mprotect(pages_, page, PROT_NONE);
-    ::mprotect(pages_ + byte_size_ - page, page, PROT_NONE);
-}
-
-GuardedMemory::~GuardedMemory() {
-    ::munmap(pages_, byte_size_);
-}
-
-void GuardedMemory::seal() {
-    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
-    ::mprotect(pages_ + page, byte_size_ - 2 * page, PROT_READ);
-}
 
 arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_pixel_format pixel_format) {
     arhost_frame_format format{};

@@ -3,6 +3,7 @@
 // A tracker at work on frames of printed markers.
 #pragma once
 
+#include "conformance/guarded_memory.hpp"
 #include "conformance/plugin_library.hpp"
 #include "conformance/prints.hpp"
 #include "conformance/scenes.hpp"
@@ -12,21 +13,6 @@
 #include <optional>
 
 namespace arhost::conformance {
-
-// Memory whose neighbours can be neither read nor written: before, up to a page's start, and behind.
-class GuardedMemory {
-public:
-    explicit GuardedMemory(std::size_t size);
-    ~GuardedMemory();
-    GuardedMemory(const GuardedMemory &) = delete;
-    GuardedMemory &operator=(const GuardedMemory &) = delete;
-    std::byte *data() const { return data_; }
-    void seal(); // from here on it can't be written
-
-private:
-    std::byte *pages_, *data_;
-    std::size_t byte_size_; // of the pages
-};
 
 // A frame in memory that can't be written. What is in no pixel is noise, chosen by `filler`.
 class SealedFrame {

@@ -13,47 +13,36 @@ namespace arhost::base {
 Option Option::required() {
     return Option(option_->required());
 }
-
 Option Option::hidden() {
     return Option(option_->group(""));
 }
-
 Option Option::type_name(const std::string &name) {
     return Option(option_->type_name(name));
 }
-
 Option Option::show_default() {
     return Option(option_->capture_default_str());
 }
-
 Option Option::default_text(const std::string &text) {
     return Option(option_->default_str(text));
 }
-
 Option Option::separator(char c) {
     return Option(option_->delimiter(c));
 }
-
 Option Option::one_value_each() {
     return Option(option_->allow_extra_args(false));
 }
-
 Option Option::range(int minimum, int maximum) {
     return Option(option_->check(CLI::Range(minimum, maximum)));
 }
-
 Option Option::range(double minimum, double maximum) {
     return Option(option_->check(CLI::Range(minimum, maximum)));
 }
-
 Option Option::one_of(const std::vector<std::string> &choices) {
     return Option(option_->check(CLI::IsMember(choices)));
 }
-
 Option Option::existing_path() {
     return Option(option_->check(CLI::ExistingPath));
 }
-
 Option Option::check(const std::function<std::string(const std::string &value)> &problem) {
     return Option(option_->check(problem));
 }

@@ -11,8 +11,6 @@
 namespace arhost::base {
 
 void exec_child(const char *program, char *const argv[], std::span<const int> fds, pid_t parent) {
-    // Its own group: a kill reaches what it forks, and the terminal's Ctrl-C does not reach it.
-    ::setpgid(0, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) // it died before the line above
         return;

@@ -10,32 +10,32 @@ namespace {
 
 using enum Type;
 
+void add(std::vector<Key> &keys, const std::string &prefix, const std::vector<Key> &more) {
+    for (Key key : more) {
+        key.path = prefix + key.path;
+        keys.push_back(key);
+    }
+}
+
 // Adds a component: its `own` keys and those that every component has. `example`: a plugin of its kind.
 void add_component(std::vector<Key> &keys, const Key &component, const std::string &example,
                    const std::vector<Key> &own) {
-    const std::string path = component.path + (component.type == list ? "[]" : "");
+    const std::string prefix = component.path + (component.type == list ? "[]." : ".");
     keys.push_back(component);
-    keys.push_back({path + ".plugin", text, true, "", "Plugin name (`" + example + "`), or path to a `.so`."});
-    for (Key key : own) {
-        key.path = path + "." + key.path;
-        keys.push_back(key);
-    }
-    const std::vector<Key> common = {
-        {"options", free_map, false, "", "The plugin's own options; `arhost plugins --options` lists them."},
-        {"allow", list, false, "nothing",
-         "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-        {"reads", list, false, "", "Additional files and folders that it may read."},
-        {"writes", list, false, "", "Additional folders that it may write to."},
-        {"environment", list, false, "", "Additional environment variables that it receives (docs/security.md)."},
-        {"memory_mb", integer, false, "0",
-         "Limit of its private memory, in MiB; 0: three quarters of the machine's memory."},
-        {"deadline_ms", integer, false, "5000", "Timeout for one frame, in ms."},
-        {"start_deadline_ms", integer, false, "10000", "Timeout without progress during start, in ms."},
-        {"stop_deadline_ms", integer, false, "30000", "Timeout without progress during shutdown, in ms."}};
-    for (Key key : common) {
-        key.path = path + "." + key.path;
-        keys.push_back(key);
-    }
+    add(keys, prefix, {{"plugin", text, true, "", "Plugin name (`" + example + "`), or path to a `.so`."}});
+    add(keys, prefix, own);
+    add(keys, prefix,
+        {{"options", free_map, false, "", "The plugin's own options; `arhost plugins --options` lists them."},
+         {"allow", list, false, "nothing",
+          "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
+         {"reads", list, false, "", "Additional files and folders that it may read."},
+         {"writes", list, false, "", "Additional folders that it may write to."},
+         {"environment", list, false, "", "Additional environment variables that it receives (docs/security.md)."},
+         {"memory_mb", integer, false, "0",
+          "Limit of its private memory, in MiB; 0: three quarters of the machine's memory."},
+         {"deadline_ms", integer, false, "5000", "Timeout for one frame, in ms."},
+         {"start_deadline_ms", integer, false, "10000", "Timeout without progress during start, in ms."},
+         {"stop_deadline_ms", integer, false, "30000", "Timeout without progress during shutdown, in ms."}});
 }
 
 std::vector<Key> make_table() {
@@ -66,28 +66,27 @@ std::vector<Key> make_table() {
                   {{"path", input_path, false, "", "Input file or printf pattern, for plugins that read files."},
                    {"fps", real, false, "0", "Frames per second; 0: the source's own rate."},
                    conform});
-    const std::vector<Key> camera = {
-        {"trajectory", input_path, false, "",
-         "File with camera poses to use instead of the tracker's (docs/trajectories.md)."},
-        {"camera", map, false, "from the trajectory or the source", "Camera intrinsics (docs/camera.md)."},
-        {"camera.file", input_path, false, "", "Calibration file in OpenCV's YAML format."},
-        {"camera.width", integer, false, "", "Image width that the intrinsics refer to, in px."},
-        {"camera.height", integer, false, "", "Image height, in px."},
-        {"camera.fx", real, false, "", "Horizontal focal length, in px."},
-        {"camera.fy", real, false, "fx", "Vertical focal length, in px."},
-        {"camera.vertical_fov_degrees", real, false, "", "Replaces fx and fy for an uncalibrated camera."},
-        {"camera.cx", real, false, "(width − 1) / 2", "Principal point, in px; pixel centres are at integers."},
-        {"camera.cy", real, false, "(height − 1) / 2", "Principal point, in px."},
-        {"camera.distortion", map, false, "none", "Lens distortion."},
-        {"camera.distortion.model",
-         text,
-         true,
-         "",
-         "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
-         {"none", "brown", "fisheye"}},
-        {"camera.distortion.coefficients", reals, false, "",
-         "In OpenCV's order: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."}};
-    keys.insert(keys.end(), camera.begin(), camera.end());
+    add(keys, "",
+        {{"trajectory", input_path, false, "",
+          "File with camera poses to use instead of the tracker's (docs/trajectories.md)."},
+         {"camera", map, false, "from the trajectory or the source", "Camera intrinsics (docs/camera.md)."},
+         {"camera.file", input_path, false, "", "Calibration file in OpenCV's YAML format."},
+         {"camera.width", integer, false, "", "Image width that the intrinsics refer to, in px."},
+         {"camera.height", integer, false, "", "Image height, in px."},
+         {"camera.fx", real, false, "", "Horizontal focal length, in px."},
+         {"camera.fy", real, false, "fx", "Vertical focal length, in px."},
+         {"camera.vertical_fov_degrees", real, false, "", "Replaces fx and fy for an uncalibrated camera."},
+         {"camera.cx", real, false, "(width − 1) / 2", "Principal point, in px; pixel centres are at integers."},
+         {"camera.cy", real, false, "(height − 1) / 2", "Principal point, in px."},
+         {"camera.distortion", map, false, "none", "Lens distortion."},
+         {"camera.distortion.model",
+          text,
+          true,
+          "",
+          "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
+          {"none", "brown", "fisheye"}},
+         {"camera.distortion.coefficients", reals, false, "",
+          "In OpenCV's order: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."}});
     add_component(
         keys, {"tracker", map, false, "no tracking", "Finds the markers."}, "tracker_aruco",
         {{"markers", list, true, "", "The markers; the first visible one anchors the scene."},
@@ -98,36 +97,35 @@ std::vector<Key> make_table() {
          conform});
     add_component(keys, {"raytracer", map, false, "no overlay", "Renders the virtual objects."}, "rt_embree",
                   {{"scene", input_path, true, "", "Scene file (docs/scenes.md)."}, fallback, conform});
-    const std::vector<Key> coordinates = {
-        {"coordinates", map, false, "from the scene's axes",
-         "Transform from the marker's axes to the scene's (docs/camera.md)."},
-        {"coordinates.ar", integer, false, "1",
-         "Profile of the tracker's axes: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other."},
-        {"coordinates.rt", integer, false, "1", "Profile of the scene's axes."},
-        {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
-        {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
-        {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}};
-    keys.insert(keys.end(), coordinates.begin(), coordinates.end());
+    add(keys, "",
+        {{"coordinates", map, false, "from the scene's axes",
+          "Transform from the marker's axes to the scene's (docs/camera.md)."},
+         {"coordinates.ar", integer, false, "1",
+          "Profile of the tracker's axes: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other."},
+         {"coordinates.rt", integer, false, "1", "Profile of the scene's axes."},
+         {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
+         {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
+         {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}});
     add_component(keys, {"outputs", list, false, "", "Where augmented frames go."}, "sink_video",
                   {{"path", output_path, false, "",
                     "Output file, for plugins that write files; its folder becomes writable."}});
-    const std::vector<Key> rest = {
-        {"live", map, false, "", "Settings of mode `live`."},
-        {"live.max_latency_ms", integer, false, "500",
-         "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
+    add(keys, "",
+        {
+            {"live", map, false, "", "Settings of mode `live`."},
+            {"live.max_latency_ms", integer, false, "500",
+             "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
 
-        {"restart", map, false, "", "How failed components are restarted."},
-        {"restart.proven_after_frames", integer, false, "10",
-         "A component that has delivered this many frames is restarted without delay or limit."},
-        {"restart.quarantine_after", integer, false, "5", "Consecutive failures before giving up."},
-        {"restart.first_delay_ms", integer, false, "250",
-         "Delay after the first failure, in ms; it doubles with each failure."},
-        {"restart.longest_delay_ms", integer, false, "10000", "Longest delay, in ms."},
+            {"restart", map, false, "", "How failed components are restarted."},
+            {"restart.proven_after_frames", integer, false, "10",
+             "A component that has delivered this many frames is restarted without delay or limit."},
+            {"restart.quarantine_after", integer, false, "5", "Consecutive failures before giving up."},
+            {"restart.first_delay_ms", integer, false, "250",
+             "Delay after the first failure, in ms; it doubles with each failure."},
+            {"restart.longest_delay_ms", integer, false, "10000", "Longest delay, in ms."},
 
-        {"stats", output_path, false, "", "File for the statistics of the run (JSON)."},
-        {"timeline", output_path, false, "", "File for the times of each frame (CSV)."},
-    };
-    keys.insert(keys.end(), rest.begin(), rest.end());
+            {"stats", output_path, false, "", "File for the statistics of the run (JSON)."},
+            {"timeline", output_path, false, "", "File for the times of each frame (CSV)."},
+        });
     return keys;
 }
 

@@ -25,7 +25,9 @@ using arhost::base::UniqueFd;
 
 // In the child, after fork: control channel and doorbell as descriptors 3 and 4, as arhost-worker expects them.
 [[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
-    ::signal(SIGINT, SIG_IGN); // the host alone handles Ctrl-C
+    // Its own group: a kill reaches what it forks, and the terminal's Ctrl-C reaches the host only.
+    ::setpgid(0, 0);
+    ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_DFL);
     ::signal(SIGHUP, SIG_IGN);
     ::signal(SIGPIPE, SIG_IGN); // and SIGXFSZ, which the host ignores too: a full disk is an error value

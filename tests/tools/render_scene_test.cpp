@@ -154,7 +154,8 @@ TEST_F(RenderScene, SaysWhatIsWrongWithThePluginAndItsOptions) {
     // The plugin's own words, then which call has failed.
     EXPECT_THAT(
         refused("--set refuse=true --raytracer " + counter),
-        HasSubstr("refused, as the option 'refuse' asks\nrender-scene: rt_counter: create: configuration error"));
+        HasSubstr(
+            "rejected, as the option 'refuse' requests\nrender-scene: rt_counter: create: configuration error"));
     EXPECT_THAT(refused("--set error_at=13 --eye 0,0,513 --raytracer " + counter),
                 HasSubstr("rt_counter: render: internal error"));
 }
