@@ -19,10 +19,9 @@ enum {
     ARHOST_PIXEL_FORMAT_GREY8 = 1, /* 1 plane: Y */
     ARHOST_PIXEL_FORMAT_RGB8 = 2,  /* 1 plane: R G B */
     ARHOST_PIXEL_FORMAT_BGR8 = 3,  /* 1 plane: B G R */
-    ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; width is even */
-    ARHOST_PIXEL_FORMAT_NV12 =
-        5, /* 2 planes: Y; interleaved U V at half width and height. Width and height are even */
-    ARHOST_PIXEL_FORMAT_I420 = 6 /* 3 planes: Y; U and V at half width and height. Width and height are even */
+    ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; even width */
+    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y; interleaved U V at half size. Even width and height */
+    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V; U and V at half size. Even width and height */
 };
 
 /* R'G'B' to Y'CbCr conversion. Required for YUYV, NV12 and I420, ignored otherwise. */
