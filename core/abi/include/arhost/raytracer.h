@@ -59,7 +59,7 @@ typedef struct arhost_raytracer {
      * after `stop`, with another scene and size. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
-    /* [worker, started] Renders one image. Equal requests give identical bytes, whatever the number of threads. */
+    /* [worker, started] Renders one image. The same request gives identical bytes on any number of threads. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 

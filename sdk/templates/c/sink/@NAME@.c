@@ -32,7 +32,7 @@ static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup
     *slash = '/';
     /* Report an unwritable path now, but leave existing files unchanged until the first frame: another component may
      * still reject the run. */
-    snprintf(temporary, sizeof temporary, "%s.temporary", self->path);
+    snprintf(temporary, sizeof temporary, "%s.part", self->path);
     file = fopen(temporary, "wb");
     if (!file)
         return io_error(self, temporary);
@@ -52,7 +52,7 @@ static arhost_status write_frame(arhost_instance *self, const arhost_output *out
     FILE *file;
     int complete;
     snprintf(name, sizeof name, "%s%06llu.ppm", self->path, (unsigned long long)output->record->sequence);
-    snprintf(temporary, sizeof temporary, "%s.temporary", self->path);
+    snprintf(temporary, sizeof temporary, "%s.part", self->path);
 
     /* FILL IN: your output. output->record has the frame's pose, time and more. */
     file = fopen(temporary, "wb");

@@ -10,7 +10,7 @@ class @CLASS@:
         self.host = host  # host.info("…") logs; poll host.cancelled() in long loops
 
     def start(self, setup):
-        self.path, self.temporary = setup.path, setup.path + ".temporary"
+        self.path, self.temporary = setup.path, setup.path + ".part"
         # Report an unwritable path now, but leave existing files unchanged until the first frame: another component
         # may still reject the run.
         os.makedirs(os.path.dirname(self.path), exist_ok=True)

@@ -13,7 +13,7 @@ struct @CLASS@ {
 impl Plugin for @CLASS@ {
     fn new(_host: Host, options: &Options) -> Result<Self, Failure> {
         let path = options.text("path");
-        let temporary = PathBuf::from(format!("{}.temporary", path));
+        let temporary = PathBuf::from(format!("{}.part", path));
         Ok(@CLASS@ { path, temporary })
     }
 }
