@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs a class of a Python script in CPython. What the class sees is made by arhost.py; this file starts the
-// interpreter, hands memory over as memoryviews, and takes statuses back. The interpreter's lock is held during
-// calls only, so that threads of the script run between them.
+// Runs a class of a Python script in CPython. This file starts the interpreter and passes memory to arhost.py as
+// memoryviews; arhost.py presents it to the class. The GIL is held only during calls, so the script's threads run in
+// between.
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
@@ -12,6 +12,7 @@
 
 #include <cstdio>
 #include <dlfcn.h>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,7 +34,7 @@ namespace {
 
 using namespace arhost;
 
-// A reference that is given back; null where Python has raised.
+// An owned reference; null if Python raised an exception.
 class Object {
 public:
     Object(PyObject *owned = nullptr) : object_(owned) {} // NOLINT(google-explicit-constructor)
@@ -53,12 +54,12 @@ private:
     PyObject *object_;
 };
 
-class Locked {
+class GilLock {
 public:
-    Locked() : state_(PyGILState_Ensure()) {}
-    ~Locked() { PyGILState_Release(state_); }
-    Locked(const Locked &) = delete;
-    Locked &operator=(const Locked &) = delete;
+    GilLock() : state_(PyGILState_Ensure()) {}
+    ~GilLock() { PyGILState_Release(state_); }
+    GilLock(const GilLock &) = delete;
+    GilLock &operator=(const GilLock &) = delete;
 
 private:
     PyGILState_STATE state_;
@@ -71,12 +72,12 @@ std::string text_of(PyObject *object) {
     return bytes ? bytes : "";
 }
 
-// What Python has raised outside of arhost.py's own care.
+// The message of an exception that arhost.py did not handle.
 std::string take_error() {
     PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
     PyErr_Fetch(&type, &value, &trace);
     const Object owned_type(type), owned_value(value), owned_trace(trace);
-    return value ? text_of(value) : type ? text_of(type) : "an error of unknown kind";
+    return value ? text_of(value) : type ? text_of(type) : "unknown error";
 }
 
 Object checked(PyObject *object) {
@@ -102,7 +103,7 @@ Object tuple_of(std::vector<Object> &&objects) {
 }
 
 std::size_t plane_size(const arhost_frame_format &format, std::uint32_t plane) {
-    const bool halved = plane > 0; // of NV12 and I420, the formats that have more planes than one
+    const bool halved = plane > 0; // only NV12 and I420 have more than one plane
     return std::size_t(format.stride[plane]) * (halved ? format.height / 2 : format.height);
 }
 template <class Plane> Object views_of_planes(const arhost_frame_format &format, const Plane *planes, int flag) {
@@ -112,7 +113,7 @@ template <class Plane> Object views_of_planes(const arhost_frame_format &format,
     return tuple_of(std::move(views));
 }
 
-// ---- the host's callbacks; `self` is a capsule of the Host ----
+// ---- the host's callbacks; `self` is a capsule that holds the Host ----
 
 const Host &host_of(PyObject *self) {
     return *static_cast<const Host *>(PyCapsule_GetPointer(self, nullptr));
@@ -138,12 +139,12 @@ PyObject *py_cancelled(PyObject *self, PyObject *) {
 }
 PyMethodDef callbacks[] = {{"log", py_log, METH_VARARGS, "log(severity, text)"},
                            {"progress", py_progress, METH_VARARGS, "progress(fraction, what)"},
-                           {"cancelled", py_cancelled, METH_NOARGS, "True: the running call is to return soon"}};
+                           {"cancelled", py_cancelled, METH_NOARGS, "True: the running call must return soon"}};
 
 // ---- the interpreter ----
 
-// Held while the interpreter starts. In arhost-inprocess another kind's adapter may be at it too: a library of its
-// own, with which this one shares no mutex but those of the C library.
+// Serialises the interpreter's start. In arhost-inprocess the adapters of several kinds share one process as separate
+// libraries; the only mutexes they share are those of the C library, such as that of stderr.
 class ProcessLock {
 public:
     ProcessLock() { ::flockfile(stderr); }
@@ -156,7 +157,7 @@ void initialise(const std::string &interpreter) {
     const ProcessLock lock;
     if (Py_IsInitialized())
         return;
-    // Modules in C look for Python's symbols among the global ones, and this plugin was opened with RTLD_LOCAL.
+    // Extension modules need libpython's symbols globally, but this plugin was opened with RTLD_LOCAL.
     Dl_info info{};
     if (::dladdr(reinterpret_cast<void *>(&Py_IsInitialized), &info))
         ::dlopen(info.dli_fname, RTLD_NOW | RTLD_GLOBAL | RTLD_NOLOAD);
@@ -164,29 +165,34 @@ void initialise(const std::string &interpreter) {
     PyConfig_InitPythonConfig(&config);
     config.install_signal_handlers = 0;
     config.parse_argv = 0;
-    config.buffered_stdio = 0; // print() comes in its place in the log
-    config.write_bytecode = 0; // nothing is written beside the script
+    config.buffered_stdio = 0; // keeps print() in order with the log
+    config.write_bytecode = 0; // no __pycache__ next to the script
     PyConfig_SetBytesString(&config, &config.program_name, interpreter.c_str());
     const PyStatus status = Py_InitializeFromConfig(&config);
     PyConfig_Clear(&config);
     if (PyStatus_Exception(status))
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::string("Python can't be started: ") +
-                                                             (status.err_msg ? status.err_msg : "no reason given"));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      std::string("cannot start Python: ") + (status.err_msg ? status.err_msg : "unknown reason"));
     PyEval_SaveThread();
 }
 
-// `import arhost`, for this plugin and for its script.
+// Creates the modules arhost_abi and arhost, which the script imports.
 Object import_arhost(const std::string &interpreter) {
     if (PyObject *already = PyImport_AddModule("arhost"); already && PyObject_HasAttrString(already, "_Adapter"))
         return Py_NewRef(already);
-    const Object code = checked(Py_CompileString(arhost_py, "arhost.py", Py_file_input));
-    Object module = PyImport_ExecCodeModule("arhost", code.get());
-    if (!module)
-        throw Failure(
-            ARHOST_STATUS_ERROR_CONFIGURATION,
-            "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
-                "; install python3-numpy, or name the python of a virtual "
-                "environment that has numpy in the option 'interpreter' (and let it be read: 'reads: [FOLDER]')");
+    Object module;
+    for (const auto &[name, file, text] :
+         {std::tuple{"arhost_abi", "arhost_abi.py", arhost_abi_py}, {"arhost", "arhost.py", arhost_py}}) {
+        const Object code = checked(Py_CompileString(text, file, Py_file_input));
+        module = PyImport_ExecCodeModule(name, code.get());
+        if (module)
+            continue;
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "Python " PY_VERSION " (" + interpreter + "): " + take_error() +
+                          "; install python3-numpy, or set the option 'interpreter' to the python of a virtual "
+                          "environment with "
+                          "numpy (and allow reading it: 'reads: [FOLDER]')");
+    }
     return module;
 }
 
@@ -200,7 +206,7 @@ public:
 #endif
         const std::string interpreter = options.text("interpreter");
         initialise(interpreter);
-        const Locked locked;
+        const GilLock lock;
         const Object module = import_arhost(interpreter);
         const Object capsule = checked(PyCapsule_New(&host_, nullptr, nullptr));
         Object functions[3];
@@ -212,25 +218,25 @@ public:
             call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
                  options.text("arguments").c_str());
         } catch (...) {
-            adapter_ = Object(); // while the lock is held
+            adapter_ = Object(); // needs the GIL
             throw;
         }
     }
     ~PythonAdapter() {
-        const Locked locked;
+        const GilLock lock;
         adapter_ = Object();
     }
     PythonAdapter(const PythonAdapter &) = delete;
     PythonAdapter &operator=(const PythonAdapter &) = delete;
 
     void stop() {
-        const Locked locked;
+        const GilLock lock;
         call("stop", "");
     }
 
     // sources
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        const Locked locked;
+        const GilLock lock;
         const Answer answer = call("start_source", "KdNN", static_cast<unsigned long long>(setup.first_sequence),
                                    setup.fps, PyBool_FromLong(setup.paced), view_of(setup.intrinsics).release());
         arhost_frame_format &format = properties.format;
@@ -239,11 +245,10 @@ public:
                                  &format.fps, &format.yuv_matrix, &format.yuv_range, &frames));
         properties.frame_count = frames;
         if (!arhost_frame_layout(&format))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "start returned a frame format or size that is not valid");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "start returned an invalid frame format or size");
     }
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        const Locked locked;
+        const GilLock lock;
         const Answer answer =
             call("read", "NKN", view_of(buffer.format).release(), static_cast<unsigned long long>(buffer.sequence),
                  views_of_planes(*buffer.format, buffer.plane, PyBUF_WRITE).release());
@@ -257,7 +262,7 @@ public:
 
     // trackers
     void start(const arhost_tracker_setup &setup) {
-        const Locked locked;
+        const GilLock lock;
         std::vector<arhost_marker_config> markers;
         for (std::uint32_t i = 0; i < setup.marker_count; ++i)
             markers.push_back(listed_marker(setup, i));
@@ -265,7 +270,7 @@ public:
              view(markers.data(), markers.size() * sizeof(arhost_marker_config)).release());
     }
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
-        const Locked locked;
+        const GilLock lock;
         const arhost_frame_format &format = *frame.format;
         const Answer answer = call("track", "KLiNNN", static_cast<unsigned long long>(frame.sequence),
                                    static_cast<long long>(frame.capture_ns), frame.clock,
@@ -275,18 +280,18 @@ public:
         const long count = PyLong_AsLong(answer.value.get());
         if (count < 0 || count > ARHOST_MAX_MARKERS)
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
-                          "track must return how many markers it has filled in, 0 to 64");
+                          "track must return the number of markers it filled in, 0 to 64");
         result.marker_count = static_cast<std::uint32_t>(count);
     }
 
     // ray tracers
     void start(const arhost_raytracer_setup &setup) {
-        const Locked locked;
+        const GilLock lock;
         call("start_raytracer", "IINN", setup.width, setup.height,
              view(setup.scene, setup.scene->byte_size).release(), view_of(setup.intrinsics).release());
     }
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        const Locked locked;
+        const GilLock lock;
         std::vector<Object> deformed;
         const arhost_motion *motion = request.motion;
         for (std::uint32_t i = 0; motion && i < motion->deformed_count; ++i) {
@@ -315,13 +320,13 @@ public:
 
     // sinks
     void start(const arhost_sink_setup &setup) {
-        const Locked locked;
+        const GilLock lock;
         call("start_sink", "IIdKsN", setup.width, setup.height, setup.fps,
              static_cast<unsigned long long>(setup.first_sequence), path_.c_str(),
              view_of(setup.intrinsics).release());
     }
     arhost_status write(const arhost_output &output) {
-        const Locked locked;
+        const GilLock lock;
         return call("write", "NIIIN",
                     view(output.bgr, std::size_t(output.stride) * (output.height - 1) + std::size_t(3) * output.width)
                         .release(),
@@ -335,7 +340,7 @@ private:
         Object value;
     };
 
-    // A method of _Adapter. Throws what it says has failed.
+    // Calls a method of _Adapter; throws if it reports an error.
     template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
         const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
         Answer answer{ARHOST_STATUS_ERROR_INTERNAL, {}};
@@ -357,13 +362,13 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_INPUT_PATH, "script", nullptr, "The Python script that has the class."),
-    option(ARHOST_OPTION_TEXT, "class", "", "The class; empty: the only one with a method '" METHOD "'."),
-    option(ARHOST_OPTION_TEXT, "arguments", "{}", "Further arguments of its constructor, a JSON object."),
+    option(ARHOST_OPTION_INPUT_PATH, "script", nullptr, "The Python script that defines the class."),
+    option(ARHOST_OPTION_TEXT, "class", "", "Class name; empty: the only class with a method '" METHOD "'."),
+    option(ARHOST_OPTION_TEXT, "arguments", "{}", "Further constructor arguments, as a JSON object."),
     option(ARHOST_OPTION_INPUT_PATH, "interpreter", "/usr/bin/python3",
-           "The python whose packages are used: that of a virtual environment, say."),
+           "The python whose packages are used, e.g. that of a virtual environment."),
 #if defined(KIND_SINK)
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", "", "The file to write, for classes that write one."),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", "", "The output file, for classes that write one."),
 #endif
 };
 

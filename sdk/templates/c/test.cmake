@@ -1,4 +1,4 @@
-# Runs the plugin in arhost for five frames; all of them must have come through it.
+# Runs the plugin in arhost for five frames; all of them must pass through it.
 execute_process(COMMAND ${ARHOST} --config try.yaml --frames 5 --set @SECTION@.plugin=${PLUGIN}
                 WORKING_DIRECTORY ${CMAKE_CURRENT_LIST_DIR} COMMAND_ERROR_IS_FATAL ANY)
 file(READ ${CMAKE_CURRENT_LIST_DIR}/out/stats.json stats)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What arhost-cpp/plugin.hpp makes of a class.
+// The adapters of arhost-cpp/plugin.hpp.
 #include <arhost-cpp/plugin.hpp>
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ const arhost_host host = {sizeof host,
 
 ARHOST_TRACKER(Thrower, descriptor)
 
-TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
+TEST(CppHelper, ConvertsExceptionsToStatusesAndMessages) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
     arhost_answer answer{sizeof answer, 99, nullptr};
     ASSERT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_STATUS_OK);
@@ -77,17 +77,17 @@ TEST(CppHelper, TurnsExceptionsIntoStatusesAndMessages) {
     answer.plugin->destroy(instance);
 
     EXPECT_EQ(answer.plugin->create(&host, nullptr, 0, &instance), ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
-        << "an option is missing";
+        << "a missing option";
 }
 
-TEST(CppHelper, GivesAClassThatHasDevicesTheExtension) {
+TEST(CppHelper, AddsTheDevicesExtensionToAClassWithDevices) {
     EXPECT_EQ(arhost_plugin_object.get_extension("arhost.devices/2"), nullptr);
     const void *extension = arhost_plugin_object.get_extension("arhost.devices/1");
     ASSERT_NE(extension, nullptr);
     const auto &devices = *static_cast<const arhost_devices *>(extension);
     EXPECT_EQ(devices.struct_size, sizeof(arhost_devices));
 
-    std::vector<std::string> told;
+    std::vector<std::string> listed;
     const arhost_take_device take = [](void *context, const arhost_device *device) {
         EXPECT_EQ(device->struct_size, sizeof(arhost_device));
         const auto text = [](const char *t) { return t ? std::string(t) : "none"; };
@@ -96,13 +96,13 @@ TEST(CppHelper, GivesAClassThatHasDevicesTheExtension) {
             (device->is_default ? " default " : " ") + device->name + " " + text(device->uuid) + " " +
             text(device->abilities));
     };
-    ASSERT_EQ(devices.list(&host, take, &told), ARHOST_STATUS_OK);
-    EXPECT_EQ(told, (std::vector<std::string>{"3 3 default Thrower's a-b throws", "4 4 Else none none"}));
+    ASSERT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_OK);
+    EXPECT_EQ(listed, (std::vector<std::string>{"3 3 default Thrower's a-b throws", "4 4 Else none none"}));
 
     Thrower::no_devices = true;
-    EXPECT_EQ(devices.list(&host, take, &told), ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(logged, "no driver");
-    EXPECT_EQ(told.size(), 2u);
+    EXPECT_EQ(listed.size(), 2u);
     Thrower::no_devices = false;
 }
 
@@ -122,12 +122,12 @@ struct WithAHost {
     }
 };
 struct WithOtherDevices {
-    static int devices() { return 2; } // a name that is the plugin's own affair
+    static int devices() { return 2; } // not a list of devices
 };
 
 } // namespace
 
-TEST(CppHelper, GivesDevicesTheHostIfTheyTakeIt) {
+TEST(CppHelper, PassesTheHostToDevicesIfItTakesOne) {
     const auto *devices =
         static_cast<const arhost_devices *>(arhost::detail::get_extension<WithAHost>(ARHOST_DEVICES_EXTENSION));
     ASSERT_NE(devices, nullptr);
@@ -137,7 +137,7 @@ TEST(CppHelper, GivesDevicesTheHostIfTheyTakeIt) {
     EXPECT_EQ(logged, "looking");
 }
 
-TEST(CppHelper, LeavesOtherExtensionsToTheClass) {
+TEST(CppHelper, DelegatesOtherExtensionsToTheClass) {
     EXPECT_EQ(arhost::detail::get_extension<Deviceless>(ARHOST_DEVICES_EXTENSION), nullptr);
     EXPECT_EQ(arhost::detail::get_extension<WithOtherDevices>(ARHOST_DEVICES_EXTENSION), nullptr);
     const char *other = "somebody.something/1";
@@ -147,7 +147,7 @@ TEST(CppHelper, LeavesOtherExtensionsToTheClass) {
               &arhost::detail::devices_functions<WithBoth>);
 }
 
-TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {
+TEST(CppHelper, RejectsAnOfferWithoutItsVersion) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION + 1, ARHOST_ABI_VERSION + 9};
     arhost_answer answer{sizeof answer, 99, nullptr};
     EXPECT_EQ(arhost_entry.negotiate(&offer, &answer), ARHOST_STATUS_ERROR_UNSUPPORTED);
@@ -156,7 +156,7 @@ TEST(CppHelper, RefusesAnOfferWithoutItsVersion) {
 
 namespace {
 
-// What a host of a later day passes.
+// A struct as extended by a newer host.
 template <class T> struct Longer {
     T known;
     std::uint64_t unknown[2] = {0xa5a5a5a5a5a5a5a5, 0xa5a5a5a5a5a5a5a5};
@@ -164,7 +164,7 @@ template <class T> struct Longer {
 
 } // namespace
 
-TEST(CppHelper, StepsThroughOptionsThatAreLongerThanItKnows) {
+TEST(CppHelper, StepsThroughExtendedOptions) {
     const auto option = [](const char *key, int value) {
         return Longer<arhost_option>{
             {sizeof(Longer<arhost_option>), ARHOST_OPTION_INTEGER, key, value, 0.5 * value, key}};
@@ -180,7 +180,7 @@ TEST(CppHelper, StepsThroughOptionsThatAreLongerThanItKnows) {
     EXPECT_EQ(arhost_find_option(&passed[0].known, 2, "three"), nullptr);
 }
 
-TEST(CppHelper, StepsThroughMarkersThatAreLongerThanItKnows) {
+TEST(CppHelper, StepsThroughExtendedMarkers) {
     constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_marker_config>));
     const Longer<arhost_marker_config> listed[] = {{{size, 4, 80}}, {{size, 7, 40}}};
     const arhost_tracker_setup setup{sizeof setup, 2, nullptr, nullptr, &listed[0].known};

@@ -24,7 +24,7 @@ TEST(FrameLayout, AlignsRowsAndPlanes) {
     EXPECT_EQ(format.byte_size, 320u * 7 + 128u * 7);
 }
 
-TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyOne) {
+TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyPlane) {
     arhost_frame_format format = format_of(ARHOST_PIXEL_FORMAT_I420, 100, 50);
     ASSERT_TRUE(arhost_frame_layout(&format));
     EXPECT_EQ(format.plane_count, 3u);
@@ -34,7 +34,7 @@ TEST(FrameLayout, UsesTheLumaPlaneAsTheGreyOne) {
     EXPECT_EQ(format.byte_size, 128u * 50 + 2u * 64 * 25);
 }
 
-TEST(FrameLayout, RefusesWhatIsNoFormat) {
+TEST(FrameLayout, RejectsInvalidFormats) {
     for (auto [pixel_format, width, height] : {std::tuple{ARHOST_PIXEL_FORMAT_YUYV, 101, 8},
                                                {ARHOST_PIXEL_FORMAT_NV12, 100, 7},
                                                {ARHOST_PIXEL_FORMAT_I420, 99, 8},

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Generated from the headers by tools/make-bindings; do not edit. */
 /*
- * The ABI's binary layout, as every plugin has it compiled in (64-bit Linux, x86-64 and AArch64 alike). In the
- * draft a change is made here as well; once version 1 is frozen an existing line never changes (docs/abi.md).
+ * The ABI's binary layout on 64-bit Linux (x86-64 and AArch64 alike), checked by the C compiler. While version 1 is a
+ * draft this file may change with the headers; once it is frozen, no existing line may change (docs/abi.md).
  */
 #include <arhost/arhost.h>
 
@@ -11,6 +12,7 @@
     _Static_assert(offsetof(type, field) == (offset) && sizeof(((type *)0)->field) == (size), #type "." #field)
 
 /* arhost/plugin.h */
+VALUE(ARHOST_ABI_VERSION, 0);
 VALUE(ARHOST_STATUS_OK, 1);
 VALUE(ARHOST_STATUS_END, 2);
 VALUE(ARHOST_STATUS_END_TRUNCATED, 3);
@@ -32,16 +34,6 @@ VALUE(ARHOST_SEVERITY_WARNING, 3);
 VALUE(ARHOST_SEVERITY_ERROR, 4);
 VALUE(ARHOST_SEVERITY_HOST_MISBEHAVING, 5);
 VALUE(ARHOST_SEVERITY_PLUGIN_MISBEHAVING, 6);
-VALUE(ARHOST_OPTION_BOOL, 1);
-VALUE(ARHOST_OPTION_INTEGER, 2);
-VALUE(ARHOST_OPTION_REAL, 3);
-VALUE(ARHOST_OPTION_TEXT, 4);
-VALUE(ARHOST_OPTION_INPUT_PATH, 5);
-VALUE(ARHOST_OPTION_OUTPUT_PATH, 6);
-VALUE(ARHOST_CAPABILITY_SEEK, 1);
-VALUE(ARHOST_CAPABILITY_LIVE, 2);
-VALUE(ARHOST_CAPABILITY_LENS_DISTORTION, 4);
-VALUE(ARHOST_CAPABILITY_REALTIME_SINK, 16);
 
 STRUCT(arhost_host, 64);
 FIELD(arhost_host, struct_size, 0, 4);
@@ -53,6 +45,12 @@ FIELD(arhost_host, log, 32, 8);
 FIELD(arhost_host, progress, 40, 8);
 FIELD(arhost_host, cancelled, 48, 8);
 FIELD(arhost_host, get_extension, 56, 8);
+VALUE(ARHOST_OPTION_BOOL, 1);
+VALUE(ARHOST_OPTION_INTEGER, 2);
+VALUE(ARHOST_OPTION_REAL, 3);
+VALUE(ARHOST_OPTION_TEXT, 4);
+VALUE(ARHOST_OPTION_INPUT_PATH, 5);
+VALUE(ARHOST_OPTION_OUTPUT_PATH, 6);
 
 STRUCT(arhost_option_descriptor, 56);
 FIELD(arhost_option_descriptor, struct_size, 0, 4);
@@ -71,6 +69,10 @@ FIELD(arhost_option, key, 8, 8);
 FIELD(arhost_option, integer, 16, 8);
 FIELD(arhost_option, real, 24, 8);
 FIELD(arhost_option, text, 32, 8);
+VALUE(ARHOST_CAPABILITY_SEEK, 1);
+VALUE(ARHOST_CAPABILITY_LIVE, 2);
+VALUE(ARHOST_CAPABILITY_LENS_DISTORTION, 4);
+VALUE(ARHOST_CAPABILITY_REALTIME_SINK, 16);
 
 STRUCT(arhost_descriptor, 80);
 FIELD(arhost_descriptor, struct_size, 0, 4);
@@ -239,14 +241,14 @@ FIELD(arhost_source, stop, 24, 8);
 /* arhost/tracker.h */
 VALUE(ARHOST_MAX_MARKERS, 64);
 VALUE(ARHOST_MAX_FAMILY, 32);
-VALUE(ARHOST_MARKER_DETECTED, 1);
-VALUE(ARHOST_MARKER_PREDICTED, 2);
-VALUE(ARHOST_MARKER_LOST, 3);
 
 STRUCT(arhost_marker_config, 16);
 FIELD(arhost_marker_config, struct_size, 0, 4);
 FIELD(arhost_marker_config, id, 4, 4);
 FIELD(arhost_marker_config, side_mm, 8, 8);
+VALUE(ARHOST_MARKER_DETECTED, 1);
+VALUE(ARHOST_MARKER_PREDICTED, 2);
+VALUE(ARHOST_MARKER_LOST, 3);
 
 STRUCT(arhost_marker, 384);
 FIELD(arhost_marker, struct_size, 0, 4);
@@ -282,44 +284,15 @@ FIELD(arhost_tracker, stop, 24, 8);
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
 VALUE(ARHOST_SCENE_VERSION, 2);
 VALUE(ARHOST_NONE, 0xffffffff);
-VALUE(ARHOST_AXES_Z_UP, 1);
-VALUE(ARHOST_AXES_Y_UP, 2);
-VALUE(ARHOST_GEOMETRY_TRIANGLES, 1);
-VALUE(ARHOST_GEOMETRY_SPHERES, 2);
-VALUE(ARHOST_TEXEL_SRGB8, 1);
-VALUE(ARHOST_TEXEL_RGBA8, 2);
-VALUE(ARHOST_TEXEL_RGBA32F, 3);
-VALUE(ARHOST_WRAP_REPEAT, 1);
-VALUE(ARHOST_WRAP_CLAMP, 2);
-VALUE(ARHOST_WRAP_MIRROR, 3);
-VALUE(ARHOST_MATERIAL_DIFFUSE, 1);
-VALUE(ARHOST_MATERIAL_SPECULAR, 2);
-VALUE(ARHOST_MATERIAL_MIRROR, 3);
-VALUE(ARHOST_MATERIAL_METAL, 4);
-VALUE(ARHOST_MATERIAL_GLASS, 5);
-VALUE(ARHOST_MATERIAL_METALLIC_ROUGHNESS, 6);
-VALUE(ARHOST_ROLE_VIRTUAL, 1);
-VALUE(ARHOST_ROLE_CATCHER, 2);
-VALUE(ARHOST_ROLE_OCCLUDER, 3);
-VALUE(ARHOST_CHANNEL_TRANSLATION, 1);
-VALUE(ARHOST_CHANNEL_ROTATION, 2);
-VALUE(ARHOST_CHANNEL_SCALE, 3);
-VALUE(ARHOST_CHANNEL_MORPH_WEIGHTS, 4);
-VALUE(ARHOST_INTERPOLATION_STEP, 1);
-VALUE(ARHOST_INTERPOLATION_LINEAR, 2);
-VALUE(ARHOST_INTERPOLATION_CUBIC, 3);
-VALUE(ARHOST_LIGHT_POINT, 1);
-VALUE(ARHOST_LIGHT_DIRECTIONAL, 2);
-VALUE(ARHOST_LIGHT_SPOT, 3);
-VALUE(ARHOST_LIGHT_RECTANGLE, 4);
-VALUE(ARHOST_LIGHT_SPHERE, 5);
-VALUE(ARHOST_FALLOFF_NONE, 1);
-VALUE(ARHOST_FALLOFF_INVERSE_SQUARE, 2);
 
 STRUCT(arhost_buffer, 16);
 FIELD(arhost_buffer, offset, 0, 8);
 FIELD(arhost_buffer, count, 8, 4);
 FIELD(arhost_buffer, stride, 12, 4);
+VALUE(ARHOST_AXES_Z_UP, 1);
+VALUE(ARHOST_AXES_Y_UP, 2);
+VALUE(ARHOST_GEOMETRY_TRIANGLES, 1);
+VALUE(ARHOST_GEOMETRY_SPHERES, 2);
 
 STRUCT(arhost_geometry, 136);
 FIELD(arhost_geometry, type, 0, 4);
@@ -332,6 +305,12 @@ FIELD(arhost_geometry, joints, 72, 16);
 FIELD(arhost_geometry, weights, 88, 16);
 FIELD(arhost_geometry, morph_positions, 104, 16);
 FIELD(arhost_geometry, morph_normals, 120, 16);
+VALUE(ARHOST_TEXEL_SRGB8, 1);
+VALUE(ARHOST_TEXEL_RGBA8, 2);
+VALUE(ARHOST_TEXEL_RGBA32F, 3);
+VALUE(ARHOST_WRAP_REPEAT, 1);
+VALUE(ARHOST_WRAP_CLAMP, 2);
+VALUE(ARHOST_WRAP_MIRROR, 3);
 
 STRUCT(arhost_texture, 40);
 FIELD(arhost_texture, format, 0, 4);
@@ -341,6 +320,12 @@ FIELD(arhost_texture, wrap_u, 12, 4);
 FIELD(arhost_texture, wrap_v, 16, 4);
 FIELD(arhost_texture, name, 20, 4);
 FIELD(arhost_texture, texels, 24, 16);
+VALUE(ARHOST_MATERIAL_DIFFUSE, 1);
+VALUE(ARHOST_MATERIAL_SPECULAR, 2);
+VALUE(ARHOST_MATERIAL_MIRROR, 3);
+VALUE(ARHOST_MATERIAL_METAL, 4);
+VALUE(ARHOST_MATERIAL_GLASS, 5);
+VALUE(ARHOST_MATERIAL_METALLIC_ROUGHNESS, 6);
 
 STRUCT(arhost_material, 172);
 FIELD(arhost_material, model, 0, 4);
@@ -368,6 +353,9 @@ FIELD(arhost_material, cutoff_colour, 148, 12);
 FIELD(arhost_material, importance_cutoff, 160, 4);
 FIELD(arhost_material, reflection_depth, 164, 4);
 FIELD(arhost_material, refraction_depth, 168, 4);
+VALUE(ARHOST_ROLE_VIRTUAL, 1);
+VALUE(ARHOST_ROLE_CATCHER, 2);
+VALUE(ARHOST_ROLE_OCCLUDER, 3);
 
 STRUCT(arhost_object, 80);
 FIELD(arhost_object, geometry, 0, 4);
@@ -388,6 +376,13 @@ FIELD(arhost_node, translation, 56, 12);
 FIELD(arhost_node, rotation, 68, 16);
 FIELD(arhost_node, scale, 84, 12);
 FIELD(arhost_node, morph_weights, 96, 16);
+VALUE(ARHOST_CHANNEL_TRANSLATION, 1);
+VALUE(ARHOST_CHANNEL_ROTATION, 2);
+VALUE(ARHOST_CHANNEL_SCALE, 3);
+VALUE(ARHOST_CHANNEL_MORPH_WEIGHTS, 4);
+VALUE(ARHOST_INTERPOLATION_STEP, 1);
+VALUE(ARHOST_INTERPOLATION_LINEAR, 2);
+VALUE(ARHOST_INTERPOLATION_CUBIC, 3);
 
 STRUCT(arhost_channel, 48);
 FIELD(arhost_channel, node, 0, 4);
@@ -400,6 +395,13 @@ FIELD(arhost_channel, values, 32, 16);
 STRUCT(arhost_skin, 32);
 FIELD(arhost_skin, joints, 0, 16);
 FIELD(arhost_skin, node_from_mesh, 16, 16);
+VALUE(ARHOST_LIGHT_POINT, 1);
+VALUE(ARHOST_LIGHT_DIRECTIONAL, 2);
+VALUE(ARHOST_LIGHT_SPOT, 3);
+VALUE(ARHOST_LIGHT_RECTANGLE, 4);
+VALUE(ARHOST_LIGHT_SPHERE, 5);
+VALUE(ARHOST_FALLOFF_NONE, 1);
+VALUE(ARHOST_FALLOFF_INVERSE_SQUARE, 2);
 
 STRUCT(arhost_light, 80);
 FIELD(arhost_light, type, 0, 4);
@@ -507,9 +509,6 @@ FIELD(arhost_raytracer, render, 16, 8);
 FIELD(arhost_raytracer, stop, 24, 8);
 
 /* arhost/sink.h */
-VALUE(ARHOST_OVERLAY_RENDERED, 1);
-VALUE(ARHOST_OVERLAY_HELD, 2);
-VALUE(ARHOST_OVERLAY_NONE, 3);
 
 STRUCT(arhost_sink_setup, 40);
 FIELD(arhost_sink_setup, struct_size, 0, 4);
@@ -519,6 +518,9 @@ FIELD(arhost_sink_setup, reserved, 12, 4);
 FIELD(arhost_sink_setup, fps, 16, 8);
 FIELD(arhost_sink_setup, first_sequence, 24, 8);
 FIELD(arhost_sink_setup, intrinsics, 32, 8);
+VALUE(ARHOST_OVERLAY_RENDERED, 1);
+VALUE(ARHOST_OVERLAY_HELD, 2);
+VALUE(ARHOST_OVERLAY_NONE, 3);
 
 STRUCT(arhost_record, 24984);
 FIELD(arhost_record, struct_size, 0, 4);

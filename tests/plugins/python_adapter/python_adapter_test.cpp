@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Scripts in the real arhost: what they see, and what becomes of their errors.
+// Runs scripts in the real arhost: what they receive, and how their errors are reported.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -21,12 +21,12 @@ protected:
     }
 };
 
-// The counting plugins, but for the one under test; six frames.
-std::string chain(const std::string &replaced, const std::string &by) {
+// The counting plugins with one component replaced; six frames.
+std::string chain(const std::string &prefix, const std::string &replacement) {
     std::istringstream lines(counting("lockstep", "frames: 6", "", ""));
     std::string result;
     for (std::string line; std::getline(lines, line);)
-        result += line.starts_with(replaced) ? by + "\n" : line + "\n";
+        result += line.starts_with(prefix) ? replacement + "\n" : line + "\n";
     return result;
 }
 const std::string tracker = chain(
@@ -65,10 +65,10 @@ class Tracker:
         try:
             frame.grey[0, 0] = 1
             return 0
-        except ValueError: # arhost's memory is read-only to it
+        except ValueError: # input frames are read-only
             pass
         m = markers[0]
-        m["id"], m["family"], m["state"] = self.id, b"python", arhost.DETECTED
+        m["id"], m["family"], m["state"] = self.id, b"python", arhost.MARKER_DETECTED
         mt = np.eye(4)
         mt[2, 3] = -500 - frame.sequence
         m["mt"] = mt.T.reshape(16)
@@ -76,7 +76,7 @@ class Tracker:
 )"),
               0)
         << run.output();
-    // rt_counter writes the number that the pose says into the image, sink_counter compares it with the frame's.
+    // rt_counter encodes the pose's frame number in the image; sink_counter compares it with the frame's own.
     EXPECT_EQ(run.stats()["frames"]["augmented"], 6);
     const auto lines = counted(run);
     ASSERT_EQ(lines.size(), 6u);
@@ -93,7 +93,7 @@ class Tracer:
     def __init__(self, host): pass
     def start(self, setup):
         scene = setup.scene
-        assert scene.axes == arhost.Z_UP and len(scene.objects) == 1 and scene.objects[0]["role"] == arhost.VIRTUAL
+        assert scene.axes == arhost.AXES_Z_UP and len(scene.objects) == 1 and scene.objects[0]["role"] == arhost.ROLE_VIRTUAL
         sphere = scene.elements(scene.geometries[0]["positions"], "4f4")
         assert sphere.tolist() == [[0, 0, 10, 10]], sphere
         assert scene.bounds_max.tolist() == [10, 10, 20] and scene.materials[0]["diffuse"].tolist() == [0.5] * 3
@@ -113,7 +113,7 @@ class Tracer:
         EXPECT_EQ(lines[i].overlay, std::to_string(i));
 }
 
-TEST_F(PythonAdapter, SourceAndSinkPassFramesOn) {
+TEST_F(PythonAdapter, SourceAndSinkExchangeFrames) {
     ArhostRun run(
         "version: 1\nsource: {plugin: source_python, options: {script: script.py, class: Source, "
         "arguments: '{\"frames\": 3}'}}\n"
@@ -122,7 +122,7 @@ TEST_F(PythonAdapter, SourceAndSinkPassFramesOn) {
 import arhost
 class Source:
     def __init__(self, host, frames): self.frames = frames
-    def start(self, setup): return {"width": 66, "height": 34, "pixel_format": arhost.NV12, "fps": 25}
+    def start(self, setup): return {"width": 66, "height": 34, "pixel_format": arhost.PIXEL_FORMAT_NV12, "fps": 25}
     def read(self, buffer):
         if buffer.sequence >= self.frames: return None
         y, uv = buffer.planes
@@ -176,12 +176,12 @@ class Tracker:
     EXPECT_THAT(run.output(), HasSubstr("from a thread"));
 }
 
-TEST_F(PythonAdapter, AnExceptionCostsItsFrameAndNamesItsLine) {
+TEST_F(PythonAdapter, AnExceptionSkipsItsFrameAndReportsItsLine) {
     for (const auto &[statement, message] :
          {std::pair{"1 / 0", "script.py:6: ZeroDivisionError: division by zero"},
           {"sys.exit(3)", "the script called sys.exit(3)"},
           {"raise KeyboardInterrupt", "script.py:6: KeyboardInterrupt"},
-          {"raise arhost.Failure('the lamp is off', arhost.ERROR_IO)", "the lamp is off"}}) {
+          {"raise arhost.Failure('the lamp is off', arhost.STATUS_ERROR_IO)", "the lamp is off"}}) {
         ArhostRun run(tracker);
         EXPECT_EQ(
             run_script(run, std::string("import arhost, sys\nclass T:\n    def __init__(self, host): pass\n"
@@ -196,17 +196,17 @@ TEST_F(PythonAdapter, AnExceptionCostsItsFrameAndNamesItsLine) {
     }
 }
 
-TEST_F(PythonAdapter, AnArrayThatIsKeptIsToldOf) {
+TEST_F(PythonAdapter, WarnsIfAScriptKeepsAnArray) {
     ArhostRun run(tracker);
     EXPECT_EQ(run_script(run, "class T:\n    def __init__(self, host): pass\n    def start(self, setup): pass\n"
                               "    def track(self, frame, markers):\n        self.last = frame.grey[10:20]\n"
                               "        return 0\n"),
               0);
-    EXPECT_THAT(run.output(), HasSubstr("'track' has kept an array"));
+    EXPECT_THAT(run.output(), HasSubstr("'track' kept an array"));
 }
 
-// What can't work is told before the run, at the component's line, and not tried again.
-TEST_F(PythonAdapter, ScriptsThatCannotWorkAreConfigurationErrors) {
+// Reported before the run at the component's line in the configuration, without a retry.
+TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
     const std::string two = std::string(idle_tracker) + "class U(T): pass\n";
     for (const auto &[script, message] :
          {std::pair<std::string, const char *>{"class T\n", "script.py:1: SyntaxError"},
@@ -224,7 +224,7 @@ TEST_F(PythonAdapter, ScriptsThatCannotWorkAreConfigurationErrors) {
                                      "}, markers: [{id: 3, side_mm: 80}]}");
     };
     for (const auto &[options, message] :
-         {std::pair{"script: none.py", "there is no file"},
+         {std::pair{"script: none.py", "names a file that does not exist"},
           {"script: script.py, arguments: '{'", "the option 'arguments' is not valid JSON"},
           {"script: script.py, arguments: '[1]'", "must be a JSON object"},
           {"script: script.py, class: U", "has no classes named 'U'"}}) {

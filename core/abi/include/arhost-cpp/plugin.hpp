@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-cpp/plugin.hpp: the C ABI's boilerplate for plugins written in C++20. Header-only; it adds
-// nothing to the ABI. A plugin is a class, made known by one macro:
+// arhost-cpp/plugin.hpp: the C ABI's boilerplate for plugins in C++20, header-only. A plugin is a class that one
+// macro exports:
 //
 //   class Grey {
 //   public:
@@ -11,8 +11,8 @@
 //   };
 //   ARHOST_TRACKER(Grey, descriptor)
 //
-// Members throw arhost::Failure (or any std::exception) with a message for the user; the adapters below
-// log it and turn it into a status, so nothing is thrown across the ABI.
+// Members report errors by throwing arhost::Failure (or any std::exception) with a message for the user. The adapters
+// below log the message and return a status, so no exception crosses the ABI.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -29,7 +29,7 @@
 
 namespace arhost {
 
-// An error for the user: which ARHOST_ERROR_…, and a sentence that names what to mend.
+// An error for the user: an ARHOST_STATUS_ERROR_…, and a message that says what to change.
 class Failure : public std::runtime_error {
 public:
     Failure(arhost_status status, const std::string &message) : std::runtime_error(message), status_(status) {}
@@ -39,7 +39,7 @@ private:
     arhost_status status_;
 };
 
-// The host's callbacks. Cheap to copy; every function may be called on any thread.
+// The host's callbacks. Cheap to copy; all functions may be called on any thread.
 class Host {
 public:
     explicit Host(const arhost_host *host) : host_(host) {}
@@ -49,16 +49,16 @@ public:
     void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
     bool cancelled() const { return host_->cancelled(host_) != 0; }
-    // Sleeps until `when`, or until the host cancels: then it returns false.
+    // Sleeps until `when`. Returns false, early, if the host cancels.
     bool wait_until(std::chrono::steady_clock::time_point when) const {
-        constexpr auto patience = std::chrono::milliseconds(20); // between looks at cancelled()
+        constexpr auto poll_interval = std::chrono::milliseconds(20);
         for (;;) {
             const auto now = std::chrono::steady_clock::now();
             if (now >= when)
                 return true;
             if (cancelled())
                 return false;
-            std::this_thread::sleep_until(std::min(when, now + patience));
+            std::this_thread::sleep_until(std::min(when, now + poll_interval));
         }
     }
 
@@ -66,7 +66,7 @@ private:
     const arhost_host *host_;
 };
 
-// The option values handed to `create`. A key that the descriptor does not declare is a defect.
+// The option values passed to `create`. Requesting a key that the descriptor does not declare throws.
 class Options {
 public:
     Options(const arhost_option *first, std::uint32_t count) : first_(first), count_(count) {}
@@ -79,28 +79,27 @@ private:
     const arhost_option &find(const std::string &key) const {
         if (const arhost_option *option = arhost_find_option(first_, count_, key.c_str()))
             return *option;
-        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the option '" + key + "' was not passed");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the option '" + key + "' is missing");
     }
     const arhost_option *first_;
     std::uint32_t count_;
 };
 
-// A marker of the list in a tracker's setup, whose elements may be longer than is known here.
+// Element `i` of setup.markers, whose elements a newer host may have extended.
 inline const arhost_marker_config &listed_marker(const arhost_tracker_setup &setup, std::size_t i) {
     return *reinterpret_cast<const arhost_marker_config *>(reinterpret_cast<const char *>(setup.markers) +
                                                            i * setup.markers->struct_size);
 }
 
-// A descriptor's option, with the fields in the order that they are read in.
+// An arhost_option_descriptor, with the optional fields last.
 constexpr arhost_option_descriptor option(arhost_option_type type, const char *key, const char *default_value,
                                           const char *help, double minimum = 0, double maximum = 0,
                                           const char *const *choices = nullptr) {
     return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
 }
 
-// What a plugin could run on. A class with a static member `std::vector<arhost::Device> devices()`, or one that takes
-// `const arhost::Host &`, has the extension of arhost/devices.h, where the fields are explained; "" is for what a
-// device does not have.
+// A device of the extension in arhost/devices.h, which documents the fields; "" stands for NULL. A class gets the
+// extension by a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host &)`.
 struct Device {
     std::uint32_t index = 0;
     arhost_device_kind kind = ARHOST_DEVICE_OTHER;
@@ -110,7 +109,7 @@ struct Device {
 
 namespace detail {
 
-// What arhost_instance is for a plugin written as the class T.
+// The arhost_instance of a plugin that is written as the class T.
 template <class T> struct Instance {
     Host host;
     T plugin;
@@ -121,12 +120,12 @@ template <class T> Instance<T> &instance_of(arhost_instance *instance) {
     return *reinterpret_cast<Instance<T> *>(instance);
 }
 
-// Runs `call` and turns what it throws into a logged message and a status.
+// Runs `call`; logs an exception and converts it to a status.
 template <class Call> arhost_status guarded(const Host &host, Call &&call) noexcept {
     try {
         return call();
     } catch (const Failure &failure) {
-        // That it was cancelled is no fault.
+        // Cancellation is not an error.
         host.log(failure.status() == ARHOST_STATUS_ERROR_CANCELLED ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_ERROR,
                  failure.what());
         return failure.status();
@@ -137,7 +136,7 @@ template <class Call> arhost_status guarded(const Host &host, Call &&call) noexc
         host.error(error.what());
         return ARHOST_STATUS_ERROR_INTERNAL;
     } catch (...) {
-        host.log(ARHOST_SEVERITY_ERROR, "an exception of unknown type");
+        host.log(ARHOST_SEVERITY_ERROR, "exception of unknown type");
         return ARHOST_STATUS_ERROR_INTERNAL;
     }
 }
@@ -193,7 +192,7 @@ arhost_status list_devices(const arhost_host *host, arhost_take_device take, voi
 template <ListsDevices T>
 inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), list_devices<T>};
 
-// Members that a class may leave out.
+// Optional members of the class.
 template <class T> void stop(T &plugin) {
     if constexpr (requires { plugin.stop(); })
         plugin.stop();
@@ -211,7 +210,7 @@ template <class T> const void *get_extension(const char *id) {
         return no_extension(id);
 }
 
-// The kinds' function tables. `read` and `write` return an arhost_status, since ARHOST_STATUS_END is no error.
+// The function tables of the kinds. `read`, `write` and `idle` return an arhost_status: it may be ARHOST_STATUS_END.
 template <class T>
 inline constexpr arhost_source source_functions = {
     sizeof(arhost_source),
@@ -264,21 +263,21 @@ template <class T> inline constexpr arhost_sink sink_functions = make_sink_funct
 
 } // namespace detail
 
-// Answers a loader's offer for `plugin`; what ARHOST_SOURCE and its like define negotiate with.
+// Implements arhost_entry_point.negotiate for `plugin`.
 inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer, const arhost_plugin &plugin) {
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
         return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
-    const std::uint32_t spoken = ARHOST_ABI_VERSION;
-    if (std::clamp(spoken, offer->oldest_abi_version, offer->newest_abi_version) != spoken)
+    const std::uint32_t version = ARHOST_ABI_VERSION;
+    if (version < offer->oldest_abi_version || version > offer->newest_abi_version)
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
-    answer->abi_version = spoken;
+    answer->abi_version = version;
     answer->plugin = &plugin;
     return ARHOST_STATUS_OK;
 }
 
 } // namespace arhost
 
-// Defines arhost_entry for a class and its arhost_descriptor. Once a library, outside any namespace.
+// Defines arhost_entry for a class and its arhost_descriptor. Use once per library, at global scope.
 #define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                            \
     static constexpr arhost_plugin arhost_plugin_object = {                                                          \
         sizeof(arhost_plugin),         &(descriptor_object),           &arhost::detail::functions_object<Class>,     \

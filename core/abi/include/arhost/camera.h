@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/camera.h: the lens, and the camera as ray tracers are given it.
+ * arhost/camera.h: lens intrinsics, and the camera that a render request specifies.
  *
- * A point (x, y, z) in the camera's OpenCV axes (x right, y down, z forward) is seen at the pixel
- *   u = fx·x'' + cx,  v = fy·y'' + cy,  (x'', y'') = distort(x/z, y/z)
- * with pixel centres at integers (arhost/frame.h), so the default principal point is
+ * A point (x, y, z) in camera coordinates (OpenCV: x right, y down, z forward) projects to the pixel
+ *   u = fx·x'' + cx,  v = fy·y'' + cy,  (x'', y'') = distort(x/z, y/z).
+ * Pixel centres are at integer coordinates (arhost/frame.h), so the default principal point is
  * ((width−1)/2, (height−1)/2).
  */
 #ifndef ARHOST_CAMERA_H
@@ -19,10 +19,10 @@ extern "C" {
 typedef int32_t arhost_distortion;
 enum {
     ARHOST_DISTORTION_NONE = 1,
-    /* Brown–Conrady as in OpenCV's calib3d: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]; the count is
-     * 4, 5, 8 or 12. */
+    /* Brown–Conrady, as in OpenCV's calib3d: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]; 4, 5, 8 or 12
+     * coefficients. */
     ARHOST_DISTORTION_BROWN = 2,
-    /* Kannala–Brandt as in OpenCV's fisheye: k1 k2 k3 k4. */
+    /* Kannala–Brandt, as in OpenCV's fisheye: k1 k2 k3 k4. */
     ARHOST_DISTORTION_FISHEYE = 3
 };
 
@@ -30,18 +30,19 @@ enum { ARHOST_MAX_DISTORTION = 12 };
 
 typedef struct arhost_intrinsics {
     uint32_t struct_size;
-    uint32_t width, height; /* px, of the image that the numbers below belong to */
+    uint32_t width, height; /* px, of the image to which the values below apply */
     arhost_distortion distortion;
-    double fx, fy; /* focal lengths in px, > 0 */
-    double cx, cy; /* principal point in px */
+    double fx, fy; /* focal lengths, px, > 0 */
+    double cx, cy; /* principal point, px */
     uint32_t coefficient_count;
     uint32_t reserved; /* 0 */
     double coefficients[ARHOST_MAX_DISTORTION];
 } arhost_intrinsics;
 
-/* A camera in the scene's world: right-handed, millimetres. `look_at` − `eye` has length 1 where it comes
- * from a marker, and `up` is perpendicular to it with length 1; a trajectory's are what its file says. A
- * ray tracer copes with any that are not parallel, by w = eye − look_at, u = up × w, v = w × u. */
+/* A camera in world coordinates: right-handed, millimetres. The camera axes are
+ *   w = eye − look_at (backward),  u = up × w (right),  v = w × u (up), each normalised.
+ * A camera derived from a marker has |look_at − eye| = 1 and a unit `up` perpendicular to it; one from a trajectory
+ * file may have any `up` that is not parallel to w. */
 typedef struct arhost_camera {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/devices.h: the extension "arhost.devices/1", by which a plugin tells what devices it could run on. It is for
- * people who choose one: `arhost plugins --devices` shows it. Which option of the plugin takes the choice, and how,
- * that option's help says.
+ * arhost/devices.h: the extension "arhost.devices/1": lists the devices that a plugin can run on.
  *
- * plugin.get_extension(ARHOST_DEVICES_EXTENSION) gives an arhost_devices, or NULL where the plugin has nothing to
- * choose from.
+ * `arhost plugins --devices` prints the list for users. The plugin selects a device by one of its own options, whose
+ * help text describes the syntax.
+ *
+ * plugin.get_extension(ARHOST_DEVICES_EXTENSION) returns a pointer to arhost_devices, or NULL if the plugin offers no
+ * choice.
  */
 #ifndef ARHOST_DEVICES_H
 #define ARHOST_DEVICES_H
@@ -18,40 +19,41 @@ extern "C" {
 
 #define ARHOST_DEVICES_EXTENSION "arhost.devices/1"
 
-/* A host shows a kind that it does not know as ARHOST_DEVICE_OTHER. */
+/* The host displays an unknown kind as ARHOST_DEVICE_OTHER. */
 typedef int32_t arhost_device_kind;
 enum {
     ARHOST_DEVICE_DISCRETE_GPU = 1,
     ARHOST_DEVICE_INTEGRATED_GPU = 2,
-    ARHOST_DEVICE_VIRTUAL_GPU = 3, /* a share of one, in a virtual machine */
-    ARHOST_DEVICE_CPU = 4,         /* by a driver that computes on the processor too */
+    ARHOST_DEVICE_VIRTUAL_GPU = 3, /* a GPU share in a virtual machine */
+    ARHOST_DEVICE_CPU = 4,         /* including software drivers that run on the CPU */
     ARHOST_DEVICE_OTHER = 5
 };
 
-/* One device. Texts are UTF-8; a host shows 256 bytes of each. */
+/* One device. The host displays at most 256 bytes of each string. */
 typedef struct arhost_device {
     uint32_t struct_size;
-    uint32_t index; /* its number in this list, as the plugin's option counts where it takes one */
+    uint32_t index; /* position in this list; also the number that the plugin's option takes, if it takes one */
     arhost_device_kind kind;
-    int32_t is_default;    /* non-zero: taken where no other is chosen; of one at most */
-    const char *name;      /* for people, as its driver calls it; not NULL */
-    const char *uuid;      /* the same after a restart and, where drivers give one, in other programs:
-                            * "d4a1e1ba-0b5f-…"; NULL: it has none */
-    const char *abilities; /* what the plugin can do there: "paths: pipeline, query, plain"; NULL: nothing to tell */
+    int32_t is_default;    /* non-zero: used if the user selects none; set on at most one device */
+    const char *name;      /* display name reported by the driver; not NULL */
+    const char *uuid;      /* stable across restarts and, if reported by the driver, across programs:
+                            * "d4a1e1ba-0b5f-…"; NULL: none */
+    const char *abilities; /* what the plugin supports on it: "paths: pipeline, query, plain"; NULL: unspecified */
 } arhost_device;
 
-/* [worker] The host's: takes one device, which need not outlive the call. `context` is what `list` was given. */
+/* [worker] Callback of the host that receives one device; the device and its strings need only be valid during the
+ * call. `context` is the one passed to `list`. */
 typedef void (*arhost_take_device)(void *context, const arhost_device *device);
 
-/* Static, as long as the library lives. */
+/* Static storage: valid as long as the library is loaded. */
 typedef struct arhost_devices {
     uint32_t struct_size;
 
-    /* [worker] From negotiate on, without an instance, as often as the host likes. Calls `take` once for each device,
-     * in the order of `index`, and closes what it opened for that before it returns. It may take seconds, until
-     * drivers are loaded; a host waits some twenty, and takes the first 64 devices. ARHOST_STATUS_OK without a device
-     * where there is none, or no driver. Any error where it can't tell, after the reason has been logged with
-     * ARHOST_SEVERITY_ERROR. */
+    /* [worker, negotiated or later] Calls `take` once per device, in order of `index`, and releases everything it
+     * opened before it returns. The host may call it repeatedly and keeps the first 64 devices. It may take seconds
+     * while drivers load; the host's timeout is about 20 s. Returns ARHOST_STATUS_OK without calling `take` if there
+     * is no device or driver. If it cannot enumerate devices, logs the reason with ARHOST_SEVERITY_ERROR and returns
+     * any error. */
     arhost_status (*list)(const arhost_host *host, arhost_take_device take, void *context);
 } arhost_devices;
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/frame.h: video frames as they lie in shared memory.
+ * arhost/frame.h: layout of video frames in shared memory.
  *
- * Pixels: centres at integer coordinates, the first pixel of the first row (top left) is (0, 0), as in
- * OpenCV's calibrations. Rows run downwards.
+ * Pixel coordinates are those of OpenCV's calibrations: centres at integers, (0, 0) is the centre of the top left
+ * pixel, y points down. The first row is the top one.
  */
 #ifndef ARHOST_FRAME_H
 #define ARHOST_FRAME_H
@@ -19,46 +19,46 @@ enum {
     ARHOST_PIXEL_FORMAT_GREY8 = 1, /* 1 plane: Y */
     ARHOST_PIXEL_FORMAT_RGB8 = 2,  /* 1 plane: R G B */
     ARHOST_PIXEL_FORMAT_BGR8 = 3,  /* 1 plane: B G R */
-    ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; width is even */
-    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y, then U V interleaved at half size; width and height are even */
-    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V, the last two at half size; width and height are even */
+    ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; even width */
+    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y; interleaved U V at half size. Even width and height */
+    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V; U and V at half size. Even width and height */
 };
 
-/* How Y, U and V were made from R'G'B'. Set for YUYV, NV12 and I420; ignored otherwise. */
+/* R'G'B' to Y'CbCr conversion. Required for YUYV, NV12 and I420, ignored otherwise. */
 typedef int32_t arhost_yuv_matrix;
 enum { ARHOST_YUV_MATRIX_BT601 = 1, ARHOST_YUV_MATRIX_BT709 = 2 };
 typedef int32_t arhost_yuv_range;
 enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 
-/* What a capture time counts. */
+/* The clock of a capture time. */
 typedef int32_t arhost_clock;
 enum {
-    ARHOST_CLOCK_MONOTONIC = 1, /* CLOCK_MONOTONIC of this machine: cameras */
-    ARHOST_CLOCK_MEDIA = 2      /* from the start of the file or of the synthetic sequence */
+    ARHOST_CLOCK_MONOTONIC = 1, /* this machine's CLOCK_MONOTONIC; for cameras */
+    ARHOST_CLOCK_MEDIA = 2      /* time since the start of the file or synthetic sequence */
 };
 
 enum { ARHOST_MAX_PLANES = 3, ARHOST_MAX_IMAGE_SIDE = 16384 };
 
-/* The layout of every frame of a source, fixed from its start to its stop. The source sets the fields
- * of the first group and calls arhost_frame_layout for the second. */
+/* The layout of all frames of a source, constant from its start to its stop. The source sets the first group of
+ * fields and calls arhost_frame_layout to fill in the second. */
 typedef struct arhost_frame_format {
     uint32_t struct_size;
     arhost_pixel_format pixel_format;
     uint32_t width, height; /* px, 1 to ARHOST_MAX_IMAGE_SIDE */
     arhost_yuv_matrix yuv_matrix;
     arhost_yuv_range yuv_range;
-    double fps; /* nominal frames a second; 0 where unknown */
+    double fps; /* nominal frame rate, 1/s; 0: unknown */
 
     uint32_t plane_count;
-    uint32_t stride[ARHOST_MAX_PLANES]; /* bytes from a row to the next, a multiple of 64 */
-    uint64_t offset[ARHOST_MAX_PLANES]; /* bytes from the slot's start, a multiple of 64 */
+    uint32_t stride[ARHOST_MAX_PLANES]; /* bytes per row, a multiple of 64 */
+    uint64_t offset[ARHOST_MAX_PLANES]; /* bytes from the start of the slot, a multiple of 64 */
     uint32_t grey_stride;
-    uint64_t grey_offset; /* of the grey plane: plane 0 where that is luma already, else a plane of its
-                             own which the worker fills once for all trackers */
-    uint64_t byte_size;   /* of a slot */
+    uint64_t grey_offset; /* of the grey plane: plane 0 if that is luma, else a separate plane that the
+                             worker fills once for all trackers */
+    uint64_t byte_size;   /* size of a slot */
 } arhost_frame_format;
 
-/* Fills the second group from the first. Returns 0 where the first group is not valid. */
+/* Fills in the second group of fields from the first. Returns 0 if the first group is invalid. */
 static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     const uint64_t w = format->width, h = format->height;
     uint64_t row[ARHOST_MAX_PLANES] = {0, 0, 0};
@@ -115,15 +115,15 @@ static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     return 1;
 }
 
-/* A frame to read. Bytes of a row past its pixels are undefined. */
+/* A frame to read. The padding at the end of each row is undefined. */
 typedef struct arhost_frame {
     uint32_t struct_size;
     arhost_clock clock;
     const arhost_frame_format *format;
-    const uint8_t *plane[ARHOST_MAX_PLANES]; /* NULL past format->plane_count */
-    const uint8_t *grey;                     /* full-range luma, rows of format->grey_stride bytes */
-    uint64_t sequence;                       /* counts up by one a frame from 0 */
-    int64_t capture_ns;                      /* middle of the exposure where known */
+    const uint8_t *plane[ARHOST_MAX_PLANES]; /* NULL from format->plane_count on */
+    const uint8_t *grey;                     /* full-range luma, format->grey_stride bytes per row */
+    uint64_t sequence;                       /* frame number: 0, 1, 2, … */
+    int64_t capture_ns;                      /* ns of `clock`; the middle of the exposure, if known */
 } arhost_frame;
 
 #ifdef __cplusplus

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/motion.h: where the moving things of a scene are in one image.
+ * arhost/motion.h: the animated state of a scene at the time of one image.
  *
- * Comes with a render request whenever the scene's duration_s is above 0. Its worker evaluates it from the
- * scene's nodes, channels and skins, so that every ray tracer moves alike. All of it is valid during the
- * call only. The elements of its arrays have no struct_size and never grow: step by sizeof.
+ * Part of each render request if the scene's duration_s is above 0. The worker evaluates it from the scene's nodes,
+ * channels and skins, so ray tracers need not. All of it is valid only during the call. The array elements have no
+ * struct_size and never grow: step by sizeof.
  */
 #ifndef ARHOST_MOTION_H
 #define ARHOST_MOTION_H
@@ -15,19 +15,19 @@
 extern "C" {
 #endif
 
-/* Objects whose `moves` is set, each, in the scene's order. */
+/* The transform of an object with `moves` set. One entry for each such object, in the scene's order. */
 typedef struct arhost_moved_object {
     uint32_t object;
-    float world_from_object[12]; /* column-major 3×4, invertible */
+    float world_from_object[12]; /* column-major 3×4, invertible; mm */
 } arhost_moved_object;
 
-/* Geometries of the objects whose `deforms` is set, each, in the scene's order. Skinned vertices are in the
- * world, that is, world_from_object is the identity. */
+/* The vertices of an object with `deforms` set. One entry for each such object, in the scene's order. Skinned
+ * vertices are in world coordinates: their world_from_object is the identity. */
 typedef struct arhost_deformed_geometry {
     uint32_t object;
-    uint32_t vertex_count;  /* that of the geometry in the arena */
-    const float *positions; /* FLOAT3, at least 16 readable bytes behind the last */
-    const float *normals;   /* FLOAT3, unit length; NULL where the geometry has none */
+    uint32_t vertex_count;  /* equals that of the geometry in the arena */
+    const float *positions; /* 3 floats each; at least 16 readable bytes follow the last */
+    const float *normals;   /* 3 floats each, unit length; NULL if the geometry has none */
 } arhost_deformed_geometry;
 
 typedef struct arhost_motion {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/raytracer.h: makes the image that is laid over the video.
+ * arhost/raytracer.h: renders the overlay that the host composites over the video.
  */
 #ifndef ARHOST_RAYTRACER_H
 #define ARHOST_RAYTRACER_H
@@ -16,56 +16,54 @@ extern "C" {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;              /* px, of the images to make */
+    uint32_t width, height;              /* px, of the images to render */
     uint32_t reserved;                   /* 0 */
-    const arhost_scene *scene;           /* read-only, valid until stop; checked by the host */
-    const arhost_intrinsics *intrinsics; /* those that every request will bear: build ray tables now */
+    const arhost_scene *scene;           /* read-only, valid until `stop`; validated by the host */
+    const arhost_intrinsics *intrinsics; /* equal in every request: precompute ray tables here */
 } arhost_raytracer_setup;
 
 typedef struct arhost_render_request {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */
-    uint64_t sequence; /* of the video frame; the seed of anything random */
-    double time_s;     /* scene time */
+    uint64_t sequence; /* of the video frame; use it to seed random numbers */
+    double time_s;     /* scene time, s */
     arhost_camera camera;
-    const arhost_motion *motion; /* NULL where the scene's duration_s is 0 */
+    const arhost_motion *motion; /* NULL if the scene's duration_s is 0 */
 } arhost_render_request;
 
-/* The image to write. RGBA8: R, G, B, A bytes; straight (not premultiplied) alpha; sRGB-encoded; first row at the
- * top. Alpha is exactly 0 where no ray hit (colour is ignored there) and 255 on virtual objects. Drawn is what is
- * 1e-4 of the scene's extent before the eye, or farther. Every pixel must be written, and no byte outside them.
- * `rgba` begins a page of 4096 bytes, and its last page is mapped whole, so that a GPU can import the memory; what
- * lies there behind the last row stays untouched. From start to stop the same few addresses (8 at most) come again
- * and again. */
+/* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is
+ * exactly 0 where no ray hit (the colour is then ignored) and 255 on virtual objects. Near clip: 1e-4 × scene extent.
+ * Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page and its last page is fully mapped, so a
+ * GPU can import the memory; leave the bytes after the last row unchanged. Between `start` and `stop` at most 8
+ * distinct addresses occur. */
 typedef struct arhost_image {
     uint32_t struct_size;
-    uint32_t stride; /* bytes a row, a multiple of 64 */
+    uint32_t stride; /* bytes per row, a multiple of 64 */
     uint32_t width, height;
     uint8_t *rgba;
 } arhost_image;
 
-/* What `render` tells of the image. Comes zeroed but for struct_size, which stands for "all of it". */
+/* Optional results of `render`. Zeroed by the worker except for struct_size; leave it zeroed if nothing applies. */
 typedef struct arhost_render_info {
     uint32_t struct_size;
-    int32_t has_region; /* non-zero: the region below is set */
-    /* A rectangle outside of which every alpha is 0: the host need not look there. Empty: width 0. */
+    int32_t has_region; /* non-zero: the region is set; 0: it is the whole image */
+    /* px; every alpha outside of this rectangle is 0, so the host skips those pixels. Width 0: empty. */
     uint32_t region_x, region_y, region_width, region_height;
-    uint64_t device_time_ns; /* by the device's own clock, of a GPU say, from the image's first command to its last;
-                                0: not told */
+    uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
 } arhost_render_info;
 
 typedef struct arhost_raytracer {
     uint32_t struct_size;
 
-    /* [worker] After create, and again after a stop, then with another scene and size: builds acceleration
-     * structures, compiles shaders; reports progress. */
+    /* [worker, created] Builds acceleration structures and compiles shaders; reports progress. May be called again
+     * after `stop`, with another scene and size. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
-    /* [worker] Traces one image. The same request gives the same bytes, on any number of threads. */
+    /* [worker, started] Renders one image. The same request gives identical bytes on any number of threads. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 
-    /* [worker] Once after each start that succeeded, before the next or destroy. */
+    /* [worker, started] Called once after each successful `start`. */
     void (*stop)(arhost_instance *instance);
 } arhost_raytracer;
 

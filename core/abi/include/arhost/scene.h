@@ -2,11 +2,12 @@
 /*
  * arhost/scene.h: the scene as one flat, position-independent block of memory, the arena.
  *
- * The loader writes it, the host checks it (every offset, index and number, once) and seals it; ray
- * tracers read it in place. All offsets count bytes from the arena's start and are multiples of 64.
- * After every buffer of vertices and attributes there are at least 16 more readable bytes.
- * World: right-handed, millimetres. Numbers are finite, coordinates within 1e9, in the world 4e9. A scene may be of
- * any size: what is too near or too small is judged by the scene's own. Little-endian.
+ * The loader writes the arena; the host validates every offset, index and number once, then seals it; ray tracers
+ * read it in place. Offsets are bytes from the start of the arena and multiples of 64. At least 16 readable bytes
+ * follow every buffer of vertices and attributes. Little-endian.
+ *
+ * World coordinates are right-handed, in millimetres. All numbers are finite; absolute coordinates are at most 1e9,
+ * in the world 4e9. Scenes may have any extent, so choose tolerances relative to it.
  */
 #ifndef ARHOST_SCENE_H
 #define ARHOST_SCENE_H
@@ -21,7 +22,7 @@ extern "C" {
 #define ARHOST_SCENE_VERSION 2u
 #define ARHOST_NONE 0xffffffffu
 
-/* `count` elements, each `stride` bytes from the one before; count 0: absent. */
+/* An array in the arena: `count` elements, `stride` bytes apart. count 0: absent. */
 typedef struct arhost_buffer {
     uint64_t offset;
     uint32_t count;
@@ -30,28 +31,28 @@ typedef struct arhost_buffer {
 
 typedef int32_t arhost_axes;
 enum {
-    ARHOST_AXES_Z_UP = 1 /* x right, y back, z up: the marker's own */,
-    ARHOST_AXES_Y_UP = 2 /* x right, y up, z front */
+    ARHOST_AXES_Z_UP = 1, /* x right, y back, z up: those of the marker */
+    ARHOST_AXES_Y_UP = 2  /* x right, y up, z front */
 };
 
 typedef int32_t arhost_geometry_type;
 enum {
-    ARHOST_GEOMETRY_TRIANGLES = 1, /* positions FLOAT3, normals FLOAT3 or absent, texcoords FLOAT2 or absent,
-                             indices 3×uint32 */
-    ARHOST_GEOMETRY_SPHERES = 2    /* positions FLOAT4: centre and radius; nothing else */
+    ARHOST_GEOMETRY_TRIANGLES = 1, /* positions and indices, optionally normals and texcoords */
+    ARHOST_GEOMETRY_SPHERES = 2    /* positions only */
 };
 
 typedef struct arhost_geometry {
     arhost_geometry_type type;
     uint32_t reserved;
-    arhost_buffer positions; /* stride 12 (FLOAT3) or 16 (FLOAT4); of a skinned mesh: as its skin takes them */
-    arhost_buffer normals;   /* one a vertex, unit length: smooth shading; absent: flat */
-    arhost_buffer texcoords; /* one a vertex; (0, 0) is a texture's left top corner, (1, 1) its right bottom one */
-    arhost_buffer indices;   /* stride 12; each < positions.count */
-    /* Of triangles that deform; else absent. Ray tracers need not look at them: arhost/motion.h. */
-    arhost_buffer joints;          /* a vertex: 4×uint16, places in the skin's list; stride 8 */
-    arhost_buffer weights;         /* a vertex: 4 floats, 0 to 1, sum 1; stride 16 */
-    arhost_buffer morph_positions; /* FLOAT3 displacements, vertices of target 0, of target 1, …; stride 12 */
+    arhost_buffer positions; /* triangles: 3 floats per vertex; spheres: 4 floats, centre and radius. Object space;
+                                of a skinned mesh: bind pose. mm */
+    arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat */
+    arhost_buffer texcoords; /* 2 floats per vertex; (0, 0): top left corner of the texture, (1, 1): bottom right */
+    arhost_buffer indices;   /* 3 uint32 per triangle, each < positions.count */
+    /* Only for deforming triangles, otherwise absent. Evaluated by the worker (arhost/motion.h). */
+    arhost_buffer joints;          /* 4 uint16 per vertex: indices into the skin's joints */
+    arhost_buffer weights;         /* 4 floats per vertex, 0 to 1, sum 1 */
+    arhost_buffer morph_positions; /* 3 floats per vertex and target: displacements, all vertices of target 0 first */
     arhost_buffer morph_normals;   /* likewise, or absent */
 } arhost_geometry;
 
@@ -59,101 +60,101 @@ typedef struct arhost_geometry {
 
 typedef int32_t arhost_texel_format;
 enum {
-    ARHOST_TEXEL_SRGB8 = 1,  /* R, G, B, A bytes; colour sRGB-encoded, alpha linear */
-    ARHOST_TEXEL_RGBA8 = 2,  /* R, G, B, A bytes, linear: numbers rather than colours */
-    ARHOST_TEXEL_RGBA32F = 3 /* four floats, linear light, 0 to 1e6 */
+    ARHOST_TEXEL_SRGB8 = 1,  /* R, G, B, A bytes; sRGB-encoded colour, linear alpha */
+    ARHOST_TEXEL_RGBA8 = 2,  /* R, G, B, A bytes, linear: data rather than colour */
+    ARHOST_TEXEL_RGBA32F = 3 /* 4 floats, linear light, 0 to 1e6 */
 };
 typedef int32_t arhost_wrap;
 enum { ARHOST_WRAP_REPEAT = 1, ARHOST_WRAP_CLAMP = 2, ARHOST_WRAP_MIRROR = 3 };
 
-/* Sampled bilinearly; texel (i, j) has its centre at u = (i + ½)/width, v = (j + ½)/height. Bytes are
- * linearised before they are mixed. */
+/* Sampled bilinearly; the centre of texel (i, j) is at u = (i + ½)/width, v = (j + ½)/height. sRGB texels are
+ * linearised before interpolation. */
 typedef struct arhost_texture {
     arhost_texel_format format;
-    uint32_t width, height; /* 1 to 16384 */
+    uint32_t width, height; /* texels, 1 to 16384 */
     arhost_wrap wrap_u, wrap_v;
-    uint32_t name;        /* byte offset into `names` */
-    arhost_buffer texels; /* width·height of them, first row at the top; stride 4 or 16 */
+    uint32_t name;        /* byte offset into `names`, of a NUL-terminated string */
+    arhost_buffer texels; /* width·height, top row first; stride 4 or 16 */
 } arhost_texture;
 
 /* ---- materials ---- */
 
 typedef int32_t arhost_material_model;
 enum {
-    ARHOST_MATERIAL_DIFFUSE = 1,           /* Lambert */
-    ARHOST_MATERIAL_SPECULAR = 2,          /* Lambert + Phong */
-    ARHOST_MATERIAL_MIRROR = 3,            /* perfect reflection times `reflectivity` */
-    ARHOST_MATERIAL_METAL = 4,             /* Lambert + Phong + perfect reflection times Schlick's Fresnel term of
-                                     `reflectivity` */
-    ARHOST_MATERIAL_GLASS = 5,             /* refraction and reflection by a Fresnel term, absorption inside */
-    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* glTF 2.0's: GGX over Lambert */
+    ARHOST_MATERIAL_DIFFUSE = 1,  /* Lambert */
+    ARHOST_MATERIAL_SPECULAR = 2, /* Lambert + Phong */
+    ARHOST_MATERIAL_MIRROR = 3,   /* perfect reflection · `reflectivity` */
+    ARHOST_MATERIAL_METAL = 4,    /* Lambert + Phong + perfect reflection · Schlick's Fresnel term with
+                                     F0 = `reflectivity` */
+    ARHOST_MATERIAL_GLASS = 5,    /* refraction and reflection weighted by a Fresnel term, absorption inside */
+    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX over Lambert */
 };
 
-/* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; what a
- * texture gives is multiplied with the number beside it; on a geometry without texcoords it counts as 1.
- * Fields that a model does not name are ignored: mirror and glass have neither colour nor emission. */
+/* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; a texture value
+ * multiplies the constant next to it, and is 1 on a geometry without texcoords. A model ignores fields that do not
+ * apply to it: mirror and glass have no diffuse colour and no emission. */
 typedef struct arhost_material {
     arhost_material_model model;
-    uint32_t colour_texture; /* of ambient and diffuse; its alpha against alpha_cutoff */
-    float ambient[3];        /* Ka: times the scene's ambient light */
-    float diffuse[3];        /* Kd; metallic-roughness: the base colour */
+    uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha is compared with alpha_cutoff */
+    float ambient[3];        /* Ka; multiplies the scene's ambient light */
+    float diffuse[3];        /* Kd; metallic-roughness: base colour */
     float specular[3];       /* Ks */
-    float exponent;          /* Phong's, >= 1 */
-    float reflectivity[3];   /* Kr; glass: colour of what is reflected */
-    float emission[3];       /* given off, 0 to 1e6 */
-    float alpha_cutoff;      /* where the colour's alpha is below it there is nothing; 0: no holes */
+    float exponent;          /* Phong exponent, >= 1 */
+    float reflectivity[3];   /* Kr; glass: tint of reflected light */
+    float emission[3];       /* emitted radiance, 0 to 1e6 */
+    float alpha_cutoff;      /* the surface is absent where colour_texture's alpha is lower; 0: nowhere */
 
     /* Metallic-roughness. */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
-    uint32_t normal_texture;             /* tangent space: R along u, G against v, B out; each 2t − 1 */
+    uint32_t normal_texture;             /* tangent space, 2t − 1 each: R along +u, G along −v, B outwards */
     uint32_t emission_texture;
 
-    /* Glass. Its reflectance at an angle of cosine c (on the outside, c of the refracted ray) is
-     * clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), 1 at total reflection. */
-    float index;                                 /* of refraction against what is outside, 1 to 4 */
-    float fresnel_exponent;                      /* 0.01 to 100 */
-    float fresnel_minimum, fresnel_maximum;      /* 0 to 1 */
-    float refraction[3];                         /* colour of what is refracted */
-    float extinction[3];                         /* per mm, >= 0: light loses exp(−extinction · way inside) */
-    float shadow_attenuation[3];                 /* of light that passes a surface at a right angle */
-    float cutoff_colour[3];                      /* stands for a ray that is not followed any more */
-    float importance_cutoff;                     /* a ray that would add less of itself is not followed; 0 to 1 */
-    uint32_t reflection_depth, refraction_depth; /* such rays start only from a depth below */
+    /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
+     * internal reflection; c is the cosine of the angle to the normal, of the incident or refracted ray, whichever is
+     * outside. */
+    float index;                            /* refractive index relative to the outside, 1 to 4 */
+    float fresnel_exponent;                 /* 0.01 to 100 */
+    float fresnel_minimum, fresnel_maximum; /* 0 to 1 */
+    float refraction[3];                    /* tint of refracted light */
+    float extinction[3];         /* 1/mm, >= 0; transmittance is exp(−extinction · path length inside) */
+    float shadow_attenuation[3]; /* transmittance of shadow rays per surface, at normal incidence; 0 to 1 */
+    float cutoff_colour[3];      /* radiance assumed for rays that are cut off */
+    float importance_cutoff;     /* rays that contribute less than this are cut off; 0 to 1 */
+    uint32_t reflection_depth, refraction_depth; /* such rays are spawned only at a lower depth */
 } arhost_material;
 
 /* ---- objects ---- */
 
 typedef int32_t arhost_role;
 enum {
-    ARHOST_ROLE_VIRTUAL = 1, /* alpha 255 */
-    ARHOST_ROLE_CATCHER = 2, /* stands for real geometry: alpha only where shadowed; seen by secondary rays.
-                           Primary rays pass through the sides that face away. */
-    ARHOST_ROLE_OCCLUDER = 3 /* stands for real geometry: hides what is behind it, alpha 0 */
+    ARHOST_ROLE_VIRTUAL = 1, /* virtual object: alpha 255 */
+    ARHOST_ROLE_CATCHER = 2, /* shadow catcher, proxy for real geometry: alpha only where shadowed. Visible to
+                                secondary rays; primary rays pass through its back faces */
+    ARHOST_ROLE_OCCLUDER = 3 /* proxy for real geometry that hides virtual objects behind it: alpha 0 */
 };
 
 typedef struct arhost_object {
     uint32_t geometry, material; /* indices */
     arhost_role role;
     uint32_t name; /* byte offset into `names`, of a NUL-terminated string */
-    /* Column-major 3×4: the columns are x, y, z axes and the origin. Invertible. The identity where
-     * the loader has put a static object's vertices into the world already. Of an object that moves: at
-     * time 0. */
+    /* Column-major 3×4, invertible: the columns are the x, y, z axes and the origin, mm. Identity if the loader has
+     * transformed a static object's vertices to world coordinates. For a moving object: the transform at time 0. */
     float world_from_object[12];
-    uint32_t moves;      /* non-zero: its place comes with each request (arhost/motion.h) */
-    uint32_t deforms;    /* non-zero: so do its geometry's vertices; no other object has that geometry */
-    uint32_t node, skin; /* for arhost/motion.h; ARHOST_NONE */
+    uint32_t moves;      /* non-zero: each request contains its transform (arhost/motion.h) */
+    uint32_t deforms;    /* non-zero: and its vertices; no other object shares its geometry */
+    uint32_t node, skin; /* indices or ARHOST_NONE; for the worker's animation */
 } arhost_object;
 
-/* ---- what moves: evaluated for the ray tracer by its worker, for whom it may be opaque ---- */
+/* ---- animation: evaluated by the worker (arhost/motion.h); ray tracers may ignore it ---- */
 
-/* A place in a tree of places. */
+/* A node of the transform hierarchy. */
 typedef struct arhost_node {
-    uint32_t parent;            /* an index below its own, or ARHOST_NONE: the world */
-    uint32_t animated;          /* non-zero: translation, rotation and scale are valid, and stand for: */
-    float parent_from_node[12]; /* column-major 3×4 */
-    float translation[3], rotation[4] /* a unit quaternion x, y, z, w */, scale[3];
-    arhost_buffer morph_weights; /* floats: of the targets of the geometry at this node */
+    uint32_t parent;                             /* an index lower than its own; ARHOST_NONE: the world */
+    uint32_t animated;                           /* non-zero: use translation, rotation and scale instead of: */
+    float parent_from_node[12];                  /* column-major 3×4 */
+    float translation[3], rotation[4], scale[3]; /* mm; unit quaternion x, y, z, w; factors */
+    arhost_buffer morph_weights;                 /* floats, one per morph target of this node's geometry */
 } arhost_node;
 
 typedef int32_t arhost_channel_target;
@@ -166,22 +167,23 @@ enum {
 typedef int32_t arhost_interpolation;
 enum {
     ARHOST_INTERPOLATION_STEP = 1,
-    ARHOST_INTERPOLATION_LINEAR = 2, /* rotations: spherically */
-    ARHOST_INTERPOLATION_CUBIC = 3   /* a key: in-tangent, value, out-tangent, as in glTF 2.0, appendix C */
+    ARHOST_INTERPOLATION_LINEAR = 2, /* spherical (slerp) for rotations */
+    ARHOST_INTERPOLATION_CUBIC = 3   /* keys of in-tangent, value, out-tangent, as in glTF 2.0, appendix C */
 };
 
+/* Animates one property of a node. */
 typedef struct arhost_channel {
     uint32_t node;
     arhost_channel_target target;
     arhost_interpolation interpolation;
     uint32_t reserved;
-    arhost_buffer times;  /* s, floats, ascending */
-    arhost_buffer values; /* floats: a key's 3, 4 or as many as morph weights; CUBIC: three times that */
+    arhost_buffer times;  /* floats, s, ascending: one per key */
+    arhost_buffer values; /* floats: 3, 4 or one per morph weight for each key; CUBIC: three times that */
 } arhost_channel;
 
 typedef struct arhost_skin {
-    arhost_buffer joints;         /* uint32: nodes */
-    arhost_buffer node_from_mesh; /* a joint: column-major 3×4 floats, "inverse bind matrix"; stride 48 */
+    arhost_buffer joints;         /* uint32: node indices */
+    arhost_buffer node_from_mesh; /* inverse bind matrices, one per joint: column-major 3×4 floats, stride 48 */
 } arhost_skin;
 
 /* ---- lights ---- */
@@ -189,11 +191,11 @@ typedef struct arhost_skin {
 typedef int32_t arhost_light_type;
 enum {
     ARHOST_LIGHT_POINT = 1,       /* at `position` */
-    ARHOST_LIGHT_DIRECTIONAL = 2, /* from infinitely far, along `direction` */
-    ARHOST_LIGHT_SPOT = 3,        /* at `position`, along `direction`, in a cone */
-    ARHOST_LIGHT_RECTANGLE = 4,   /* about `position`, corners at ±axis_u ±axis_v, shining to the side of
-                                     `direction` with the cosine to it */
-    ARHOST_LIGHT_SPHERE = 5       /* about `position`, of `radius` */
+    ARHOST_LIGHT_DIRECTIONAL = 2, /* at infinity, shining along `direction` */
+    ARHOST_LIGHT_SPOT = 3,        /* at `position`, shining along `direction` in a cone */
+    ARHOST_LIGHT_RECTANGLE = 4,   /* centred at `position`, corners at ±axis_u ±axis_v; emits on the side of
+                                     `direction`, with a cosine falloff */
+    ARHOST_LIGHT_SPHERE = 5       /* centred at `position`, of `radius` */
 };
 typedef int32_t arhost_falloff;
 enum {
@@ -201,57 +203,56 @@ enum {
     ARHOST_FALLOFF_INVERSE_SQUARE = 2 /* irradiance = intensity · cosθ / d², d in mm */
 };
 
-/* The light of an extended one is the mean over points spread evenly over it (of a sphere: over the disc
- * that it shows), each a light of `intensity`; so a small one is like a point light. */
+/* An area light is the mean over points distributed uniformly on it (on a sphere: over its visible disc), each a
+ * light of `intensity`; in the limit of a small size it equals a point light. */
 typedef struct arhost_light {
     arhost_light_type type;
-    arhost_falloff falloff; /* directional: NONE */
-    float position[3];      /* mm */
-    float direction[3];     /* unit length, away from the light */
-    float intensity[3];
-    float axis_u[3], axis_v[3];       /* mm, half a side each, across each other and `direction` */
+    arhost_falloff falloff;           /* directional: NONE */
+    float position[3];                /* mm */
+    float direction[3];               /* unit length, pointing away from the light */
+    float intensity[3];               /* linear RGB; see arhost_falloff */
+    float axis_u[3], axis_v[3];       /* mm; half sides, perpendicular to each other and to `direction` */
     float radius;                     /* mm */
-    float cosine_inner, cosine_outer; /* of a spot's half angles: full light within, none without,
-                                         smoothly between; inner >= outer */
+    float cosine_inner, cosine_outer; /* cosines of a spot's half angles: full intensity inside inner, none outside
+                                         outer, smooth in between; inner >= outer */
 } arhost_light;
 
-/* Light from all round, by an image in equirectangular projection: a direction (x, y, z) of the
- * environment, y up, has u = ½ + atan2(x, −z)/2π, v = acos(y)/π. */
+/* Environment map in equirectangular projection: a unit direction (x, y, z) in environment coordinates, y up, maps to
+ * u = ½ + atan2(x, −z)/2π, v = acos(y)/π. */
 typedef struct arhost_environment {
-    uint32_t texture;                /* RGBA32F; ARHOST_NONE: there is none */
-    float intensity;                 /* times the texels */
-    float environment_from_world[9]; /* a rotation, column-major */
-    /* For choosing directions with a density as the light's, luminance times sin(πv): cumulative sums,
-     * each ending with 1. Floats. */
-    arhost_buffer rows;    /* height: over whole rows */
-    arhost_buffer columns; /* height·width: along each row */
+    uint32_t texture;                /* index, RGBA32F; ARHOST_NONE: no environment */
+    float intensity;                 /* multiplies the texels */
+    float environment_from_world[9]; /* rotation, column-major 3×3 */
+    /* CDFs for importance sampling with a density proportional to luminance · sin(πv); floats, the last one is 1. */
+    arhost_buffer rows;    /* marginal: `height` values */
+    arhost_buffer columns; /* conditional: `width` values for each row */
 } arhost_environment;
 
-/* The arena's first bytes. */
+/* The header at the start of the arena. */
 typedef struct arhost_scene {
-    uint64_t magic;
-    uint32_t version;
+    uint64_t magic;   /* ARHOST_SCENE_MAGIC */
+    uint32_t version; /* ARHOST_SCENE_VERSION */
     uint32_t struct_size;
-    uint64_t byte_size; /* of the arena, the header and the last buffer's 16 spare bytes included */
+    uint64_t byte_size; /* of the arena, including this header and the 16 bytes after the last buffer */
     arhost_axes axes;
-    uint32_t max_depth;  /* bounces after the primary ray */
-    float ambient[3];    /* light from everywhere */
-    float background[3]; /* seen by secondary rays that hit nothing where there is no environment; primary
-                            rays: alpha 0 */
-    float bounds_min[3], bounds_max[3]; /* of all objects, world, at time 0; what moves or deforms may leave them */
-    float shadow_alpha_opaque, shadow_alpha_translucent; /* on catchers: 0.6 and 0.3 */
-    uint32_t coloured_shadows;                           /* non-zero: shadows of glass on catchers take its colour */
-    float duration_s; /* of the motion, which then begins again; 0: nothing moves */
+    uint32_t max_depth;  /* maximum number of bounces after the primary ray */
+    float ambient[3];    /* ambient light, linear RGB */
+    float background[3]; /* radiance of secondary rays that hit nothing, without an environment; primary rays
+                            that hit nothing: alpha 0 */
+    float bounds_min[3], bounds_max[3]; /* world bounding box of all objects at time 0; animation may exceed it */
+    float shadow_alpha_opaque, shadow_alpha_translucent; /* of full shadows on catchers; by default 0.6 and 0.3 */
+    uint32_t coloured_shadows;                           /* non-zero: glass casts coloured shadows on catchers */
+    float duration_s;                                    /* period of the animation, which repeats; 0: static */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
     arhost_buffer textures;   /* arhost_texture */
     arhost_buffer materials;  /* arhost_material */
-    arhost_buffer objects;    /* arhost_object; may be 0 */
+    arhost_buffer objects;    /* arhost_object; may be absent */
     arhost_buffer lights;     /* arhost_light */
     arhost_buffer nodes;      /* arhost_node */
     arhost_buffer channels;   /* arhost_channel */
     arhost_buffer skins;      /* arhost_skin */
-    arhost_buffer names;      /* bytes, stride 1 */
+    arhost_buffer names;      /* bytes of NUL-terminated strings */
 } arhost_scene;
 
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/sink.h: takes augmented frames: a film, images, a window, a log of the poses.
+ * arhost/sink.h: receives augmented frames: writes a video, images or poses, or shows a window.
  */
 #ifndef ARHOST_SINK_H
 #define ARHOST_SINK_H
@@ -18,22 +18,22 @@ typedef struct arhost_sink_setup {
     uint32_t struct_size;
     uint32_t width, height; /* px, of the images */
     uint32_t reserved;      /* 0 */
-    double fps;             /* nominal; 0 where unknown */
-    /* 0 on a fresh start. After a restart, the sequence number of the frame that comes first: what was
-     * written for it or later ones is to be replaced, what was written before is to be kept. */
+    double fps;             /* nominal frame rate, 1/s; 0: unknown */
+    /* Sequence number of the first frame: 0 on a fresh start, higher after a restart. Keep the output for earlier
+     * frames; replace that for this frame and later ones. */
     uint64_t first_sequence;
-    const arhost_intrinsics *intrinsics; /* of every camera in the records; NULL where none is known */
+    const arhost_intrinsics *intrinsics; /* of every camera in the records; NULL if unknown */
 } arhost_sink_setup;
 
-/* How the overlay of this frame arose. */
+/* The origin of a frame's overlay. */
 typedef int32_t arhost_overlay;
 enum {
-    ARHOST_OVERLAY_RENDERED = 1, /* traced from this frame's own pose */
-    ARHOST_OVERLAY_HELD = 2,     /* traced from the last known pose, within the configured grace */
-    ARHOST_OVERLAY_NONE = 3      /* the plain video: no marker in view, or a backend is down */
+    ARHOST_OVERLAY_RENDERED = 1, /* rendered from this frame's pose */
+    ARHOST_OVERLAY_HELD = 2,     /* rendered from the last known pose, within the configured hold time */
+    ARHOST_OVERLAY_NONE = 3      /* plain video: no marker in view, or a component is down */
 };
 
-/* All that is known of a frame. What is set is finite. */
+/* Metadata of a frame. All values that are set are finite. */
 typedef struct arhost_record {
     uint32_t struct_size;
     arhost_clock clock;
@@ -50,7 +50,7 @@ typedef struct arhost_record {
     arhost_marker markers[ARHOST_MAX_MARKERS];
 } arhost_record;
 
-/* An augmented frame to read: BGR8, `stride` bytes a row. */
+/* An augmented frame to read: B, G, R bytes, top row first, `stride` bytes per row. */
 typedef struct arhost_output {
     uint32_t struct_size;
     uint32_t stride;
@@ -62,23 +62,23 @@ typedef struct arhost_output {
 typedef struct arhost_sink {
     uint32_t struct_size;
 
-    /* [worker] Once after create. Fails where nothing can be written, but harms no earlier file: that waits
-     * for the first frame, since another component may yet refuse the run. What goes to a file goes to it at once or
-     * can be finished after a kill; a file appears under its own name only when it is whole, or is whole at every
-     * moment. */
+    /* [worker, created] Fails if the output cannot be written. Must leave existing files unchanged until the first
+     * `write`, because another component may still reject the run. Output survives a kill of the process: it is
+     * written immediately or can be completed afterwards. A file appears under its final name only once it is
+     * complete, unless it is valid at every moment. */
     arhost_status (*start)(arhost_instance *instance, const arhost_sink_setup *setup);
 
-    /* [worker] One frame, sequence numbers ascending. Once it has returned ARHOST_STATUS_OK the frame is not sent
-     * again, so it must survive the death of this process. Frames in one file are in order; of files of a frame each
-     * whose names differ in a number, the numbers ascend. ARHOST_STATUS_END: the user closed the window, the run is
-     * to end. */
+    /* [worker, started] Takes one frame; sequence numbers ascend. After ARHOST_STATUS_OK the frame is not sent again,
+     * so it must survive a kill of the process. Frames within a file are in order; if each frame has its own numbered
+     * file, the numbers ascend. Returns ARHOST_STATUS_END to end the run: the user closed the window. */
     arhost_status (*write)(arhost_instance *instance, const arhost_output *output);
 
-    /* [worker] About 30 times a second while no frame comes, for windows' events; may be NULL. */
+    /* [worker, started] Called about 30 times per second while no frame arrives, to process window events. Results as
+     * for `write`. Optional: may be NULL. */
     arhost_status (*idle)(arhost_instance *instance);
 
-    /* [worker] Once before destroy, if start succeeded: finishes the files. The status tells whether
-     * they are whole. */
+    /* [worker, started] Called once, after a successful `start`; completes the files. Returns an error if they are
+     * incomplete. */
     arhost_status (*stop)(arhost_instance *instance);
 } arhost_sink;
 

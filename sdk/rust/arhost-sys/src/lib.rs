@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//! The C ABI for plugins of arhost. The declarations are those of the headers, under the same names; on top of them
-//! are four traits ([`Source`], [`Tracker`], [`Raytracer`], [`Sink`]) and one macro ([`plugin!`]) that turn a Rust
-//! type into a plugin. No panic leaves a function: it becomes a logged message and `ARHOST_STATUS_ERROR_INTERNAL`.
+//! The C ABI for plugins of arhost: the declarations of the C headers under their own names, a trait for each kind of
+//! plugin ([`Source`], [`Tracker`], [`Raytracer`], [`Sink`]), and the macro [`plugin!`], which exports a Rust type as a
+//! plugin. A panic does not cross the ABI: it becomes a logged message and `ARHOST_STATUS_ERROR_INTERNAL`.
 #![allow(non_camel_case_types)]
 
 mod abi;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! What turns a Rust type into a plugin.
+//! Exports a Rust type as a plugin.
 
 use crate::abi::*;
 use crate::views::*;
@@ -7,7 +7,7 @@ use std::ffi::{CStr, CString};
 use std::os::raw::{c_char, c_void};
 use std::panic::{catch_unwind, AssertUnwindSafe};
 
-/// An error for the user: which `ARHOST_ERROR_…`, and a sentence that names what to mend.
+/// An error for the user: an `ARHOST_STATUS_ERROR_…`, and a message that says what to change.
 #[derive(Debug)]
 pub struct Failure {
     pub status: arhost_status,
@@ -25,7 +25,7 @@ impl From<std::io::Error> for Failure {
     }
 }
 
-/// The host's callbacks; every function may be called on any thread.
+/// The host's callbacks; all functions may be called on any thread.
 #[derive(Clone, Copy)]
 pub struct Host(*const arhost_host);
 unsafe impl Send for Host {}
@@ -46,7 +46,8 @@ impl Host {
     pub fn warn(&self, text: &str) {
         self.log(ARHOST_SEVERITY_WARNING, text);
     }
-    /// Tells that long work goes on: at least every few seconds in `new` and `start`.
+    /// Reports progress (0 to 1) and extends the start-up deadline: call it at least every few seconds in `new` and
+    /// `start`.
     pub fn progress(&self, fraction: f64, what: &str) {
         let what = CString::new(what.replace('\0', " ")).unwrap_or_default();
         unsafe {
@@ -55,13 +56,13 @@ impl Host {
             }
         }
     }
-    /// True once the running call is to return soon, with `ARHOST_STATUS_ERROR_CANCELLED`.
+    /// True if the running call must return soon, with `ARHOST_STATUS_ERROR_CANCELLED`.
     pub fn cancelled(&self) -> bool {
         unsafe { (*self.0).cancelled.map_or(false, |cancelled| cancelled(self.0) != 0) }
     }
 }
 
-/// The option values. A key that the plugin does not declare is a defect, and panics.
+/// The option values. Panics on a key that the plugin does not declare.
 pub struct Options<'a>(Vec<&'a arhost_option>);
 
 impl Options<'_> {
@@ -85,7 +86,7 @@ impl Options<'_> {
     }
 }
 
-/// What every plugin is.
+/// Common to all kinds of plugin.
 pub trait Plugin: Sized {
     fn new(host: Host, options: &Options) -> Result<Self, Failure>;
     fn stop(&mut self) -> Result<(), Failure> {
@@ -94,9 +95,9 @@ pub trait Plugin: Sized {
 }
 
 pub trait Source: Plugin {
-    /// `properties.format` needs pixel_format, width, height, fps; its layout is filled in afterwards.
+    /// Set pixel_format, width, height and fps of `properties.format`; its layout is filled in afterwards.
     fn start(&mut self, setup: &arhost_source_setup, properties: &mut arhost_source_properties) -> Result<(), Failure>;
-    /// False: there are no more frames.
+    /// Returns false at the end of the sequence.
     fn read(&mut self, buffer: &mut FrameBuffer, info: &mut arhost_frame_info) -> Result<bool, Failure>;
 }
 
@@ -117,21 +118,21 @@ pub trait Raytracer: Plugin {
 
 pub trait Sink: Plugin {
     fn start(&mut self, setup: &arhost_sink_setup) -> Result<(), Failure>;
-    /// False: the user closed the window, the run is to end.
+    /// Returns false to end the run: the user closed the window.
     fn write(&mut self, output: &Output) -> Result<bool, Failure>;
 }
 
-/// Defines `arhost_entry`, the one symbol of a plugin:
+/// Defines `arhost_entry`, the symbol that a plugin exports:
 ///
 /// ```ignore
 /// arhost_sys::plugin! {
 ///     sink MySink, "my_sink", "Counts frames.",
 ///     capabilities: 0,
 ///     options: [
-///         option!(ARHOST_OPTION_INTEGER, "every", "1", "Counts each so-many-th.", 1.0, 1e6),
+///         option!(ARHOST_OPTION_INTEGER, "every", "1", "Counts every n-th frame.", 1.0, 1e6),
 ///         option!(ARHOST_OPTION_OUTPUT_PATH, "path", required, "The file to write."),
 ///     ],
-///     needs: ["gpu"] // what the sandbox must allow (arhost/plugin.h); may be left out
+///     needs: ["gpu"] // optional: permissions from the sandbox (arhost/plugin.h)
 /// }
 /// ```
 #[macro_export]
@@ -164,7 +165,7 @@ macro_rules! plugin {
                 offer: *const $crate::arhost_offer,
                 answer: *mut $crate::arhost_answer,
             ) -> $crate::arhost_status {
-                // Before there is a reference to a struct of which a part may not be there.
+                // Check the sizes before creating references: the structs may be truncated.
                 if (*offer).struct_size < std::mem::size_of::<$crate::arhost_offer>() as u32
                     || (*answer).struct_size < std::mem::size_of::<$crate::arhost_answer>() as u32
                 {
@@ -181,7 +182,7 @@ macro_rules! plugin {
     };
 }
 
-/// One option of [`plugin!`]: type, key, default (as in YAML) or `required`, help, and a number's bounds.
+/// One option of [`plugin!`]: type, key, default (in YAML syntax) or `required`, help, and the bounds of a number.
 #[macro_export]
 macro_rules! option {
     (@ $type:expr, $key:literal, $default:expr, $help:literal, $minimum:expr, $maximum:expr) => {
@@ -207,7 +208,7 @@ macro_rules! option {
     };
 }
 
-/// A literal as C has it.
+/// A NUL-terminated string literal.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! c_text {
@@ -216,7 +217,7 @@ macro_rules! c_text {
     };
 }
 
-// ---- what the macro uses ----
+// ---- used by the macro ----
 
 #[doc(hidden)]
 #[allow(non_upper_case_globals)]
@@ -239,7 +240,7 @@ struct Instance<T> {
     plugin: T,
 }
 
-/// Runs `call`; what it returns or panics with becomes a status, and a message where it failed.
+/// Runs `call`; logs an error or a panic and converts it to a status.
 fn guarded(host: Host, call: impl FnOnce() -> Result<arhost_status, Failure>) -> arhost_status {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(status)) => status,
@@ -269,7 +270,7 @@ unsafe fn with<T>(
     guarded(instance.host, || call(plugin))
 }
 
-fn end_unless(more: bool) -> arhost_status {
+fn ok_or_end(more: bool) -> arhost_status {
     if more {
         ARHOST_STATUS_OK
     } else {
@@ -336,7 +337,7 @@ unsafe extern "C" fn start_source<T: Source>(
     with(instance, |plugin: &mut T| {
         plugin.start(&*setup, &mut *properties)?;
         if !(*properties).format.lay_out() {
-            return Err(Failure::new(ARHOST_STATUS_ERROR_CONFIGURATION, "the frames' format or size is not valid"));
+            return Err(Failure::new(ARHOST_STATUS_ERROR_CONFIGURATION, "invalid frame format or size"));
         }
         Ok(ARHOST_STATUS_OK)
     })
@@ -346,7 +347,7 @@ unsafe extern "C" fn read<T: Source>(
     buffer: *const arhost_frame_buffer,
     info: *mut arhost_frame_info,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.read(&mut FrameBuffer(&*buffer), &mut *info).map(end_unless))
+    with(instance, |plugin: &mut T| plugin.read(&mut FrameBuffer(&*buffer), &mut *info).map(ok_or_end))
 }
 #[doc(hidden)]
 pub const fn source<T: Source>() -> arhost_source {
@@ -414,7 +415,7 @@ unsafe extern "C" fn start_sink<T: Sink>(
     with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn write<T: Sink>(instance: *mut arhost_instance, output: *const arhost_output) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.write(&Output(&*output)).map(end_unless))
+    with(instance, |plugin: &mut T| plugin.write(&Output(&*output)).map(ok_or_end))
 }
 #[doc(hidden)]
 pub const fn sink<T: Sink>() -> arhost_sink {
@@ -432,12 +433,12 @@ mod tests {
     use super::*;
     use std::mem::size_of;
 
-    /// What a host of a later day passes.
+    /// A struct as extended by a newer host.
     #[repr(C)]
     struct Longer<T>(T, [u64; 2]);
 
     #[test]
-    fn elements_may_be_longer_than_known() {
+    fn steps_through_extended_elements() {
         let option = |key: &'static [u8], integer| {
             let struct_size = size_of::<Longer<arhost_option>>() as u32;
             let (key, text) = (key.as_ptr().cast(), b"\0".as_ptr().cast());
@@ -460,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn there_may_be_no_elements() {
+    fn accepts_a_null_array_without_elements() {
         assert!(unsafe { elements::<arhost_option>(std::ptr::null(), 0) }.is_empty());
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! What a call is given, without pointers. All of it is valid during that call.
+//! Safe views of the arguments of a call, valid only during that call.
 
 use crate::abi::*;
 use std::ops::Deref;
@@ -20,7 +20,7 @@ impl Frame<'_> {
             slice::from_raw_parts(self.0.grey.add(row as usize * format.grey_stride as usize), format.width as usize)
         }
     }
-    /// One plane as it lies in memory: `format().stride[plane]` bytes a row.
+    /// One plane: `format().stride[plane]` bytes per row.
     pub fn plane(&self, plane: usize) -> &[u8] {
         let format = self.format();
         unsafe { slice::from_raw_parts(self.0.plane[plane], plane_size(format, plane)) }
@@ -40,7 +40,7 @@ impl FrameBuffer<'_> {
     pub fn format(&self) -> &arhost_frame_format {
         unsafe { &*self.0.format }
     }
-    /// One plane as it lies in memory: `format().stride[plane]` bytes a row.
+    /// One plane: `format().stride[plane]` bytes per row.
     pub fn plane_mut(&mut self, plane: usize) -> &mut [u8] {
         let size = plane_size(self.format(), plane);
         unsafe { slice::from_raw_parts_mut(self.0.plane[plane], size) }
@@ -55,7 +55,7 @@ impl Deref for FrameBuffer<'_> {
 
 fn plane_size(format: &arhost_frame_format, plane: usize) -> usize {
     assert!(plane < format.plane_count as usize);
-    let halved = plane > 0; // of NV12 and I420, the formats that have more planes than one
+    let halved = plane > 0; // only NV12 and I420 have more than one plane
     format.stride[plane] as usize * (format.height as usize / if halved { 2 } else { 1 })
 }
 
@@ -78,7 +78,7 @@ impl Image<'_> {
     }
 }
 
-/// An augmented frame to read: B, G, R bytes.
+/// An augmented frame to read: B, G, R bytes per pixel.
 pub struct Output<'a>(pub(crate) &'a arhost_output);
 
 impl Output<'_> {
@@ -100,8 +100,7 @@ impl Deref for Output<'_> {
     }
 }
 
-/// The elements of an array behind a pointer, which may be longer than is known here: their first field, a u32, is
-/// their size.
+/// The elements of an array that a newer host may have extended: their first field, a u32, is their size.
 pub(crate) unsafe fn elements<'a, T>(first: *const T, count: u32) -> Vec<&'a T> {
     let element = |i| &*first.cast::<u8>().add(i as usize * *first.cast::<u32>() as usize).cast();
     (0..count).map(element).collect()
@@ -112,11 +111,11 @@ pub(crate) unsafe fn elements<'a, T>(first: *const T, count: u32) -> Vec<&'a T> 
 pub struct Scene(pub(crate) *const arhost_scene);
 
 impl Scene {
-    /// The elements of one of its buffers: `scene.elements::<arhost_object>(scene.objects)`.
+    /// The elements of a buffer: `scene.elements::<arhost_object>(scene.objects)`.
     ///
     /// # Safety
-    /// `T` is what `arhost/scene.h` says that the buffer holds, without holes (its stride is `T`'s size), and the
-    /// slice is not used after `stop`.
+    /// `T` must be the element type documented in `arhost/scene.h`, with the buffer's stride as its size. Do not use the
+    /// slice after `stop`.
     pub unsafe fn elements<'a, T>(self, buffer: arhost_buffer) -> &'a [T] {
         if buffer.count == 0 {
             return &[];
@@ -133,7 +132,7 @@ impl Deref for Scene {
 }
 
 impl arhost_tracker_setup {
-    /// The markers to look for.
+    /// The markers to detect.
     pub fn markers(&self) -> Vec<&arhost_marker_config> {
         unsafe { elements(self.markers, self.marker_count) }
     }
@@ -149,7 +148,7 @@ impl arhost_raytracer_setup {
 }
 
 impl arhost_render_request {
-    /// Where what moves is in this image; `None` where nothing in the scene does.
+    /// The animated state of the scene; `None` for a static scene.
     pub fn motion(&self) -> Option<&arhost_motion> {
         unsafe { self.motion.as_ref() }
     }
@@ -168,13 +167,13 @@ impl arhost_deformed_geometry {
     pub fn positions(&self) -> &[[f32; 3]] {
         unsafe { array(self.positions.cast(), self.vertex_count) }
     }
-    /// Empty where the geometry has none.
+    /// Empty if the geometry has none.
     pub fn normals(&self) -> &[[f32; 3]] {
         unsafe { array(self.normals.cast(), if self.normals.is_null() { 0 } else { self.vertex_count }) }
     }
 }
 
-/// The pointer may be null where the count is 0.
+/// `first` may be null if the count is 0.
 unsafe fn array<'a, T>(first: *const T, count: u32) -> &'a [T] {
     if count == 0 {
         return &[];
@@ -183,8 +182,8 @@ unsafe fn array<'a, T>(first: *const T, count: u32) -> &'a [T] {
 }
 
 impl arhost_frame_format {
-    /// arhost_frame_layout of `arhost/frame.h`: fills the second group of fields from the first. False where the
-    /// first group is not valid.
+    /// arhost_frame_layout of `arhost/frame.h`: fills in the second group of fields from the first. Returns false if the
+    /// first group is invalid.
     pub fn lay_out(&mut self) -> bool {
         let (w, h) = (u64::from(self.width), u64::from(self.height));
         let sides = 1..=ARHOST_MAX_IMAGE_SIDE as u64;
@@ -192,7 +191,7 @@ impl arhost_frame_format {
             return false;
         }
         let even = w % 2 == 0 && h % 2 == 0;
-        // Bytes a row and rows of each plane, and whether the first one is luma.
+        // Bytes per row and number of rows of each plane; whether the first plane is luma.
         let (planes, grey_is_plane_0) = match self.pixel_format {
             ARHOST_PIXEL_FORMAT_GREY8 => (vec![(w, h)], true),
             ARHOST_PIXEL_FORMAT_RGB8 | ARHOST_PIXEL_FORMAT_BGR8 => (vec![(3 * w, h)], false),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! What `plugin!` says of its `needs` is what a host reads.
+//! The descriptor contains the `needs` given to `plugin!`.
 
 use arhost_sys::*;
 use std::ffi::CStr;
@@ -32,7 +32,7 @@ extern "C" {
 }
 
 #[test]
-fn the_descriptor_lists_them_and_ends_with_null() {
+fn the_descriptor_lists_needs_and_ends_with_null() {
     let offer = arhost_offer {
         struct_size: std::mem::size_of::<arhost_offer>() as u32,
         oldest_abi_version: ARHOST_ABI_VERSION,

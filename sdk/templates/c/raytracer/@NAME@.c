@@ -1,5 +1,5 @@
-/* @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in
- * tracer.h. */
+/* @NAME@: a ray tracer for arhost. This file is the plugin: it turns cameras into rays and samples into images.
+ * tracer.h traces the rays. */
 #include "tracer.h"
 
 #include <stdlib.h>
@@ -7,20 +7,20 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int side; /* of the grid of rays through a pixel */
+    int side; /* rays per pixel: side × side */
     tracer *tracer;
 };
 
 /* ---- the camera ---- */
 
-/* Pixel centres are at integers, rows run downwards, the camera looks along -back. */
+/* Pixel centres are at integer coordinates, rows go downwards, the camera looks along -back. */
 typedef struct view {
     const arhost_intrinsics *lens;
-    vec eye, right, up, back; /* the last three of length 1 */
+    vec eye, right, up, back; /* axes: unit length */
 } view;
 
-/* False where up is parallel to the view, and where a number is not finite. */
-static int look_through(view *v, const arhost_camera *camera) {
+/* Returns 0 if up is parallel to the viewing direction, or if a number is not finite. */
+static int init_view(view *v, const arhost_camera *camera) {
     const vec up = {camera->up[0], camera->up[1], camera->up[2]};
     const vec look_at = {camera->look_at[0], camera->look_at[1], camera->look_at[2]};
     vec back, right;
@@ -44,47 +44,47 @@ static ray ray_through(const view *v, double column, double row) {
 
 /* ---- the image ---- */
 
-static uint8_t byte(double share) {
-    return (uint8_t)(255 * fmin(fmax(share, 0), 1) + 0.5);
+static uint8_t to_byte(double value) {
+    return (uint8_t)(255 * fmin(fmax(value, 0), 1) + 0.5);
 }
 static double srgb(double linear) {
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-/* The mean over a grid of rays. Alpha is straight: the colour is that of what was seen, not multiplied by how much of
- * the pixel it covers. */
+/* Averages a grid of rays. Alpha is straight: the colour is not multiplied by the pixel's coverage. */
 static void write_pixel(uint8_t *pixel, const arhost_instance *self, const view *v, double column, double row) {
     const int side = self->side;
-    vec sum = {0, 0, 0}; /* of colours times alphas */
-    double alphas = 0;
+    vec sum = {0, 0, 0}; /* of colour · alpha */
+    double alpha_sum = 0;
     int i;
     for (i = 0; i < side * side; ++i) {
         const double right = (i % side + 0.5) / side - 0.5, down = (i / side + 0.5) / side - 0.5;
-        const seen what = tracer_look(self->tracer, ray_through(v, column + right, row + down));
-        sum = add(sum, scale(what.alpha, what.colour));
-        alphas += what.alpha;
+        const sample s = tracer_trace(self->tracer, ray_through(v, column + right, row + down));
+        sum = add(sum, scale(s.alpha, s.colour));
+        alpha_sum += s.alpha;
     }
-    if (alphas > 0)
-        sum = scale(1 / alphas, sum);
-    pixel[0] = byte(srgb(sum.x));
-    pixel[1] = byte(srgb(sum.y));
-    pixel[2] = byte(srgb(sum.z));
-    pixel[3] = byte(alphas / (side * side));
+    if (alpha_sum > 0)
+        sum = scale(1 / alpha_sum, sum);
+    pixel[0] = to_byte(srgb(sum.x));
+    pixel[1] = to_byte(srgb(sum.y));
+    pixel[2] = to_byte(srgb(sum.z));
+    pixel[3] = to_byte(alpha_sum / (side * side));
 }
 
 static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
                             arhost_render_info *info) {
     uint32_t column, row;
     view v;
-    (void)info; /* it could tell a region outside of which every alpha is 0 */
-    if (!look_through(&v, &request->camera)) {
-        self->host->log(self->host, ARHOST_SEVERITY_ERROR, "the camera's up is parallel to its view");
+    (void)info; /* optional: set a region outside of which every alpha is 0 */
+    if (!init_view(&v, &request->camera)) {
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR,
+                        "the camera's up vector is parallel to its viewing direction");
         return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
     }
     if (request->motion)
-        tracer_move(self->tracer, request->motion);
+        tracer_update(self->tracer, request->motion);
     for (row = 0; row < image->height; ++row) {
-        if (self->host->cancelled(self->host)) /* arhost wants to end: rows must not keep it waiting */
+        if (self->host->cancelled(self->host)) /* arhost wants this call to return soon */
             return ARHOST_STATUS_ERROR_CANCELLED;
         for (column = 0; column < image->width; ++column)
             write_pixel(image->rgba + (size_t)row * image->stride + 4 * (size_t)column, self, &v, column, row);
@@ -116,7 +116,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
-    /* Every option that is declared below is there. */
+    /* arhost passes every option declared below. */
     self->side = (int)sqrt((double)arhost_find_option(options, option_count, "samples")->integer);
     *instance = self;
     return ARHOST_STATUS_OK;
@@ -131,35 +131,35 @@ static const void *get_extension(const char *id) {
     return NULL;
 }
 
-/* ---- what it is ---- */
+/* ---- description ---- */
 
-/* arhost checks the configuration against these before create sees a value. */
+/* arhost validates the configuration against these before it calls create. */
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "samples", "1", 1, 64, NULL,
-     "Rays a pixel: the largest square number up to it."},
+     "Rays per pixel, rounded down to a square number."},
 };
 static const arhost_raytracer functions = {sizeof functions, start, render, stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_RAYTRACER,
-    .id = "@NAME@", /* the file's name */
+    .id = "@NAME@", /* must equal the file name without ".so" */
     .name = "@NAME@",
     .version = "0.1.0",
-    .vendor = "unknown", /* FILL IN: you */
-    .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
-    .description = "Traces rays by brute force.",
+    .vendor = "unknown", /* FILL IN: your name */
+    .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
+    .description = "Brute-force ray tracer.",
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
 static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
-    const uint32_t spoken = ARHOST_ABI_VERSION;
+    const uint32_t version = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
-    if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* an older layout of these structs */
+    if (version < offer->oldest_abi_version || version > offer->newest_abi_version)
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
-    answer->abi_version = spoken;
+    answer->abi_version = version;
     answer->plugin = &plugin;
     return ARHOST_STATUS_OK;
 }

@@ -1,5 +1,4 @@
-/* What is seen along a ray. FILL IN: this and tracer.c are the part to replace; @NAME@.c needs no more of it than
- * these functions. */
+/* Traces rays. FILL IN: replace this and tracer.c; @NAME@.c uses only the functions at the end. */
 #ifndef TRACER_H
 #define TRACER_H
 
@@ -20,7 +19,7 @@ static inline vec scale(double s, vec a) {
 static inline vec subtract(vec a, vec b) {
     return add(a, scale(-1, b));
 }
-static inline vec multiply(vec a, vec b) { /* colours */
+static inline vec multiply(vec a, vec b) { /* per channel */
     return (vec){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 static inline double dot(vec a, vec b) {
@@ -40,21 +39,21 @@ static inline vec vec_of(const float a[3]) {
 }
 
 typedef struct ray {
-    vec origin, direction; /* length 1 */
-    double end;            /* hits beyond do not count; INFINITY */
+    vec origin, direction; /* mm; unit length */
+    double end;            /* maximum distance of a hit, mm */
 } ray;
 
-/* What to lay over the video. Alpha is exactly 0 where the video shows, exactly 1 on virtual objects. */
-typedef struct seen {
+/* The overlay along a ray. Alpha is exactly 0 where only the video is visible, exactly 1 on virtual objects. */
+typedef struct sample {
     vec colour; /* linear light */
     double alpha;
-} seen;
+} sample;
 
 typedef struct tracer tracer;
 
-tracer *tracer_new(const arhost_scene *scene);            /* NULL: out of memory. The scene must live longer. */
-void tracer_free(tracer *self);                           /* may be NULL */
-void tracer_move(tracer *self, const arhost_motion *now); /* puts what moves where it is now */
-seen tracer_look(const tracer *self, ray r);
+tracer *tracer_new(const arhost_scene *scene);                 /* NULL: out of memory. The scene must outlive it. */
+void tracer_free(tracer *self);                                /* may be NULL */
+void tracer_update(tracer *self, const arhost_motion *motion); /* applies the animated state */
+sample tracer_trace(const tracer *self, ray r);
 
 #endif

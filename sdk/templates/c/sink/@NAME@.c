@@ -1,4 +1,4 @@
-/* @NAME@: a sink for arhost. It writes each frame as a picture, <path>000000.ppm and so on. */
+/* @NAME@: a sink for arhost. Writes each frame as an image: <path>000000.ppm, … */
 #include <arhost/arhost.h>
 
 #include <errno.h>
@@ -15,29 +15,29 @@ struct arhost_instance {
     uint8_t *row;
 };
 
-/* Tells the user what went wrong with a file. */
-static arhost_status complain(const arhost_instance *self, const char *file) {
+/* Logs errno for a file. */
+static arhost_status io_error(const arhost_instance *self, const char *file) {
     char text[PATH_SIZE + 256];
-    snprintf(text, sizeof text, "can't write %s: %s", file, strerror(errno));
+    snprintf(text, sizeof text, "cannot write %s: %s", file, strerror(errno));
     self->host->log(self->host, ARHOST_SEVERITY_ERROR, text);
     return ARHOST_STATUS_ERROR_IO;
 }
 
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
-    char part[PATH_SIZE + 8];
+    char temporary[PATH_SIZE + 8];
     FILE *file;
     char *slash = strrchr(self->path, '/');
     *slash = 0;
-    mkdir(self->path, 0777); /* there already, most times */
+    mkdir(self->path, 0777); /* may exist already */
     *slash = '/';
-    /* Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
-     * another component may yet refuse the run. */
-    snprintf(part, sizeof part, "%s.part", self->path);
-    file = fopen(part, "wb");
+    /* Report an unwritable path now, but leave existing files unchanged until the first frame: another component may
+     * still reject the run. */
+    snprintf(temporary, sizeof temporary, "%s.part", self->path);
+    file = fopen(temporary, "wb");
     if (!file)
-        return complain(self, part);
+        return io_error(self, temporary);
     fclose(file);
-    remove(part);
+    remove(temporary);
     self->row = malloc(3 * (size_t)setup->width);
     if (!self->row) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");
@@ -47,17 +47,17 @@ static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup
 }
 
 static arhost_status write_frame(arhost_instance *self, const arhost_output *output) {
-    char name[PATH_SIZE + 32], part[PATH_SIZE + 8];
+    char name[PATH_SIZE + 32], temporary[PATH_SIZE + 8];
     uint32_t column, row;
     FILE *file;
-    int whole;
+    int complete;
     snprintf(name, sizeof name, "%s%06llu.ppm", self->path, (unsigned long long)output->record->sequence);
-    snprintf(part, sizeof part, "%s.part", self->path);
+    snprintf(temporary, sizeof temporary, "%s.part", self->path);
 
-    /* FILL IN: what becomes of a frame. output->record tells its pose, its time and how its overlay arose. */
-    file = fopen(part, "wb");
+    /* FILL IN: your output. output->record has the frame's pose, time and more. */
+    file = fopen(temporary, "wb");
     if (!file)
-        return complain(self, part);
+        return io_error(self, temporary);
     fprintf(file, "P6\n%u %u\n255\n", output->width, output->height);
     for (row = 0; row < output->height; ++row) {
         const uint8_t *bgr = output->bgr + (size_t)row * output->stride;
@@ -68,16 +68,17 @@ static arhost_status write_frame(arhost_instance *self, const arhost_output *out
         }
         fwrite(self->row, 3, output->width, file);
     }
-    whole = !ferror(file);
-    if (fclose(file) != 0 || !whole || rename(part, name) != 0) /* under its own name only when it is whole */
-        return complain(self, name);
-    return ARHOST_STATUS_OK; /* the frame must now survive the death of this process */
+    complete = !ferror(file);
+    if (fclose(file) != 0 || !complete ||
+        rename(temporary, name) != 0) /* atomic: only complete files get the final name */
+        return io_error(self, name);
+    return ARHOST_STATUS_OK; /* from here on the frame must survive a kill of the process */
 }
 
 static arhost_status stop(arhost_instance *self) {
     free(self->row);
     self->row = NULL;
-    return ARHOST_STATUS_OK; /* all files are whole */
+    return ARHOST_STATUS_OK; /* all files are complete */
 }
 
 static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
@@ -88,7 +89,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
-    /* Every option that is declared below is there. */
+    /* arhost passes every option declared below. */
     snprintf(self->path, sizeof self->path, "%s", arhost_find_option(options, option_count, "path")->text);
     *instance = self;
     return ARHOST_STATUS_OK;
@@ -104,35 +105,35 @@ static const void *get_extension(const char *id) {
     return NULL;
 }
 
-/* ---- what it is ---- */
+/* ---- description ---- */
 
-/* arhost checks the configuration against these before create sees a value. */
+/* arhost validates the configuration against these before it calls create. */
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_OUTPUT_PATH, "path", NULL, 0, 0, NULL,
-     "What the pictures' names begin with; a number and .ppm follow."},
+     "Prefix of the file names; a number and .ppm are appended."},
 };
 static const arhost_sink functions = {sizeof functions, start, write_frame, NULL, stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_SINK,
-    .id = "@NAME@", /* the file's name */
+    .id = "@NAME@", /* must equal the file name without ".so" */
     .name = "@NAME@",
     .version = "0.1.0",
-    .vendor = "unknown", /* FILL IN: you */
-    .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
-    .description = "Writes each frame as a picture (PPM).",
+    .vendor = "unknown", /* FILL IN: your name */
+    .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
+    .description = "Writes each frame as an image (PPM).",
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
 static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
-    const uint32_t spoken = ARHOST_ABI_VERSION;
+    const uint32_t version = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
-    if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* an older layout of these structs */
+    if (version < offer->oldest_abi_version || version > offer->newest_abi_version)
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
-    answer->abi_version = spoken;
+    answer->abi_version = version;
     answer->plugin = &plugin;
     return ARHOST_STATUS_OK;
 }

@@ -1,5 +1,5 @@
-/* @NAME@: a tracker for arhost. It takes the brightest patch of the image for a white square that faces the camera:
- * its middle gives the direction, its area the distance. */
+/* @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
+ * gives the direction, their area the distance. */
 #include <arhost/arhost.h>
 
 #include <math.h>
@@ -10,7 +10,7 @@ struct arhost_instance {
     const arhost_host *host;
     int64_t threshold;
     arhost_intrinsics lens;
-    arhost_marker_config marker; /* the first that the configuration lists: the only one that is looked for */
+    arhost_marker_config marker; /* the first configured marker; this tracker ignores the others */
 };
 
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
@@ -26,7 +26,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     uint32_t column, row;
     int i;
 
-    /* FILL IN: your detector. Without `return ARHOST_STATUS_OK` before the end, it has found self->marker. */
+    /* FILL IN: your detector. */
     for (row = 0; row < format->height; ++row) {
         const uint8_t *grey = frame->grey + (size_t)row * format->grey_stride;
         for (column = 0; column < format->width; ++column)
@@ -37,7 +37,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
             }
     }
     if (area < 100)
-        return ARHOST_STATUS_OK; /* nothing found is no error: the video goes on without an overlay */
+        return ARHOST_STATUS_OK; /* no marker in this frame: not an error */
     x = sum_x / area;
     y = sum_y / area;
     half = sqrt(area) / 2;
@@ -48,11 +48,11 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     marker->id = self->marker.id;
     strcpy(marker->family, "bright");
     marker->state = ARHOST_MARKER_DETECTED;
-    for (i = 0; i < 4; ++i) { /* top left, top right, bottom right, bottom left of the upright print */
+    for (i = 0; i < 4; ++i) { /* top left, top right, bottom right, bottom left on the upright print */
         marker->corners_px[i][0] = x + (i == 1 || i == 2 ? half : -half);
         marker->corners_px[i][1] = y + (i >= 2 ? half : -half);
     }
-    /* Marker to camera, column-major, x right, y up, looking along -z, in mm. Not turned: it faces the camera. */
+    /* Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us. */
     for (i = 0; i < 16; i += 5)
         marker->mt[i] = 1;
     marker->mt[12] = distance * (x - self->lens.cx) / self->lens.fx;
@@ -73,7 +73,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     }
     self->host = host;
-    /* Every option that is declared below is there. */
+    /* arhost passes every option declared below. */
     self->threshold = arhost_find_option(options, option_count, "threshold")->integer;
     *instance = self;
     return ARHOST_STATUS_OK;
@@ -88,35 +88,35 @@ static const void *get_extension(const char *id) {
     return NULL;
 }
 
-/* ---- what it is ---- */
+/* ---- description ---- */
 
-/* arhost checks the configuration against these before create sees a value. */
+/* arhost validates the configuration against these before it calls create. */
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "threshold", "200", 1, 255, NULL,
-     "Grey level from which on a pixel counts as bright."},
+     "Minimum grey level of a bright pixel."},
 };
 static const arhost_tracker functions = {sizeof functions, start, track, stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_TRACKER,
-    .id = "@NAME@", /* the file's name */
+    .id = "@NAME@", /* must equal the file name without ".so" */
     .name = "@NAME@",
     .version = "0.1.0",
-    .vendor = "unknown", /* FILL IN: you */
-    .licence = "NONE",   /* FILL IN: SPDX, "Apache-2.0" */
-    .description = "Takes the brightest patch for the marker.",
+    .vendor = "unknown", /* FILL IN: your name */
+    .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
+    .description = "Tracks a bright patch as the marker.",
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
 static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
-    const uint32_t spoken = ARHOST_ABI_VERSION;
+    const uint32_t version = ARHOST_ABI_VERSION;
     if (offer->struct_size < sizeof *offer || answer->struct_size < sizeof *answer)
-        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* of a version before this one */
-    if (spoken < offer->oldest_abi_version || spoken > offer->newest_abi_version)
+        return ARHOST_STATUS_ERROR_UNSUPPORTED; /* an older layout of these structs */
+    if (version < offer->oldest_abi_version || version > offer->newest_abi_version)
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
-    answer->abi_version = spoken;
+    answer->abi_version = version;
     answer->plugin = &plugin;
     return ARHOST_STATUS_OK;
 }

@@ -1,5 +1,5 @@
-// @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in
-// tracer.hpp.
+// @NAME@: a ray tracer for arhost. This file is the plugin: it turns cameras into rays and samples into images.
+// tracer.hpp traces the rays.
 #include "tracer.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -10,20 +10,21 @@
 
 namespace {
 
-std::uint8_t byte(double share) {
-    return static_cast<std::uint8_t>(255 * std::clamp(share, 0.0, 1.0) + 0.5);
+std::uint8_t to_byte(double value) {
+    return static_cast<std::uint8_t>(255 * std::clamp(value, 0.0, 1.0) + 0.5);
 }
 double srgb(double linear) {
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-// Pixel centres are at integers, rows run downwards, the camera looks along -back.
+// Pixel centres are at integer coordinates, rows go downwards, the camera looks along -back.
 class Camera {
 public:
     explicit Camera(const arhost_camera &camera) : eye_(vec(camera.eye)), lens_(camera.intrinsics) {
         const Vec back = eye_ - vec(camera.look_at), up = vec(camera.up), right = cross(up, back);
-        if (!(length(right) > 1e-9 * length(up) * length(back))) // nor is it where a number is not finite
-            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view");
+        if (!(length(right) > 1e-9 * length(up) * length(back))) // false for NaN too
+            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                                  "the camera's up vector is parallel to its viewing direction");
         back_ = normalised(back);
         right_ = normalised(right);
         up_ = cross(back_, right_);
@@ -49,9 +50,9 @@ public:
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &) {
         const Camera camera(request.camera);
         if (request.motion)
-            tracer_->move(*request.motion);
+            tracer_->update(*request.motion);
         for (std::uint32_t row = 0; row < image.height; ++row) {
-            if (host_.cancelled()) // arhost wants to end: rows must not keep it waiting
+            if (host_.cancelled()) // arhost wants this call to return soon
                 throw arhost::Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled");
             std::uint8_t *pixel = image.rgba + std::size_t(row) * image.stride;
             for (std::uint32_t column = 0; column < image.width; ++column, pixel += 4)
@@ -60,47 +61,46 @@ public:
     }
 
 private:
-    // The mean over a grid of rays. Alpha is straight: the colour is that of what was seen, not multiplied by how much
-    // of the pixel it covers.
+    // Averages a grid of rays. Alpha is straight: the colour is not multiplied by the pixel's coverage.
     void write(std::uint8_t *pixel, const Camera &camera, double column, double row) const {
-        Vec sum; // of colours times alphas
-        double alphas = 0;
+        Vec sum; // of colour · alpha
+        double alpha_sum = 0;
         for (int i = 0; i < side_ * side_; ++i) {
             const double right = (i % side_ + 0.5) / side_ - 0.5, down = (i / side_ + 0.5) / side_ - 0.5;
-            const Seen seen = tracer_->look(camera.ray(column + right, row + down));
-            sum = sum + seen.alpha * seen.colour;
-            alphas += seen.alpha;
+            const Sample sample = tracer_->trace(camera.ray(column + right, row + down));
+            sum = sum + sample.alpha * sample.colour;
+            alpha_sum += sample.alpha;
         }
-        const Vec colour = alphas > 0 ? 1 / alphas * sum : Vec{};
-        pixel[0] = byte(srgb(colour.x));
-        pixel[1] = byte(srgb(colour.y));
-        pixel[2] = byte(srgb(colour.z));
-        pixel[3] = byte(alphas / (side_ * side_));
+        const Vec colour = alpha_sum > 0 ? 1 / alpha_sum * sum : Vec{};
+        pixel[0] = to_byte(srgb(colour.x));
+        pixel[1] = to_byte(srgb(colour.y));
+        pixel[2] = to_byte(srgb(colour.z));
+        pixel[3] = to_byte(alpha_sum / (side_ * side_));
     }
 
     arhost::Host host_;
-    int side_; // of the grid of rays through a pixel
+    int side_; // rays per pixel: side × side
     std::optional<Tracer> tracer_;
 };
 
-// arhost checks the configuration against these before the constructor sees a value.
+// arhost validates the configuration against these before it calls the constructor.
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel: the largest square number up to it.", 1, 64),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, rounded down to a square number.", 1, 64),
 };
 
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
     ARHOST_KIND_RAYTRACER,
-    "@NAME@", // the file's name
+    "@NAME@", // must equal the file name without ".so"
     "@NAME@",
     "0.1.0",
-    "unknown", // FILL IN: you
-    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
-    "Traces rays by brute force.",
-    0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION, once rays go through the lens
+    "unknown", // FILL IN: your name
+    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    "Brute-force ray tracer.",
+    0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION if you implement lens distortion
     std::size(options),
     options,
-    nullptr, // what of the machine it needs: arhost/plugin.h
+    nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

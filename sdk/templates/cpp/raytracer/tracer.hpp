@@ -1,5 +1,4 @@
-// What is seen along a ray. FILL IN: this and tracer.cpp are the part to replace; @NAME@.cpp needs no more of it than
-// move() and look().
+// Traces rays. FILL IN: replace this and tracer.cpp; @NAME@.cpp uses only the constructor, update() and trace().
 #pragma once
 
 #include <arhost/arhost.h>
@@ -23,7 +22,7 @@ inline Vec operator-(Vec a, Vec b) {
 inline Vec operator*(double s, Vec a) {
     return {s * a.x, s * a.y, s * a.z};
 }
-inline Vec operator*(Vec a, Vec b) { // of colours
+inline Vec operator*(Vec a, Vec b) { // per channel
     return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
 inline double dot(Vec a, Vec b) {
@@ -43,29 +42,29 @@ template <class Number> Vec vec(const Number *a) {
 }
 
 struct Ray {
-    Vec origin, direction; // length 1
-    double end = infinity; // hits beyond do not count
+    Vec origin, direction; // mm; unit length
+    double end = infinity; // maximum distance of a hit, mm
 };
 
-// What to lay over the video. Alpha is exactly 0 where the video shows, exactly 1 on virtual objects.
-struct Seen {
+// The overlay along a ray. Alpha is exactly 0 where only the video is visible, exactly 1 on virtual objects.
+struct Sample {
     Vec colour; // linear light
     double alpha = 0;
 };
 
-// By brute force: each ray is tried on every object whose bounds it meets, and there on every triangle. All places
-// are in the world, in mm.
+// Brute force: tests each ray against every object whose bounding sphere it hits, and there against every sphere or
+// triangle. All positions are in world coordinates, mm.
 class Tracer {
 public:
-    explicit Tracer(const arhost_scene &scene); // which must live longer
-    void move(const arhost_motion &motion);     // puts what moves where it is now
-    Seen look(const Ray &ray) const;
+    explicit Tracer(const arhost_scene &scene); // the scene must outlive it
+    void update(const arhost_motion &motion);   // applies the animated state
+    Sample trace(const Ray &ray) const;
 
 private:
-    // What rays can hit, as bits. A shadow of glass is another than that of a solid body.
-    enum Kind : unsigned { solid = 1, glass = 2, catcher = 4, occluder = 8, anything = 15 };
-    enum class Sides { both, outside };
-    enum class Way { clear, through_glass, blocked };
+    // Kinds of objects, as bits of a ray mask. Glass and solid objects cast different shadows.
+    enum Kind : unsigned { solid = 1, glass = 2, catcher = 4, occluder = 8, all_kinds = 15 };
+    enum class Faces { all, front };
+    enum class Visibility { clear, through_glass, blocked };
 
     struct Sphere {
         Vec centre;
@@ -73,35 +72,37 @@ private:
     };
     struct Triangle {
         Vec corner, edge_1, edge_2;
-        Vec facet;      // out of the outside; length 1
-        Vec normals[3]; // at the corners
+        Vec face_normal; // geometric normal: outwards, unit length
+        Vec normals[3];  // shading normals at the corners
     };
     struct Object {
         Kind kind;
         const arhost_material *material;
         Sphere bounds;
-        std::vector<Sphere> spheres;     // one of the two
-        std::vector<Triangle> triangles; // is empty
+        std::vector<Sphere> spheres; // an object has either spheres or triangles
+        std::vector<Triangle> triangles;
     };
     struct Hit {
         double distance = infinity;
-        const Object *object = nullptr; // none: the ray missed
-        Vec facet, normal;              // the flat one and the interpolated one; length 1
+        const Object *object = nullptr; // null: no hit
+        Vec face_normal, normal;        // geometric and shading normal, unit length
     };
     struct Surface;
-    struct Incoming;
+    struct IncidentLight;
 
     template <class T> const T *elements(const arhost_buffer &buffer) const;
-    void place(std::uint32_t number, const float *world_from_object, const float *positions, const float *normals);
-    static void try_sphere(const Object &object, const Sphere &sphere, const Ray &ray, Sides sides, Hit &nearest);
-    static void try_triangle(const Object &object, const Triangle &triangle, const Ray &ray, Sides sides,
-                             Hit &nearest);
-    Hit nearest(const Ray &ray, unsigned kinds, Sides sides = Sides::both) const;
+    void update_geometry(std::uint32_t number, const float *world_from_object, const float *positions,
+                         const float *normals);
+    static void intersect_sphere(const Object &object, const Sphere &sphere, const Ray &ray, Faces faces,
+                                 Hit &nearest);
+    static void intersect_triangle(const Object &object, const Triangle &triangle, const Ray &ray, Faces faces,
+                                   Hit &nearest);
+    Hit nearest(const Ray &ray, unsigned kinds, Faces faces = Faces::all) const;
     static Surface surface_at(const Ray &ray, const Hit &hit);
-    static Incoming incoming(const arhost_light &light, const Surface &surface);
-    Way way_to(const Incoming &light, const Surface &surface) const;
-    Vec colour(const Ray &ray, const Hit &hit, unsigned bounces) const;
-    Vec lit(const Surface &surface, const arhost_material &material, Vec to_eye) const;
+    static IncidentLight incident(const arhost_light &light, const Surface &surface);
+    Visibility visibility(const IncidentLight &light, const Surface &surface) const;
+    Vec radiance(const Ray &ray, const Hit &hit, unsigned bounces) const;
+    Vec direct_light(const Surface &surface, const arhost_material &material, Vec to_eye) const;
     double shadow_alpha(const Surface &surface) const;
 
     const arhost_scene &scene_;

@@ -1,4 +1,4 @@
-// @NAME@: a sink for arhost. It writes each frame as a picture, <path>000000.ppm and so on.
+// @NAME@: a sink for arhost. Writes each frame as an image: <path>000000.ppm, …
 #include <arhost-cpp/plugin.hpp>
 
 #include <cstdio>
@@ -13,24 +13,24 @@ namespace fs = std::filesystem;
 class @CLASS@ {
 public:
     @CLASS@(const arhost::Host &, const arhost::Options &options)
-        : path_(options.text("path")), part_(path_ + ".part") {}
+        : path_(options.text("path")), temporary_(path_ + ".part") {}
 
-    // Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
-    // another component may yet refuse the run.
+    // Reports an unwritable path now, but leaves existing files unchanged until the first frame: another component
+    // may still reject the run.
     void start(const arhost_sink_setup &setup) {
-        std::error_code ignored; // what is wrong shows in the next lines
+        std::error_code ignored; // the next statement reports errors
         fs::create_directories(fs::path(path_).parent_path(), ignored);
-        if (!std::ofstream(part_))
-            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "can't write " + part_);
-        fs::remove(part_);
+        if (!std::ofstream(temporary_))
+            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + temporary_);
+        fs::remove(temporary_);
         row_.resize(std::size_t(3) * setup.width);
     }
 
-    // FILL IN: what becomes of a frame. output.record tells its pose, its time and how its overlay arose.
+    // FILL IN: your output. output.record has the frame's pose, time and more.
     arhost_status write(const arhost_output &output) {
         char number[32];
         std::snprintf(number, sizeof number, "%06llu.ppm", static_cast<unsigned long long>(output.record->sequence));
-        std::ofstream file(part_, std::ios::binary);
+        std::ofstream file(temporary_, std::ios::binary);
         file << "P6\n" << output.width << ' ' << output.height << "\n255\n";
         for (std::uint32_t row = 0; row < output.height; ++row) {
             const std::uint8_t *bgr = output.bgr + std::size_t(row) * output.stride;
@@ -43,35 +43,35 @@ public:
         }
         file.close();
         if (!file)
-            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "can't write " + part_);
-        fs::rename(part_, path_ + number); // under its own name only when it is whole
-        return ARHOST_STATUS_OK;                  // the frame must now survive the death of this process
+            throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + temporary_);
+        fs::rename(temporary_, path_ + number); // atomic: only complete files get the final name
+        return ARHOST_STATUS_OK;                // from here on the frame must survive a kill of the process
     }
 
 private:
-    std::string path_, part_; // absolute
+    std::string path_, temporary_; // absolute
     std::vector<char> row_;
 };
 
-// arhost checks the configuration against these before the constructor sees a value.
+// arhost validates the configuration against these before it calls the constructor.
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr,
-                   "What the pictures' names begin with; a number and .ppm follow."),
+                   "Prefix of the file names; a number and .ppm are appended."),
 };
 
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
     ARHOST_KIND_SINK,
-    "@NAME@", // the file's name
+    "@NAME@", // must equal the file name without ".so"
     "@NAME@",
     "0.1.0",
-    "unknown", // FILL IN: you
-    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
-    "Writes each frame as a picture (PPM).",
+    "unknown", // FILL IN: your name
+    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    "Writes each frame as an image (PPM).",
     0,
     std::size(options),
     options,
-    nullptr, // what of the machine it needs: arhost/plugin.h
+    nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

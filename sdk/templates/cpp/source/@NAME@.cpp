@@ -1,4 +1,4 @@
-// @NAME@: a source for arhost. It gives a gradient that moves.
+// @NAME@: a source for arhost. Produces a moving gradient.
 #include <arhost-cpp/plugin.hpp>
 
 namespace {
@@ -13,10 +13,10 @@ public:
           frames_(static_cast<std::uint64_t>(options.integer("frames"))) {}
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        // FILL IN: open the device or the file.
+        // FILL IN: open the device or file.
         fps_ = setup.fps > 0 ? setup.fps : 30;
         paced_ = setup.paced;
-        began_ = Clock::now() - time_of(setup.first_sequence);
+        start_time_ = Clock::now() - time_of(setup.first_sequence);
         properties.frame_count = frames_;
         properties.format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
         properties.format.width = width_;
@@ -29,12 +29,12 @@ public:
         const std::uint64_t n = buffer.sequence;
         if (frames_ > 0 && n >= frames_)
             return ARHOST_STATUS_END;
-        info.clock = ARHOST_CLOCK_MEDIA; // of a camera: ARHOST_CLOCK_MONOTONIC, when the picture was taken
+        info.clock = ARHOST_CLOCK_MEDIA; // for a camera: ARHOST_CLOCK_MONOTONIC, at the time of exposure
         info.capture_ns = time_of(n).count();
-        if (paced_ && !host_.wait_until(began_ + time_of(n)))
+        if (paced_ && !host_.wait_until(start_time_ + time_of(n)))
             return ARHOST_STATUS_ERROR_CANCELLED;
 
-        // FILL IN: your pixels. The grey plane that trackers see is made of them by arhost.
+        // FILL IN: your pixels. arhost computes the grey plane for trackers from them.
         for (std::uint32_t row = 0; row < height_; ++row) {
             std::uint8_t *rgb = buffer.plane[0] + std::size_t(row) * buffer.format->stride[0];
             for (std::uint32_t column = 0; column < width_; ++column) {
@@ -56,29 +56,29 @@ private:
     std::uint64_t frames_; // 0: endless
     double fps_ = 0;
     bool paced_ = false;
-    Clock::time_point began_; // when frame 0 was due
+    Clock::time_point start_time_; // when frame 0 was due
 };
 
-// arhost checks the configuration against these before the constructor sees a value.
+// arhost validates the configuration against these before it calls the constructor.
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "width", "640", "Image width in px.", 1, 4096),
     arhost::option(ARHOST_OPTION_INTEGER, "height", "360", "Image height in px.", 1, 4096),
-    arhost::option(ARHOST_OPTION_INTEGER, "frames", "60", "Ends after so many; 0: endless.", 0, 1e9),
+    arhost::option(ARHOST_OPTION_INTEGER, "frames", "60", "Number of frames; 0: endless.", 0, 1e9),
 };
 
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
     ARHOST_KIND_SOURCE,
-    "@NAME@", // the file's name
+    "@NAME@", // must equal the file name without ".so"
     "@NAME@",
     "0.1.0",
-    "unknown", // FILL IN: you
-    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
-    "A gradient that moves.",
-    ARHOST_CAPABILITY_SEEK,
+    "unknown", // FILL IN: your name
+    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    "Moving gradient.",
+    ARHOST_CAPABILITY_SEEK, // frame n is the same wherever reading starts
     std::size(options),
     options,
-    nullptr, // what of the machine it needs: arhost/plugin.h
+    nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

@@ -1,5 +1,5 @@
-// @NAME@: a tracker for arhost. It takes the brightest patch of the image for a white square that faces the camera:
-// its middle gives the direction, its area the distance.
+// @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
+// gives the direction, their area the distance.
 #include <arhost-cpp/plugin.hpp>
 
 #include <cmath>
@@ -18,27 +18,27 @@ public:
 
     void start(const arhost_tracker_setup &setup) {
         lens_ = *setup.intrinsics;
-        wanted_ = setup.markers[0]; // the first that the configuration lists: the only one that is looked for
+        target_ = setup.markers[0]; // the first configured marker; this tracker ignores the others
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const auto patch = detect(frame);
         if (!patch)
-            return; // nothing found is no error: the video goes on without an overlay
+            return; // no marker in this frame: not an error
         const double half = std::sqrt(patch->area) / 2;
-        const double distance = lens_.fx * wanted_.side_mm / (2 * half);
+        const double distance = lens_.fx * target_.side_mm / (2 * half);
 
         result.marker_count = 1;
         arhost_marker &marker = result.markers[0];
         marker.struct_size = sizeof marker;
-        marker.id = wanted_.id;
+        marker.id = target_.id;
         std::strcpy(marker.family, "bright");
         marker.state = ARHOST_MARKER_DETECTED;
-        for (int i = 0; i < 4; ++i) { // top left, top right, bottom right, bottom left of the upright print
+        for (int i = 0; i < 4; ++i) { // top left, top right, bottom right, bottom left on the upright print
             marker.corners_px[i][0] = patch->x + (i == 1 || i == 2 ? half : -half);
             marker.corners_px[i][1] = patch->y + (i >= 2 ? half : -half);
         }
-        // Marker to camera, column-major, x right, y up, looking along -z, in mm. Not turned: it faces the camera.
+        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
         for (int i = 0; i < 16; i += 5)
             marker.mt[i] = 1;
         marker.mt[12] = distance * (patch->x - lens_.cx) / lens_.fx;
@@ -66,27 +66,27 @@ private:
 
     std::int64_t threshold_;
     arhost_intrinsics lens_{};
-    arhost_marker_config wanted_{};
+    arhost_marker_config target_{};
 };
 
-// arhost checks the configuration against these before the constructor sees a value.
+// arhost validates the configuration against these before it calls the constructor.
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "threshold", "200", "Grey level from which on a pixel counts as bright.", 1, 255),
+    arhost::option(ARHOST_OPTION_INTEGER, "threshold", "200", "Minimum grey level of a bright pixel.", 1, 255),
 };
 
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
     ARHOST_KIND_TRACKER,
-    "@NAME@", // the file's name
+    "@NAME@", // must equal the file name without ".so"
     "@NAME@",
     "0.1.0",
-    "unknown", // FILL IN: you
-    "NONE", // FILL IN: the licence (SPDX), "Apache-2.0"
-    "Takes the brightest patch for the marker.",
+    "unknown", // FILL IN: your name
+    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    "Tracks a bright patch as the marker.",
     0,
     std::size(options),
     options,
-    nullptr, // what of the machine it needs: arhost/plugin.h
+    nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

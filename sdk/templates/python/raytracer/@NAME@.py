@@ -1,12 +1,13 @@
-"""@NAME@: a ray tracer for arhost. First what is seen along rays, then the plugin, from cameras to images.
+"""@NAME@: a ray tracer for arhost. The first part traces rays; the last is the plugin, which turns cameras into rays
+and samples into images.
 
-By brute force: rays are tried on every object whose bounds they meet, and there on every triangle; numpy does so with
-the rays of a few rows of the image at a time. All places are in the world, in mm."""
+Brute force: tests each ray against every object whose bounding sphere it hits, and there against every sphere or
+triangle, with numpy, for the rays of a few image rows at a time. All positions are in world coordinates, mm."""
 import arhost
 import numpy as np
 
-BAND = 1 << 12  # pixels that are drawn at a time: of all at once, no memory would hold a hundred reflections
-CHUNK = 1 << 18  # rays times triangles that are tried at a time
+BAND = 1 << 12  # pixels rendered at a time; limits the memory of deep recursion
+CHUNK = 1 << 18  # ray–triangle pairs tested at a time
 
 
 def dot(a, b):
@@ -21,24 +22,24 @@ def normalised(a):
     return a / length(a)[..., None]
 
 
-# ---- The scene. FILL IN: from here to the plugin is the part to replace ----
+# ---- Scene. FILL IN: replace everything from here to the plugin ----
 
-# What rays can hit, as bits. A shadow of glass is another than that of a solid body.
-SOLID, GLASS, CATCHER, OCCLUDER, ANYTHING = 1, 2, 4, 8, 15
+# Kinds of objects, as bits of a ray mask. Glass and solid objects cast different shadows.
+SOLID, GLASS, CATCHER, OCCLUDER, ALL_KINDS = 1, 2, 4, 8, 15
 
 
 class Object:
-    """An object in the world: spheres or triangles."""
+    """An object in world coordinates: spheres or triangles."""
 
     def __init__(self, record, material):
         self.material = material
-        self.kind = {arhost.CATCHER: CATCHER, arhost.OCCLUDER: OCCLUDER}.get(
-            int(record["role"]), GLASS if material["model"] == arhost.GLASS else SOLID)
+        self.kind = {arhost.ROLE_CATCHER: CATCHER, arhost.ROLE_OCCLUDER: OCCLUDER}.get(
+            int(record["role"]), GLASS if material["model"] == arhost.MATERIAL_GLASS else SOLID)
 
-    def place(self, scene, geometry, world_from_object, positions=None, normals=None):
-        """Puts its geometry into the world; `positions` and `normals` stand for those of the scene."""
+    def update(self, scene, geometry, world_from_object, positions=None, normals=None):
+        """Transforms its geometry to world coordinates; `positions` and `normals` replace those of the scene."""
         axes, origin = np.split(world_from_object.astype(float).reshape(4, 3), [3])
-        self.is_mesh = geometry["type"] == arhost.TRIANGLES
+        self.is_mesh = geometry["type"] == arhost.GEOMETRY_TRIANGLES
         if not self.is_mesh:
             spheres = scene.elements(geometry["positions"], "4f4").astype(float)
             self.centres, self.radii = spheres[:, :3] @ axes + origin, spheres[:, 3] * length(axes[0])
@@ -49,64 +50,64 @@ class Object:
         indices = scene.elements(geometry["indices"], "3u4")
         corners = (positions.astype(float) @ axes + origin)[indices]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        usable = length(across) > 0  # the others have no area, no facet
+        usable = length(across) > 0  # the others have zero area and no normal
         self.corner = corners[usable, 0]
         self.edge_1, self.edge_2 = corners[usable, 1] - self.corner, corners[usable, 2] - self.corner
-        # Normals turn by the inverse's transpose. In a mirrored object its sign keeps the outside outside.
+        # Normals transform by the inverse transpose. Its sign keeps the normals of a mirrored object pointing outwards.
         sign = np.sign(np.linalg.det(axes))
-        self.facets = sign * normalised(across[usable])
-        self.normals = np.repeat(self.facets[:, None], 3, axis=1)
+        self.face_normals = sign * normalised(across[usable])
+        self.normals = np.repeat(self.face_normals[:, None], 3, axis=1)
         if normals is not None and len(normals):
             self.normals = normalised(normals.astype(float) @ np.linalg.inv(axes).T)[indices[usable]]
         self.bound(corners.reshape(-1, 3), 0)
 
     def bound(self, centres, radii):
-        """By a sphere about the middle of the box that holds all."""
+        """Sets the bounding sphere, around the centre of the bounding box."""
         r = np.zeros((len(centres), 1)) + np.reshape(radii, (-1, 1))
-        self.middle = ((centres - r).min(axis=0) + (centres + r).max(axis=0)) / 2
-        self.radius = (length(centres - self.middle) + r[:, 0]).max() * (1 + 1e-9)  # rounding cuts no rim off
+        self.centre = ((centres - r).min(axis=0) + (centres + r).max(axis=0)) / 2
+        self.radius = (length(centres - self.centre) + r[:, 0]).max() * (1 + 1e-9)  # margin for rounding
 
 
-# ---- Rays and what they hit ----
+# ---- Intersections ----
 
-def inside(centre, radius, origins, directions):
-    """Where lines are inside a sphere, as distances along them; NaN where they miss."""
+def sphere_interval(centre, radius, origins, directions):
+    """Distances at which the rays' lines enter and leave a sphere; NaN if they miss."""
     to_centre = centre - origins
-    middle = dot(to_centre, directions)
-    aside = to_centre - middle[:, None] * directions
+    centre_distance = dot(to_centre, directions)
+    aside = to_centre - centre_distance[:, None] * directions
     squared = radius ** 2 - dot(aside, aside)
     half = np.sqrt(np.where(squared > 0, squared, np.nan))
-    return middle - half, middle + half
+    return centre_distance - half, centre_distance + half
 
 
 class Hits:
-    """The nearest hits of rays."""
+    """The nearest hit of each ray."""
 
     def __init__(self, count, end):
         self.distance = np.zeros(count) + end
-        self.object = np.full(count, -1)  # its number; -1: the ray missed
-        self.facet = np.zeros((count, 3))  # the flat normal
-        self.normal = np.zeros((count, 3))  # and the interpolated one; length 1
+        self.object = np.full(count, -1)  # index; -1: no hit
+        self.face_normal = np.zeros((count, 3))  # geometric normal, unit length
+        self.normal = np.zeros((count, 3))  # shading normal, unit length
 
-    def take(self, rays, number, distance, facet, normal):
+    def take(self, rays, number, distance, face_normal, normal):
         nearer = (distance > 0) & (distance < self.distance[rays])  # false for NaN
         rays = rays[nearer]
         self.distance[rays], self.object[rays] = distance[nearer], number
-        self.facet[rays], self.normal[rays] = facet[nearer], normal[nearer]
+        self.face_normal[rays], self.normal[rays] = face_normal[nearer], normal[nearer]
 
 
-def try_spheres(hits, number, o, rays, origins, directions, only_outside):
+def intersect_spheres(hits, number, o, rays, origins, directions, front_faces_only):
     for centre, radius in zip(o.centres, o.radii):
-        enters, leaves = inside(centre, radius, origins, directions)
-        distance = enters if only_outside else np.where(enters > 0, enters, leaves)
+        enters, leaves = sphere_interval(centre, radius, origins, directions)
+        distance = enters if front_faces_only else np.where(enters > 0, enters, leaves)
         normal = (origins + distance[:, None] * directions - centre) / radius
         hits.take(rays, number, distance, normal, normal)
 
 
-def try_triangles(hits, number, o, part, rays, origins, directions, only_outside):
-    """Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, Journal of Graphics Tools 2(1), 1997. As
-    scalar triple products: of rays times triangles these are products of matrices."""
-    slack = 1e-9  # no ray may slip through between two triangles that share an edge
+def intersect_triangles(hits, number, o, part, rays, origins, directions, front_faces_only):
+    """Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, Journal of Graphics Tools 2(1), 1997. The
+    scalar triple products of all rays and triangles are matrix products."""
+    epsilon = 1e-9  # prevents gaps between triangles with a common edge
     corner, edge_1, edge_2 = o.corner[part], o.edge_1[part], o.edge_2[part]
     moments = np.cross(origins, directions)
     # (origin − corner) · (direction × edge) = edge · (origin × direction) − direction · (edge × corner)
@@ -115,9 +116,9 @@ def try_triangles(hits, number, o, part, rays, origins, directions, only_outside
     v = -(moments @ edge_1.T - directions @ np.cross(edge_1, corner).T) / determinant
     normals = np.cross(edge_1, edge_2)
     distance = (origins @ normals.T - dot(corner, normals)) / determinant
-    hit = (u >= -slack) & (v >= -slack) & (u + v <= 1 + slack) & (distance > 0)
-    if only_outside:
-        hit &= directions @ o.facets[part].T <= 0
+    hit = (u >= -epsilon) & (v >= -epsilon) & (u + v <= 1 + epsilon) & (distance > 0)
+    if front_faces_only:
+        hit &= directions @ o.face_normals[part].T <= 0
     distance = np.where(hit, distance, np.inf)
     which, every = distance.argmin(axis=1), np.arange(len(rays))
     nearest = distance[every, which]
@@ -128,7 +129,7 @@ def try_triangles(hits, number, o, part, rays, origins, directions, only_outside
     u, v = u[every, which, None], v[every, which, None]
     corners = o.normals[part][which]
     normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
-    hits.take(rays[found], number, nearest[found], o.facets[part][which], normalised(normal))
+    hits.take(rays[found], number, nearest[found], o.face_normals[part][which], normalised(normal))
 
 
 class Tracer:
@@ -136,72 +137,72 @@ class Tracer:
         self.scene, self.host = scene, host
         self.objects = [Object(record, scene.materials[record["material"]]) for record in scene.objects]
         for number, record in enumerate(scene.objects):
-            self.place(number, record["world_from_object"])
+            self.update_object(number, record["world_from_object"])
 
-    def place(self, number, *where):
-        self.objects[number].place(self.scene, self.scene.geometries[self.scene.objects[number]["geometry"]], *where)
+    def update_object(self, number, *state):
+        self.objects[number].update(self.scene, self.scene.geometries[self.scene.objects[number]["geometry"]], *state)
 
-    def move(self, moved, deformed):
-        """Puts what moves where it is now."""
-        places = {int(m["object"]): m["world_from_object"] for m in moved}
-        for number, place in places.items():
-            self.place(number, place)
+    def update(self, moved, deformed):
+        """Applies the animated state."""
+        transforms = {int(m["object"]): m["world_from_object"] for m in moved}
+        for number, transform in transforms.items():
+            self.update_object(number, transform)
         for d in deformed:
-            place = places.get(d.object, self.scene.objects[d.object]["world_from_object"])
-            self.place(d.object, place, d.positions, d.normals)
+            transform = transforms.get(d.object, self.scene.objects[d.object]["world_from_object"])
+            self.update_object(d.object, transform, d.positions, d.normals)
 
-    def heed_cancelling(self):
-        if self.host.cancelled():  # arhost wants to end: rays must not keep it waiting
-            raise arhost.Failure("", arhost.ERROR_CANCELLED)
+    def check_cancelled(self):
+        if self.host.cancelled():  # arhost wants this call to return soon
+            raise arhost.Failure("", arhost.STATUS_ERROR_CANCELLED)
 
-    def nearest(self, origins, directions, kinds, end=np.inf, only_outside=False):
-        self.heed_cancelling()
+    def nearest(self, origins, directions, kinds, end=np.inf, front_faces_only=False):
+        self.check_cancelled()
         hits = Hits(len(origins), end)
         for number, o in enumerate(self.objects):
             if not o.kind & kinds:
                 continue
-            enters, leaves = inside(o.middle, o.radius, origins, directions)
+            enters, leaves = sphere_interval(o.centre, o.radius, origins, directions)
             rays = np.flatnonzero((enters < hits.distance) & (leaves > 0))
             if len(rays) == 0:
                 continue
             if not o.is_mesh:
-                try_spheres(hits, number, o, rays, origins[rays], directions[rays], only_outside)
+                intersect_spheres(hits, number, o, rays, origins[rays], directions[rays], front_faces_only)
                 continue
             step = max(1, CHUNK // len(rays))
             for first in range(0, len(o.corner), step):
-                self.heed_cancelling()
-                try_triangles(hits, number, o, slice(first, first + step), rays, origins[rays], directions[rays],
-                              only_outside)
+                self.check_cancelled()
+                intersect_triangles(hits, number, o, slice(first, first + step), rays, origins[rays], directions[rays],
+                                    front_faces_only)
         return hits
 
-    # ---- Light ----
+    # ---- Shading ----
 
     def incoming(self, light, surface):
-        """A light as surfaces have it: directions to it, distances, cosines (0: it is behind), and the irradiance of
-        what faces it. FILL IN: rectangles and spheres shine from their middle alone. Many points of theirs make soft
-        shadows."""
+        """The light that arrives at each surface point: direction to the light, distance, cosine to the normal (0 if
+        the light is behind the surface), irradiance at normal incidence for an intensity of 1. FILL IN: area lights
+        emit from their centre only; sample many points on them for soft shadows."""
         beam, irradiance = light["direction"].astype(float), np.ones(len(surface.position))
-        if light["type"] == arhost.DIRECTIONAL_LIGHT:
+        if light["type"] == arhost.LIGHT_DIRECTIONAL:
             direction, distance = np.broadcast_to(-beam, surface.position.shape), np.inf * irradiance
         else:
-            way = light["position"] - surface.position
-            distance = length(way)
-            direction = way / distance[:, None]
+            to_light = light["position"] - surface.position
+            distance = length(to_light)
+            direction = to_light / distance[:, None]
             if light["falloff"] == arhost.FALLOFF_INVERSE_SQUARE:
                 irradiance = 1 / np.maximum(distance ** 2, 1e-6)
         along_beam = -direction @ beam
-        if light["type"] == arhost.RECTANGLE_LIGHT:
+        if light["type"] == arhost.LIGHT_RECTANGLE:
             irradiance = irradiance * np.maximum(along_beam, 0)
-        if light["type"] == arhost.SPOT_LIGHT:
+        if light["type"] == arhost.LIGHT_SPOT:
             inner, outer = float(light["cosine_inner"]), float(light["cosine_outer"])
             t = np.clip((along_beam - outer) / max(inner - outer, 1e-6), 0, 1)
             irradiance = irradiance * t * t * (3 - 2 * t)
-        cosine = np.where(dot(surface.facet, direction) > 0, np.maximum(dot(surface.normal, direction), 0), 0)
+        cosine = np.where(dot(surface.face_normal, direction) > 0, np.maximum(dot(surface.normal, direction), 0), 0)
         return direction, distance, cosine, irradiance
 
-    def ways_to(self, direction, distance, surface, facing):
-        """Which of those that face a light are blocked, and which see it through glass. Real things cast no shadows
-        on each other: those are in the video."""
+    def visibility(self, direction, distance, surface, facing):
+        """For the points that face a light: whether it is blocked, and whether it is visible through glass. Proxies for
+        real objects cast no shadows on each other: the video already contains those."""
         blocked, through_glass = np.zeros((2, len(facing)), bool)
         for real, opaque in ((False, SOLID | CATCHER | OCCLUDER), (True, SOLID)):
             some = np.flatnonzero(facing & (surface.is_real == real))
@@ -210,23 +211,23 @@ class Tracer:
             through_glass[some] = self.nearest(*rays, GLASS, distance[some]).object >= 0
         return blocked, through_glass & ~blocked
 
-    def lit(self, surface, material, to_eye):
-        """Lambert, and Phong's highlight."""
-        light_out = np.zeros(surface.position.shape) + self.scene.ambient * material["ambient"] + material["emission"]
+    def direct_light(self, surface, material, to_eye):
+        """Lambert and Phong."""
+        radiance = np.zeros(surface.position.shape) + self.scene.ambient * material["ambient"] + material["emission"]
         for light in self.scene.lights:
             direction, distance, cosine, irradiance = self.incoming(light, surface)
-            blocked, _ = self.ways_to(direction, distance, surface, cosine * irradiance > 0)
+            blocked, _ = self.visibility(direction, distance, surface, cosine * irradiance > 0)
             reflected = cosine[:, None] * material["diffuse"]
-            if material["model"] in (arhost.SPECULAR, arhost.METAL):
+            if material["model"] in (arhost.MATERIAL_SPECULAR, arhost.MATERIAL_METAL):
                 mirrored = 2 * dot(surface.normal, direction)[:, None] * surface.normal - direction
                 lobe = np.maximum(dot(mirrored, to_eye), 0) ** float(material["exponent"]) * (cosine > 0)
                 reflected = reflected + lobe[:, None] * material["specular"]
-            light_out += (irradiance * ~blocked)[:, None] * reflected * light["intensity"]
-        return light_out
+            radiance += (irradiance * ~blocked)[:, None] * reflected * light["intensity"]
+        return radiance
 
-    def colours(self, origins, directions, hits, bounces=0):
-        """FILL IN: there are no textures, no environment, no microfacets (metallic-roughness is drawn as Lambert), and
-        glass does not bend light, nor reflect or colour any."""
+    def radiance(self, origins, directions, hits, bounces=0):
+        """FILL IN: not implemented: textures, environment maps, microfacets (metallic-roughness is shaded as Lambert),
+        and refraction, reflection and absorption of glass."""
         result = np.zeros(origins.shape) + self.scene.background
         for number in np.unique(hits.object[hits.object >= 0]):
             here = np.flatnonzero(hits.object == number)
@@ -234,50 +235,51 @@ class Tracer:
             surface = Surface(origins[here], directions_here, hits, here, self.objects[number].kind)
             cosine = -dot(directions_here, surface.normal)[:, None]
             mirrored = directions_here + 2 * cosine * surface.normal
-            if material["model"] == arhost.MIRROR:
-                colour = material["reflectivity"] * self.light_from(surface.position, mirrored, bounces + 1)
-            elif material["model"] == arhost.METAL:
-                rim = (1 - np.clip(cosine, 0, 1)) ** 5  # Schlick
-                reflectance = (1 - rim) * material["reflectivity"] + rim
-                colour = self.lit(surface, material, -directions_here) + \
-                    reflectance * self.light_from(surface.position, mirrored, bounces + 1)
-            elif material["model"] == arhost.GLASS:
-                colour = material["refraction"] * self.light_from(surface.below, directions_here, bounces + 1)
+            if material["model"] == arhost.MATERIAL_MIRROR:
+                colour = material["reflectivity"] * self.trace_secondary(surface.position, mirrored, bounces + 1)
+            elif material["model"] == arhost.MATERIAL_METAL:
+                schlick = (1 - np.clip(cosine, 0, 1)) ** 5
+                reflectance = (1 - schlick) * material["reflectivity"] + schlick
+                colour = self.direct_light(surface, material, -directions_here) + \
+                    reflectance * self.trace_secondary(surface.position, mirrored, bounces + 1)
+            elif material["model"] == arhost.MATERIAL_GLASS:
+                colour = material["refraction"] * self.trace_secondary(surface.below, directions_here, bounces + 1)
             else:
-                colour = self.lit(surface, material, -directions_here)
+                colour = self.direct_light(surface, material, -directions_here)
             result[here] = colour
         return result
 
-    def light_from(self, origins, directions, bounces):
+    def trace_secondary(self, origins, directions, bounces):
         if bounces > self.scene.max_depth:
             return np.zeros(origins.shape)
-        return self.colours(origins, directions, self.nearest(origins, directions, ANYTHING), bounces)
+        return self.radiance(origins, directions, self.nearest(origins, directions, ALL_KINDS), bounces)
 
-    # ---- What lies over the video ----
+    # ---- Overlay ----
 
     def shadow_alphas(self, surface):
-        """The share of a catcher's light that virtual objects hide decides how dark it becomes."""
+        """Shadow on a catcher: proportional to the fraction of its light that virtual objects block."""
         total, alphas = np.zeros((2, len(surface.position)))
         for light in self.scene.lights:
             direction, distance, cosine, irradiance = self.incoming(light, surface)
             power = cosine * irradiance * light["intensity"].astype(float).sum()
-            blocked, through_glass = self.ways_to(direction, distance, surface, power > 0)
+            blocked, through_glass = self.visibility(direction, distance, surface, power > 0)
             total += power
             alphas += power * np.where(blocked, self.scene.shadow_alpha_opaque, 0)
             alphas += power * np.where(through_glass, self.scene.shadow_alpha_translucent, 0)
         return np.divide(alphas, total, out=np.zeros(len(total)), where=total > 0)
 
-    def look(self, origins, directions):
-        """Colours, in linear light, and alphas: exactly 0 where the video shows, exactly 1 on virtual objects."""
-        drawn = self.nearest(origins, directions, SOLID | GLASS | OCCLUDER)
-        kinds = np.array([o.kind for o in self.objects] + [0])[drawn.object]  # -1: the last, of what missed
+    def trace(self, origins, directions):
+        """Overlay colours, in linear light, and alphas: exactly 0 where only the video is visible, exactly 1 on virtual
+        objects."""
+        hits = self.nearest(origins, directions, SOLID | GLASS | OCCLUDER)
+        kinds = np.array([o.kind for o in self.objects] + [0])[hits.object]  # index -1: no hit, kind 0
         virtual = (kinds & (SOLID | GLASS)) != 0
-        drawn.object[~virtual] = -1
+        hits.object[~virtual] = -1
         alphas = virtual.astype(float)
-        colours = self.colours(origins, directions, drawn) * virtual[:, None]
-        # A catcher is in the video already. Only the shadow on it is missing there.
+        colours = self.radiance(origins, directions, hits) * virtual[:, None]
+        # The video shows the real surface; the overlay adds only the shadow.
         rest = np.flatnonzero(~virtual)
-        caught = self.nearest(origins[rest], directions[rest], CATCHER, drawn.distance[rest], only_outside=True)
+        caught = self.nearest(origins[rest], directions[rest], CATCHER, hits.distance[rest], front_faces_only=True)
         on_catcher = np.flatnonzero(caught.object >= 0)
         rest = rest[on_catcher]
         alphas[rest] = self.shadow_alphas(Surface(origins[rest], directions[rest], caught, on_catcher, CATCHER))
@@ -285,20 +287,21 @@ class Tracer:
 
 
 class Surface:
-    """Where rays have hit; `here` are their places in `hits`."""
+    """The points hit by rays; `here` are their indices in `hits`."""
 
     def __init__(self, origins, directions, hits, here, kind):
         distance = hits.distance[here, None]
         at = origins + distance * directions
-        facet, normal = hits.facet[here], hits.normal[here]
-        self.facet = np.where(dot(facet, directions)[:, None] > 0, -facet, facet)  # to where the rays came from
-        self.normal = np.where(dot(normal, self.facet)[:, None] < 0, -normal, normal)
-        gap = 1e-9 * (length(at)[:, None] + distance) * self.facet
-        self.position, self.below = at + gap, at - gap  # rays that go on do not hit it again
+        face_normal, normal = hits.face_normal[here], hits.normal[here]
+        # Both normals face the rays' origins.
+        self.face_normal = np.where(dot(face_normal, directions)[:, None] > 0, -face_normal, face_normal)
+        self.normal = np.where(dot(normal, self.face_normal)[:, None] < 0, -normal, normal)
+        gap = 1e-9 * (length(at)[:, None] + distance) * self.face_normal
+        self.position, self.below = at + gap, at - gap  # offsets, so that secondary rays do not hit it again
         self.is_real = np.full(len(at), bool(kind & (CATCHER | OCCLUDER)))
 
 
-# ---- The plugin ----
+# ---- Plugin ----
 
 def srgb_bytes(linear):
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)
@@ -306,36 +309,37 @@ def srgb_bytes(linear):
 
 
 class @CLASS@:
-    # Further arguments are given in the YAML: options: {arguments: '{"colour": [0, 0.5, 1]}'}
+    # Further arguments come from the YAML: options: {arguments: '{"colour": [0, 0.5, 1]}'}
     def __init__(self, host):
-        self.host = host  # host.info("…") logs, host.cancelled() tells when to give up
+        self.host = host  # host.info("…") logs; poll host.cancelled() in long loops
 
     def start(self, setup):
         self.tracer = Tracer(setup.scene, self.host)
 
     def stop(self):
-        self.tracer = None  # the scene is no longer there
+        self.tracer = None  # the scene becomes invalid
 
-    @np.errstate(divide="ignore", invalid="ignore")  # of rays that miss: NaN, which no comparison takes
+    @np.errstate(divide="ignore", invalid="ignore")  # misses yield NaN, which fails every comparison
     def render(self, request, image):
         camera, lens = request.camera, request.camera.intrinsics
         back = camera.eye - camera.look_at
         right = np.cross(camera.up, back)
-        if not length(right) > 1e-9 * length(camera.up) * length(back):  # nor where a number is not finite
-            raise arhost.Failure("the camera's up is parallel to its view", arhost.ERROR_INVALID_ARGUMENT)
+        if not length(right) > 1e-9 * length(camera.up) * length(back):  # false for NaN too
+            raise arhost.Failure("the camera's up vector is parallel to its viewing direction",
+                                 arhost.STATUS_ERROR_INVALID_ARGUMENT)
         right, back = normalised(right), normalised(back)
         up = np.cross(back, right)
-        self.tracer.move(request.moved, request.deformed)
+        self.tracer.update(request.moved, request.deformed)
 
         height, width = image.shape[:2]
         step = max(1, BAND // width)
         for first in range(0, height, step):
             band = image[first:first + step]
-            # A ray a pixel. Pixel centres are at integers, rows run downwards, the camera looks along -back.
+            # One ray per pixel. Pixel centres are at integers, rows go downwards, the camera looks along -back.
             rows, columns = np.mgrid[first:first + len(band), 0:width].reshape(2, -1)
             x, y = (columns - lens.cx) / lens.fx, (rows - lens.cy) / lens.fy
             directions = normalised(x[:, None] * right - y[:, None] * up - back)
-            colours, alphas = self.tracer.look(np.broadcast_to(camera.eye, directions.shape), directions)
-            # Alpha is straight: colours are not multiplied by it.
+            colours, alphas = self.tracer.trace(np.broadcast_to(camera.eye, directions.shape), directions)
+            # Straight alpha: colours are not multiplied by it.
             band[..., :3] = srgb_bytes(colours).reshape(band.shape[:2] + (3,))
             band[..., 3] = (255 * alphas + 0.5).astype(np.uint8).reshape(band.shape[:2])

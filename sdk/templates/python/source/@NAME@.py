@@ -1,4 +1,4 @@
-"""@NAME@: a source for arhost. It gives a gradient that moves."""
+"""@NAME@: a source for arhost. Produces a moving gradient."""
 import time
 
 import arhost
@@ -6,29 +6,29 @@ import numpy as np
 
 
 class @CLASS@:
-    # The arguments after `host` are given in the YAML: options: {arguments: '{"frames": 0}'}
+    # Arguments after `host` come from the YAML: options: {arguments: '{"frames": 0}'}
     def __init__(self, host, width=640, height=360, frames=60):
-        self.host = host  # host.info("…") logs, host.cancelled() tells when to give up
+        self.host = host  # host.info("…") logs; poll host.cancelled() in long loops
         self.width, self.height, self.frames = width, height, frames  # frames 0: endless
 
     def start(self, setup):
-        # FILL IN: open the device or the file.
+        # FILL IN: open the device or file.
         self.fps = setup.fps or 30
         self.paced = setup.paced  # mode live
-        self.began = time.monotonic() - setup.first_sequence / self.fps
+        self.start_time = time.monotonic() - setup.first_sequence / self.fps
         columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
-        self.picture = np.stack([columns, rows, np.full_like(rows, 128)], axis=2)
+        self.image = np.stack([columns, rows, np.full_like(rows, 128)], axis=2)
         return {"width": self.width, "height": self.height, "fps": self.fps, "frame_count": self.frames,
-                "pixel_format": arhost.RGB8, "clock": arhost.CLOCK_MEDIA}  # of a camera: CLOCK_MONOTONIC
+                "pixel_format": arhost.PIXEL_FORMAT_RGB8, "clock": arhost.CLOCK_MEDIA}  # for a camera: CLOCK_MONOTONIC
 
     def read(self, buffer):
         n = buffer.sequence
         if self.frames and n >= self.frames:
             return None  # no more frames
-        while self.paced and time.monotonic() < self.began + n / self.fps:
+        while self.paced and time.monotonic() < self.start_time + n / self.fps:
             if self.host.cancelled():
-                raise arhost.Failure("", arhost.ERROR_CANCELLED)  # whatever waits asks this
+                raise arhost.Failure("", arhost.STATUS_ERROR_CANCELLED)  # poll this in every wait
             time.sleep(0.002)
-        # FILL IN: your pixels. The grey plane that trackers see is made of them by arhost.
-        buffer.planes[0][...] = (self.picture + [4 * n, 0, 0]).astype(np.uint8)
-        return int(1e9 * n / self.fps)  # the capture time in ns, of the clock named in start
+        # FILL IN: your pixels. arhost computes the grey plane for trackers from them.
+        buffer.planes[0][...] = (self.image + [4 * n, 0, 0]).astype(np.uint8)
+        return int(1e9 * n / self.fps)  # capture time, ns of the clock returned by start

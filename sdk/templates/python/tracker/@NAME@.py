@@ -1,18 +1,18 @@
-"""@NAME@: a tracker for arhost. It takes the brightest patch of the image for a white square that faces the camera:
-its middle gives the direction, its area the distance."""
+"""@NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
+gives the direction, their area the distance."""
 import arhost
 import numpy as np
 
 
 class @CLASS@:
-    # The arguments after `host` are given in the YAML: options: {arguments: '{"threshold": 220}'}
+    # Arguments after `host` come from the YAML: options: {arguments: '{"threshold": 220}'}
     def __init__(self, host, threshold=200):
-        self.host = host  # host.info("…") logs, host.cancelled() tells when to give up
+        self.host = host  # host.info("…") logs; poll host.cancelled() in long loops
         self.threshold = threshold
 
     def start(self, setup):
         self.lens = setup.intrinsics
-        self.wanted = setup.markers[0]  # the first that the configuration lists: the only one that is looked for
+        self.target = setup.markers[0]  # the first configured marker; this tracker ignores the others
 
     def detect(self, grey):
         """FILL IN: your detector."""
@@ -22,19 +22,19 @@ class @CLASS@:
     def track(self, frame, markers):
         patch = self.detect(frame.grey)
         if patch is None:
-            return 0  # nothing found is no error: the video goes on without an overlay
+            return 0  # no marker in this frame: not an error
         x, y, area = patch
         half = np.sqrt(area) / 2
-        distance = self.lens.fx * self.wanted.side_mm / (2 * half)
+        distance = self.lens.fx * self.target.side_mm / (2 * half)
 
         marker = markers[0]
-        marker["id"] = self.wanted.id
+        marker["id"] = self.target.id
         marker["family"] = b"bright"
-        marker["state"] = arhost.DETECTED
-        # Top left, top right, bottom right, bottom left of the upright print.
+        marker["state"] = arhost.MARKER_DETECTED
+        # Top left, top right, bottom right, bottom left on the upright print.
         marker["corners_px"] = np.array([x, y]) + half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        # Marker to camera, column-major, x right, y up, looking along -z, in mm. Not turned: it faces the camera.
+        # Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
         mt = np.eye(4)
         mt[:3, 3] = distance * (x - self.lens.cx) / self.lens.fx, -distance * (y - self.lens.cy) / self.lens.fy, -distance
         marker["mt"] = mt.T.reshape(16)
-        return 1  # markers[0] is filled in
+        return 1  # number of markers filled in

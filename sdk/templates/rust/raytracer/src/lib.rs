@@ -1,4 +1,5 @@
-//! @NAME@: a ray tracer for arhost. Here is the plugin, from cameras to images; what is seen along a ray is in tracer.rs.
+//! @NAME@: a ray tracer for arhost. This file is the plugin: it turns cameras into rays and samples into images.
+//! tracer.rs traces the rays.
 
 mod tracer;
 mod vec3;
@@ -7,18 +8,22 @@ use arhost_sys::*;
 use tracer::{Ray, Tracer};
 use vec3::*;
 
-fn byte(share: f64) -> u8 {
-    (255.0 * share.clamp(0.0, 1.0)).round() as u8
+fn to_byte(value: f64) -> u8 {
+    (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }
 fn srgb(linear: f64) -> f64 {
-    if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.0031308 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
 }
 
-/// Pixel centres are at integers, rows run downwards, the camera looks along -back.
+/// Pixel centres are at integer coordinates, rows go downwards, the camera looks along -back.
 struct View<'a> {
     lens: &'a arhost_intrinsics,
     eye: Vec3,
-    right: Vec3, // these three of length 1
+    right: Vec3, // axes: unit length
     up: Vec3,
     back: Vec3,
 }
@@ -28,9 +33,12 @@ impl View<'_> {
         let (eye, up) = (vec3(&camera.eye), vec3(&camera.up));
         let back = eye - vec3(&camera.look_at);
         let right = cross(up, back);
-        // Nor is it longer where a number is not finite.
+        // False for NaN too.
         if !(length(right) > 1e-9 * length(up) * length(back)) {
-            return Err(Failure::new(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's up is parallel to its view"));
+            return Err(Failure::new(
+                ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                "the camera's up vector is parallel to its viewing direction",
+            ));
         }
         let (right, back) = (normalised(right), normalised(back));
         Ok(View { lens: &camera.intrinsics, eye, right, up: cross(back, right), back })
@@ -44,24 +52,28 @@ impl View<'_> {
     }
 }
 
-/// The mean over a grid of rays, `side` to a side. Alpha is straight: the colour is that of what was seen, not
-/// multiplied by how much of the pixel it covers.
+/// Averages a grid of `side` × `side` rays. Alpha is straight: the colour is not multiplied by the pixel's coverage.
 fn pixel(tracer: &Tracer, view: &View, side: u32, column: f64, row: f64) -> [u8; 4] {
-    let mut sum = Vec3([0.0; 3]); // of colours times alphas
-    let mut alphas = 0.0;
-    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(side) - 0.5;
+    let mut sum = Vec3([0.0; 3]); // of colour · alpha
+    let mut alpha_sum = 0.0;
+    let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(side) - 0.5;
     for i in 0..side * side {
-        let seen = tracer.look(&view.ray(column + place(i % side), row + place(i / side)));
-        sum = sum + seen.alpha * seen.colour;
-        alphas += seen.alpha;
+        let sample = tracer.trace(&view.ray(column + offset(i % side), row + offset(i / side)));
+        sum = sum + sample.alpha * sample.colour;
+        alpha_sum += sample.alpha;
     }
-    let colour = if alphas > 0.0 { 1.0 / alphas * sum } else { sum };
-    [byte(srgb(colour[0])), byte(srgb(colour[1])), byte(srgb(colour[2])), byte(alphas / f64::from(side * side))]
+    let colour = if alpha_sum > 0.0 { 1.0 / alpha_sum * sum } else { sum };
+    [
+        to_byte(srgb(colour[0])),
+        to_byte(srgb(colour[1])),
+        to_byte(srgb(colour[2])),
+        to_byte(alpha_sum / f64::from(side * side)),
+    ]
 }
 
 struct @CLASS@ {
     host: Host,
-    side: u32, // of the grid of rays through a pixel
+    side: u32, // rays per pixel: side × side
     tracer: Option<Tracer>,
 }
 
@@ -71,7 +83,7 @@ impl Plugin for @CLASS@ {
         Ok(@CLASS@ { host, side, tracer: None })
     }
     fn stop(&mut self) -> Result<(), Failure> {
-        self.tracer = None; // the scene is no longer there
+        self.tracer = None; // the scene becomes invalid
         Ok(())
     }
 }
@@ -86,16 +98,16 @@ impl Raytracer for @CLASS@ {
         &mut self,
         request: &arhost_render_request,
         image: &mut Image,
-        _info: &mut arhost_render_info, // it could tell a region outside of which every alpha is 0
+        _info: &mut arhost_render_info, // optional: set a region outside of which every alpha is 0
     ) -> Result<(), Failure> {
         let view = View::new(&request.camera)?;
         let tracer = self.tracer.as_mut().expect("started");
-        if let Some(now) = request.motion() {
-            tracer.move_to(now);
+        if let Some(motion) = request.motion() {
+            tracer.update(motion);
         }
         for row in 0..image.height() {
             if self.host.cancelled() {
-                return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // rows must not keep arhost waiting
+                return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // arhost wants this call to return soon
             }
             for (column, rgba) in image.row_mut(row).iter_mut().enumerate() {
                 *rgba = pixel(tracer, &view, self.side, column as f64, f64::from(row));
@@ -106,10 +118,10 @@ impl Raytracer for @CLASS@ {
 }
 
 plugin! {
-    raytracer @CLASS@, "@NAME@", "Traces rays by brute force.",
-    capabilities: 0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION, once rays go through the lens
-    // arhost checks the configuration against these before `new` sees a value.
+    raytracer @CLASS@, "@NAME@", "Brute-force ray tracer.",
+    capabilities: 0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION if you implement lens distortion
+    // arhost validates the configuration against these before it calls `new`.
     options: [
-        option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel: the largest square number up to it.", 1.0, 64.0),
+        option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, rounded down to a square number.", 1.0, 64.0),
     ]
 }

@@ -23,7 +23,7 @@ impl Mul<Vec3> for f64 {
         Vec3([self * a[0], self * a[1], self * a[2]])
     }
 }
-/// Of colours.
+/// Per channel, for colours.
 impl Mul for Vec3 {
     type Output = Vec3;
     fn mul(self, b: Vec3) -> Vec3 {
@@ -37,7 +37,7 @@ impl Index<usize> for Vec3 {
     }
 }
 
-/// Of the first three numbers.
+/// From the first three numbers of a slice.
 pub fn vec3<Number: Copy + Into<f64>>(numbers: &[Number]) -> Vec3 {
     Vec3([numbers[0].into(), numbers[1].into(), numbers[2].into()])
 }

@@ -1,4 +1,4 @@
-//! @NAME@: a sink for arhost. It writes each frame as a picture, <path>000000.ppm and so on.
+//! @NAME@: a sink for arhost. Writes each frame as an image: <path>000000.ppm, …
 
 use arhost_sys::*;
 use std::fs;
@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 
 struct @CLASS@ {
     path: String, // absolute
-    part: PathBuf,
+    temporary: PathBuf,
 }
 
 impl Plugin for @CLASS@ {
     fn new(_host: Host, options: &Options) -> Result<Self, Failure> {
         let path = options.text("path");
-        let part = PathBuf::from(format!("{}.part", path));
-        Ok(@CLASS@ { path, part })
+        let temporary = PathBuf::from(format!("{}.part", path));
+        Ok(@CLASS@ { path, temporary })
     }
 }
 
-fn write_picture(file: &Path, output: &Output) -> std::io::Result<()> {
+fn write_image(file: &Path, output: &Output) -> std::io::Result<()> {
     let mut file = BufWriter::new(fs::File::create(file)?);
     write!(file, "P6\n{} {}\n255\n", output.width, output.height)?;
     for row in 0..output.height {
@@ -30,31 +30,33 @@ fn write_picture(file: &Path, output: &Output) -> std::io::Result<()> {
 }
 
 impl Sink for @CLASS@ {
-    /// Where nothing can be written this tells so now. It leaves what is there as it is until the first frame:
-    /// another component may yet refuse the run.
+    /// Reports an unwritable path now, but leaves existing files unchanged until the first frame: another component may
+    /// still reject the run.
     fn start(&mut self, _setup: &arhost_sink_setup) -> Result<(), Failure> {
-        if let Some(folder) = self.part.parent() {
+        if let Some(folder) = self.temporary.parent() {
             fs::create_dir_all(folder)?;
         }
-        fs::File::create(&self.part)?;
-        Ok(fs::remove_file(&self.part)?)
+        fs::File::create(&self.temporary)?;
+        Ok(fs::remove_file(&self.temporary)?)
     }
 
-    /// FILL IN: what becomes of a frame. output.record() tells its pose, its time and how its overlay arose.
+    /// FILL IN: your output. output.record() has the frame's pose, time and more.
     fn write(&mut self, output: &Output) -> Result<bool, Failure> {
         let name = PathBuf::from(format!("{}{:06}.ppm", self.path, output.record().sequence));
-        write_picture(&self.part, output)
-            .and_then(|()| fs::rename(&self.part, &name)) // under its own name only when it is whole
-            .map_err(|error| Failure::new(ARHOST_STATUS_ERROR_IO, format!("can't write {}: {}", name.display(), error)))?;
-        Ok(true) // the frame must now survive the death of this process
+        write_image(&self.temporary, output)
+            .and_then(|()| fs::rename(&self.temporary, &name)) // atomic: only complete files get the final name
+            .map_err(|error| {
+                Failure::new(ARHOST_STATUS_ERROR_IO, format!("cannot write {}: {}", name.display(), error))
+            })?;
+        Ok(true) // from here on the frame must survive a kill of the process
     }
 }
 
 plugin! {
-    sink @CLASS@, "@NAME@", "Writes each frame as a picture (PPM).",
+    sink @CLASS@, "@NAME@", "Writes each frame as an image (PPM).",
     capabilities: 0,
-    // arhost checks the configuration against these before `new` sees a value.
+    // arhost validates the configuration against these before it calls `new`.
     options: [
-        option!(ARHOST_OPTION_OUTPUT_PATH, "path", required, "What the pictures' names begin with; a number and .ppm follow."),
+        option!(ARHOST_OPTION_OUTPUT_PATH, "path", required, "Prefix of the file names; a number and .ppm are appended."),
     ]
 }

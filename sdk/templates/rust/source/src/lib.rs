@@ -1,4 +1,4 @@
-//! @NAME@: a source for arhost. It gives a gradient that moves.
+//! @NAME@: a source for arhost. Produces a moving gradient.
 
 use arhost_sys::*;
 use std::thread::sleep;
@@ -10,7 +10,7 @@ struct @CLASS@ {
     height: u32,
     frames: u64, // 0: endless
     fps: f64,
-    /// Mode live: the number of the first frame, and when it was given.
+    /// In mode live: the number and time of the first frame.
     pace: Option<(u64, Instant)>,
 }
 
@@ -29,7 +29,7 @@ impl Plugin for @CLASS@ {
 
 impl Source for @CLASS@ {
     fn start(&mut self, setup: &arhost_source_setup, properties: &mut arhost_source_properties) -> Result<(), Failure> {
-        // FILL IN: open the device or the file.
+        // FILL IN: open the device or file.
         self.fps = if setup.fps > 0.0 { setup.fps } else { 30.0 };
         if setup.paced != 0 {
             self.pace = Some((setup.first_sequence, Instant::now()));
@@ -47,19 +47,20 @@ impl Source for @CLASS@ {
         if self.frames > 0 && n >= self.frames {
             return Ok(false);
         }
-        info.clock = ARHOST_CLOCK_MEDIA; // of a camera: ARHOST_CLOCK_MONOTONIC, when the picture was taken
+        info.clock = ARHOST_CLOCK_MEDIA; // for a camera: ARHOST_CLOCK_MONOTONIC, at the time of exposure
         info.capture_ns = (1e9 * n as f64 / self.fps) as i64;
-        if let Some((first, began)) = self.pace {
-            let due = began + Duration::from_secs_f64(n.saturating_sub(first) as f64 / self.fps);
+        if let Some((first, start_time)) = self.pace {
+            let due = start_time + Duration::from_secs_f64(n.saturating_sub(first) as f64 / self.fps);
             while Instant::now() < due {
                 if self.host.cancelled() {
-                    return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // whatever waits asks this
+                    return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, ""));
+                    // poll this in every wait
                 }
                 sleep(Duration::from_millis(2));
             }
         }
 
-        // FILL IN: your pixels. The grey plane that trackers see is made of them by arhost.
+        // FILL IN: your pixels. arhost computes the grey plane for trackers from them.
         let (width, stride) = (self.width as usize, buffer.format().stride[0] as usize);
         for (row, line) in buffer.plane_mut(0).chunks_exact_mut(stride).enumerate() {
             for (column, rgb) in line.chunks_exact_mut(3).take(width).enumerate() {
@@ -73,12 +74,12 @@ impl Source for @CLASS@ {
 }
 
 plugin! {
-    source @CLASS@, "@NAME@", "A gradient that moves.",
-    capabilities: ARHOST_CAPABILITY_SEEK, // frame n is the same, whatever was read before
-    // arhost checks the configuration against these before `new` sees a value.
+    source @CLASS@, "@NAME@", "Moving gradient.",
+    capabilities: ARHOST_CAPABILITY_SEEK, // frame n is the same wherever reading starts
+    // arhost validates the configuration against these before it calls `new`.
     options: [
         option!(ARHOST_OPTION_INTEGER, "width", "640", "Image width in px.", 1.0, 4096.0),
         option!(ARHOST_OPTION_INTEGER, "height", "360", "Image height in px.", 1.0, 4096.0),
-        option!(ARHOST_OPTION_INTEGER, "frames", "60", "Ends after so many; 0: endless.", 0.0, 1e9),
+        option!(ARHOST_OPTION_INTEGER, "frames", "60", "Number of frames; 0: endless.", 0.0, 1e9),
     ]
 }

@@ -1,15 +1,15 @@
-//! @NAME@: a tracker for arhost. It takes the brightest patch of the image for a white square that faces the camera:
-//! its middle gives the direction, its area the distance.
+//! @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
+//! gives the direction, their area the distance.
 
 use arhost_sys::*;
 
 struct @CLASS@ {
     threshold: u8,
-    /// Of the camera, and of the one marker that is looked for: the first that the configuration lists.
+    /// The camera, and the first configured marker; this tracker ignores the others.
     setup: Option<(arhost_intrinsics, arhost_marker_config)>,
 }
 
-/// A patch of the image, in px.
+/// Centroid and area, in px.
 struct Patch {
     x: f64,
     y: f64,
@@ -50,30 +50,30 @@ impl Tracker for @CLASS@ {
     }
 
     fn track(&mut self, frame: &Frame, result: &mut arhost_tracker_result) -> Result<(), Failure> {
-        let (lens, wanted) = self.setup.expect("start comes first");
+        let (lens, target) = self.setup.expect("started");
         let patch = match self.detect(frame) {
             Some(patch) => patch,
-            None => return Ok(()), // nothing found is no error: the video goes on without an overlay
+            None => return Ok(()), // no marker in this frame: not an error
         };
         let half = patch.area.sqrt() / 2.0;
-        let distance = lens.fx * wanted.side_mm / (2.0 * half);
+        let distance = lens.fx * target.side_mm / (2.0 * half);
 
         result.marker_count = 1;
         let marker = &mut result.markers[0];
         marker.struct_size = std::mem::size_of::<arhost_marker>() as u32;
-        marker.id = wanted.id;
+        marker.id = target.id;
         for (to, from) in marker.family.iter_mut().zip(b"bright") {
             *to = *from as _;
         }
         marker.state = ARHOST_MARKER_DETECTED;
-        // Top left, top right, bottom right, bottom left of the upright print.
+        // Top left, top right, bottom right, bottom left on the upright print.
         marker.corners_px = [
             [patch.x - half, patch.y - half],
             [patch.x + half, patch.y - half],
             [patch.x + half, patch.y + half],
             [patch.x - half, patch.y + half],
         ];
-        // Marker to camera, column-major, x right, y up, looking along -z, in mm. Not turned: it faces the camera.
+        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
         for i in [0, 5, 10, 15] {
             marker.mt[i] = 1.0;
         }
@@ -85,10 +85,10 @@ impl Tracker for @CLASS@ {
 }
 
 plugin! {
-    tracker @CLASS@, "@NAME@", "Takes the brightest patch for the marker.",
+    tracker @CLASS@, "@NAME@", "Tracks a bright patch as the marker.",
     capabilities: 0,
-    // arhost checks the configuration against these before `new` sees a value.
+    // arhost validates the configuration against these before it calls `new`.
     options: [
-        option!(ARHOST_OPTION_INTEGER, "threshold", "200", "Grey level from which on a pixel counts as bright.", 1.0, 255.0),
+        option!(ARHOST_OPTION_INTEGER, "threshold", "200", "Minimum grey level of a bright pixel.", 1.0, 255.0),
     ]
 }
