@@ -119,7 +119,7 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
         // share of a hundredth ("tree").
         material.importance_cutoff = name == "glass-tree" ? 0.01f : 0;
         builder.settings.max_depth = glass_depth;
-        made.settings.one_path = name == "glass-path";
+        made.settings.single_path = name == "glass-path";
     } else if (name != "diffuse") {
         throw std::runtime_error("unknown case: " + name);
     }

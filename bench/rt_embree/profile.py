@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CASES = ["primary", "diffuse", "mirror", "glass"]
 # The first that matches counts. Most of the kernel is inlined into these functions of its own.
 PARTS = [("inside Embree", r"libembree"), ("what was hit, textures", r"surface_at"),
-         ("lamps and shadow rays", r"direct_light|caught_shadow"), ("materials", r"shade"),
+         ("lamps and shadow rays", r"direct_light|catcher_shadow"), ("materials", r"shade"),
          ("rays, queues, pixels", r"render_tile"), ("threads, clearing, start", r"")]
 
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // From which decay on a tree that is only refitted costs rays more than building it anew does: for meshes that are
-// bent further and further, TreeQuality's measure beside the time of the rays through the refitted and through a
+// bent further and further, BvhQuality's measure beside the time of the rays through the refitted and through a
 // new tree. `rt-embree-refit`
 #include "bunny.hpp"
 #include "embree_scene.hpp"
@@ -94,8 +94,8 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
                                    reinterpret_cast<const std::byte *>(mesh.triangles.data()), sizeof(glm::vec3),
                                    sizeof mesh.triangles[0], static_cast<std::uint32_t>(mesh.triangles.size())};
     Tree refitted(device.get(), positions, mesh), rebuilt(device.get(), positions, mesh);
-    rt_embree::TreeQuality quality;
-    quality.built(view);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view);
     std::printf("%s, %zu triangles\n%8s %8s %10s %10s %10s %12s %12s %16s\n", name, mesh.triangles.size(), "amount",
                 "decay", "told in ms", "refit ms", "build ms", "rays: refit", "rays: new", "building pays in");
     for (const float amount : amounts) {
@@ -110,7 +110,7 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
         const double old_rays = median_of(5, [&] { refitted.trace(); }),
                      new_rays = median_of(5, [&] { rebuilt.trace(); });
         double decay = 0;
-        const double telling = ms_of([&] { decay = quality.decay(view); });
+        const double telling = ms_of([&] { decay = quality.degradation(view); });
         std::printf("%8.2f %8.2f %10.2f %10.2f %10.2f %12.2f %12.2f ", static_cast<double>(amount), decay, telling,
                     refit, build, old_rays, new_rays);
         if (old_rays > new_rays)

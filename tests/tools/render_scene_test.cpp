@@ -53,7 +53,7 @@ private:
 
 } // namespace
 
-TEST_F(RenderScene, ShowsWhatMovesWhereItIsAtThatTime) {
+TEST_F(RenderScene, ShowsMovingObjectsAtTheGivenTime) {
     const std::string early = picture("moving", "--time 1"), late = picture("moving", "--time 2.5");
     ASSERT_FALSE(early.empty()) << said();
     EXPECT_NE(early, late);
@@ -61,7 +61,7 @@ TEST_F(RenderScene, ShowsWhatMovesWhereItIsAtThatTime) {
     EXPECT_EQ(picture("moving", ""), picture("moving", "--time 0"));
 }
 
-TEST_F(RenderScene, ReplacesNothingThatTheSceneReads) {
+TEST_F(RenderScene, RefusesToOverwriteSceneInputs) {
     const fs::path scene = folder() / "wood.png";
     std::ofstream(scene) << "version: 1\n";
     const std::string named = " " + scene.string() + " --output " + (folder() / "link.png").string();
@@ -71,7 +71,7 @@ TEST_F(RenderScene, ReplacesNothingThatTheSceneReads) {
     EXPECT_EQ(fs::file_size(scene), 11u);
 }
 
-TEST_F(RenderScene, TellsOfWrongUsageInOneLineThatCantSteerATerminal) {
+TEST_F(RenderScene, ReportsUsageErrorsInOneLineWithoutTerminalControls) {
     EXPECT_EQ(status_of(" a.yaml --output a.png '--no\x1b[2Jsuch'"), 2);
     EXPECT_THAT(said(), AllOf(HasSubstr("--no [2Jsuch"), Not(HasSubstr("\x1b"))));
     EXPECT_EQ(status_of(" 'no\x1b[2Jsuch.yaml' --output " + (folder() / "a.png").string()), 1);
@@ -79,25 +79,25 @@ TEST_F(RenderScene, TellsOfWrongUsageInOneLineThatCantSteerATerminal) {
     EXPECT_FALSE(fs::exists(folder() / "a.png"));
 }
 
-TEST_F(RenderScene, ShowsHowPointsAndSizesAreWritten) {
+TEST_F(RenderScene, HelpShowsTheSyntaxOfPointsAndSizes) {
     EXPECT_EQ(status_of(" --help"), 0);
     EXPECT_THAT(said(), AllOf(HasSubstr("--eye X,Y,Z"), HasSubstr("--size WIDTHxHEIGHT")));
 }
 
-TEST_F(RenderScene, PassesOverTheTimeWhereNothingMoves) {
+TEST_F(RenderScene, IgnoresTheTimeOfAStaticScene) {
     const std::string still = picture("demo", "");
     ASSERT_FALSE(still.empty()) << said();
     EXPECT_EQ(picture("demo", "--time 2.5"), still);
 }
 
-TEST_F(RenderScene, SoftensShadowsWithTheirSamples) {
+TEST_F(RenderScene, PassesLightSamplesToThePlugin) {
     const std::string few = picture("moving", "--light-samples 1");
     ASSERT_FALSE(few.empty()) << said();
     EXPECT_NE(picture("moving", "--light-samples 4"), few);
     EXPECT_EQ(picture("moving", "--light-samples 4"), picture("moving", "")) << "as the plugin's default";
 }
 
-TEST_F(RenderScene, RefusesWhatIsNoTimeAndNoNumberOfSamples) {
+TEST_F(RenderScene, RejectsInvalidTimesAndSampleCounts) {
     for (const char *option : {"--time -1", "--time soon", "--light-samples 0", "--samples 257"}) {
         EXPECT_EQ(picture("moving", option), "") << option;
         EXPECT_TRUE(failed()) << option;
@@ -106,7 +106,7 @@ TEST_F(RenderScene, RefusesWhatIsNoTimeAndNoNumberOfSamples) {
     }
 }
 
-TEST_F(RenderScene, AsksAnyRayTracerByItsNameOrItsFile) {
+TEST_F(RenderScene, RunsAnyRayTracerByNameOrFile) {
     const std::string embree = picture("demo", "");
     ASSERT_FALSE(embree.empty()) << said();
     EXPECT_EQ(picture("demo", "--raytracer rt_embree"), embree) << said();
@@ -124,7 +124,7 @@ TEST_F(RenderScene, AsksAnyRayTracerByItsNameOrItsFile) {
     ::unsetenv("ARHOST_PLUGIN_PATH");
 }
 
-TEST_F(RenderScene, GivesThePluginItsOptions) {
+TEST_F(RenderScene, PassesOptionsToThePlugin) {
     const std::string one = picture("demo", ""), four = picture("demo", "", "--samples 4");
     ASSERT_FALSE(one.empty()) << said();
     EXPECT_NE(four, one);
@@ -135,7 +135,7 @@ TEST_F(RenderScene, GivesThePluginItsOptions) {
     EXPECT_EQ(picture("demo", "--set threads=1 --set instruction_set=base"), one);
 }
 
-TEST_F(RenderScene, SaysWhatIsWrongWithThePluginAndItsOptions) {
+TEST_F(RenderScene, ReportsErrorsOfThePluginAndItsOptions) {
     const auto refused = [&](const std::string &options, const std::string &samples = "") {
         EXPECT_EQ(picture("demo", options, samples), "") << options;
         EXPECT_TRUE(failed()) << options;

@@ -84,7 +84,7 @@ struct Scene {
 
 } // namespace
 
-TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
+TEST(Composite, MatchesTheReferenceForEveryFormatWidthStrideAndRegion) {
     test::on_each_instruction_set([] {
         std::mt19937 random(4);
         for (const arhost_pixel_format pixel_format : all_formats)
@@ -103,7 +103,7 @@ TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
     });
 }
 
-TEST(Composite, IsEquation36) {
+TEST(Composite, ImplementsEquation36) {
     const arhost_frame_format format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4, 1);
     Bytes frame(format.byte_size);
     const std::uint8_t bgr[] = {10, 20, 30, 10, 20, 30, 10, 20, 30, 200, 100, 50};
@@ -118,7 +118,7 @@ TEST(Composite, IsEquation36) {
                           160, 95, 55}));
 }
 
-TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
+TEST(Composite, CopiesTheFrameWithoutOverlayOrRegion) {
     std::mt19937 random(5);
     const Scene scene(layout(ARHOST_PIXEL_FORMAT_BGR8, 67, 5), 1, random);
     const Bytes none = scene.output(composite, ImageView{}, Region{0, 0, 67, 5});
@@ -132,7 +132,7 @@ TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
     EXPECT_EQ(scene.output(composite, scene.overlay(), Region{0, 5, 1, 1}), none);
 }
 
-TEST(Composite, ClipsARegionThatReachesOutOfTheImage) {
+TEST(Composite, ClipsTheRegionToTheImage) {
     std::mt19937 random(6);
     const Scene scene(layout(ARHOST_PIXEL_FORMAT_NV12, 66, 6), 3, random);
     const std::uint32_t most = 0xffffffffu;
@@ -164,7 +164,7 @@ TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
     munmap(rgba, page * height);
 }
 
-TEST(Composite, ConvertsBt601AsOpenCvDoes) {
+TEST(Composite, ConvertsBt601LikeOpenCv) {
     std::mt19937 random(7);
     const int codes[] = {cv::COLOR_YUV2BGR_YUY2, cv::COLOR_YUV2BGR_NV12, cv::COLOR_YUV2BGR_I420};
     const arhost_pixel_format formats[] = {ARHOST_PIXEL_FORMAT_YUYV, ARHOST_PIXEL_FORMAT_NV12,
@@ -193,7 +193,7 @@ TEST(Composite, ConvertsBt601AsOpenCvDoes) {
     }
 }
 
-TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerTellsOne) {
+TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerReportsOne) {
     arhost_render_info info{};
     info.struct_size = sizeof info;
     const Region whole = region_of(info, 640, 480);

@@ -29,7 +29,7 @@ class EveryYuv : public testing::TestWithParam<std::tuple<double, double, bool>>
 
 } // namespace
 
-TEST(Blended, IsEquation36RoundedToNearestForEveryTriple) {
+TEST(Blended, MatchesEquation36RoundedToNearestForAllInputs) {
     std::size_t wrong = 0;
     for (int a = 0; a < 256; ++a)
         for (int b = 0; b < 256; ++b)

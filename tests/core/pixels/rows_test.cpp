@@ -130,7 +130,7 @@ std::vector<Kernel> kernels() {
 } // namespace
 
 // Inputs and output lie exactly between pages that end the process when touched.
-TEST(Rows, OfEveryLengthGiveTheFormulasBytesAndTouchNoOthers) {
+TEST(Rows, MatchTheFormulasForEveryLengthAndAccessNoOtherBytes) {
     test::on_each_instruction_set([] {
         std::mt19937 random(1);
         for (const Kernel &kernel : kernels())
@@ -153,7 +153,7 @@ TEST(Rows, OfEveryLengthGiveTheFormulasBytesAndTouchNoOthers) {
     });
 }
 
-TEST(Rows, BlendEveryTripleOfColoursAndAlpha) {
+TEST(Rows, BlendEveryCombinationOfColoursAndAlpha) {
     test::on_each_instruction_set([] {
         Bytes a(3 * 256), b(4 * 256), out(3 * 256), expected(3 * 256);
         for (std::size_t i = 0; i < 256; ++i)
@@ -197,7 +197,7 @@ TEST(Rows, BlendEmptyAndOpaqueRunsAndTheirEdges) {
 
 class EveryYuvRow : public testing::TestWithParam<std::tuple<double, double, bool>> {}; // kr, kb, limited
 
-TEST_P(EveryYuvRow, GivesTheFormulasBytes) {
+TEST_P(EveryYuvRow, MatchesTheFormula) {
     const YuvMatrix m = std::apply([](auto... of) { return yuv_matrix(of...); }, GetParam());
     Bytes y(256), u(128), v(128), out(3 * 256), expected(3 * 256);
     std::iota(y.begin(), y.end(), std::uint8_t(0));

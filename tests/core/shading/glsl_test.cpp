@@ -111,7 +111,7 @@ private:
 
 } // namespace
 
-TEST(LeafFiles, AllOfTheirFunctionsAreFound) {
+TEST(LeafFiles, AllFunctionsAreParsed) {
     for (const auto &[name, code] : leaf_files()) {
         EXPECT_FALSE(functions_of(code).empty()) << name;
         EXPECT_EQ(functions_of(code).size(), count_of(code, "ARHOST_LEAF")) << name;
@@ -128,21 +128,21 @@ TEST(LeafFiles, HaveNoBranches) {
     }
 }
 
-TEST(LeafFiles, AreAllIncludedByEveryContract) {
+TEST(LeafFiles, AreAllIncludedByEveryImplementation) {
     for (const auto &path : {shading / "scalar.hpp", shading / "glsl.h",
                              std::filesystem::path(ARHOST_SOURCE_DIRECTORY "/plugins/rt_embree/kernel/packet.hpp")})
         for (const auto &[name, code] : leaf_files())
             EXPECT_NE(contents(path).find("leaf/" + name), std::string::npos) << path << " lacks " << name;
 }
 
-TEST_F(Compiler, TakesAShaderThatCallsEveryLeafFunction) {
+TEST_F(Compiler, AcceptsAShaderThatCallsEveryLeafFunction) {
     std::vector<Function> functions;
     for (const auto &[name, code] : leaf_files())
         std::ranges::copy(functions_of(code), std::back_inserter(functions));
     EXPECT_EQ(complaint(shader_that_calls(functions)), "");
 }
 
-TEST_F(Compiler, RefusesAFunctionThatIsNotThere) {
+TEST_F(Compiler, RejectsAMissingFunction) {
     EXPECT_NE(complaint(shader_that_calls({{"Float", "no_such_function", {"Float"}}})).find("no_such_function"),
               std::string::npos);
 }

@@ -75,7 +75,7 @@ bool is_probe(const cv::Mat &image, int x, int y) {
 
 } // namespace
 
-TEST_P(Golden, PictureIsAsItWas) {
+TEST_P(Golden, MatchesTheReferencePicture) {
     const std::filesystem::path file = folder / (std::string(GetParam().name) + ".png");
     const cv::Mat got = render(GetParam());
     if (std::getenv("ARHOST_UPDATE_GOLDEN"))

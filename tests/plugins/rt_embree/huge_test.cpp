@@ -24,7 +24,7 @@ double available_gib() {
 
 } // namespace
 
-TEST(Huge, TenMillionTrianglesAreTraced) {
+TEST(Huge, TracesTenMillionTriangles) {
     if (available_gib() < 6)
         GTEST_SKIP() << "needs 6 GiB of memory";
     constexpr unsigned n = 2237; // squares a side
@@ -56,7 +56,7 @@ TEST(Huge, TenMillionTrianglesAreTraced) {
     EXPECT_EQ(picture.alpha(5, 5), 0);
 }
 
-TEST(Huge, ATextureOf16384By16384IsSampledAtItsFarEnd) {
+TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     if (available_gib() < 4)
         GTEST_SKIP() << "needs 4 GiB of memory";
     constexpr std::uint32_t side = 16384;

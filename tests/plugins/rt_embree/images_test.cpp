@@ -41,7 +41,7 @@ bool is_nearly(const Pixel &pixel, const Pixel &colour) {
 
 } // namespace
 
-TEST(Texture, LiesUprightAndIsLinearised) {
+TEST(Texture, IsUprightAndLinearised) {
     const Picture picture = of_four_texels(ARHOST_WRAP_REPEAT, 1);
     EXPECT_TRUE(is_nearly(picture.at(70, 44), Pixel{255, 0, 0, 255}));
     EXPECT_TRUE(is_nearly(picture.at(130, 44), Pixel{0, 255, 0, 255}));
@@ -51,7 +51,7 @@ TEST(Texture, LiesUprightAndIsLinearised) {
                 shading::srgb8_exact(188 / 255.0), 3);
 }
 
-TEST(Texture, IsMixedBetweenTexelsInLinearLight) {
+TEST(Texture, IsInterpolatedInLinearLight) {
     // Half way from red to green.
     const Pixel mixed = of_four_texels(ARHOST_WRAP_CLAMP, 1).at(99, 30);
     EXPECT_NEAR(mixed[0], shading::srgb8_exact(0.5), 2);
@@ -65,7 +65,7 @@ TEST(Texture, RepeatsClampsAndMirrors) {
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_MIRROR, 3).at(89, 24), Pixel{0, 255, 0, 255}));
 }
 
-TEST(Texture, TimesTheEmissionGlowsInTheDark) {
+TEST(Texture, MultipliesTheEmission) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     arhost_material material = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
@@ -82,7 +82,7 @@ TEST(Texture, TimesTheEmissionGlowsInTheDark) {
 
 // ---- Holes -----------------------------------------------------------------------------------------
 
-TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
+TEST(AlphaCutoff, CutOutTexelsWithAlphaBelowTheCutoff) {
     for (const bool instanced : {false, true}) {
         ArenaBuilder builder;
         builder.settings.ambient = glm::vec3(1);
@@ -105,7 +105,7 @@ TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
     }
 }
 
-TEST(Holes, LetLightThrough) {
+TEST(AlphaCutoff, LetLightThrough) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     builder.add_light(light(0, 0, 1000, 1));
@@ -118,7 +118,7 @@ TEST(Holes, LetLightThrough) {
     EXPECT_EQ(picture.alpha(140, 60), 0) << "light through the hole";
 }
 
-TEST(Holes, OfACatcherTakeNoShadow) {
+TEST(AlphaCutoff, OfACatcherReceiveNoShadow) {
     ArenaBuilder builder;
     builder.add_light(light(0, 0, 1000, 1));
     builder.add_object("roof", builder.add_triangles(square(20, 300)), builder.add_material(flat(1, 1, 1)));
@@ -131,7 +131,7 @@ TEST(Holes, OfACatcherTakeNoShadow) {
 
 // ---- Everything at once ----------------------------------------------------------------------------
 
-TEST(RichScene, IsTheSameOnAnyNumberOfThreadsAndAgain) {
+TEST(RichScene, IsIdenticalForAnyThreadCountAndRepeatedly) {
     for (const char *way : {"tree", "path"}) {
         Tracer one(rich_scene(), {{"threads", "1"}, {"samples", "2"}, {"glass", way}}),
             three(rich_scene(), {{"threads", "3"}, {"samples", "2"}, {"glass", way}});
@@ -141,7 +141,7 @@ TEST(RichScene, IsTheSameOnAnyNumberOfThreadsAndAgain) {
     }
 }
 
-TEST(RichScene, IsTheSameWithEveryInstructionSet) {
+TEST(RichScene, IsIdenticalForEveryInstructionSet) {
 #if defined(__x86_64__)
     const auto base = Tracer(rich_scene(), {{"instruction_set", "base"}}).render(from_the_side()).pixels();
     if (__builtin_cpu_supports("avx2")) {
@@ -197,7 +197,7 @@ Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
     return Tracer(std::move(builder)).render(from_above());
 }
 
-TEST(NormalTexture, BendsNormalsAsIfTheVerticesHadThem) {
+TEST(NormalTexture, MatchesEquivalentVertexNormals) {
     for (const Tilt &tilt :
          {Tilt{{0, 0, 1}, {0, 0, 1}}, Tilt{{0.6f, 0, 0.8f}, {0.6f, 0, 0.8f}}, Tilt{{0, 0.5f, 0.8f}, {0, 0.5f, 0.8f}},
           Tilt{{-0.3f, -0.5f, 0.8f}, {-0.3f, -0.5f, 0.8f}}, Tilt{{0.6f, 0.3f, 0.8f}, {-0.6f, 0.3f, 0.8f}, true}}) {
@@ -208,7 +208,7 @@ TEST(NormalTexture, BendsNormalsAsIfTheVerticesHadThem) {
     }
 }
 
-TEST(NormalTexture, TurnsWithItsObject) {
+TEST(NormalTexture, RotatesWithItsObject) {
     // Turned a quarter, the texture's right is the world's +y, its up −x; bent in the world, the tilt is not
     // flattened with the object as a vertex normal would be.
     const Tilt tilt{{0, -0.6f, 0.8f}, {}};
@@ -230,7 +230,7 @@ TEST(Environment, LightsADiffusePlaneByItsMean) {
     EXPECT_NEAR(sum / (200 * 150), 0.5 * 0.6, 0.003);
 }
 
-TEST(Environment, LightsByAFewBrightTexelsAsMuchAsTheyGive) {
+TEST(Environment, LightsByItsIrradianceWithFewBrightTexels) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
@@ -243,7 +243,7 @@ TEST(Environment, LightsByAFewBrightTexelsAsMuchAsTheyGive) {
     EXPECT_NEAR(sum / static_cast<double>(picture.pixels().size()), 0.25, 0.004);
 }
 
-TEST(Environment, IsSeenInMirrorsWhereItStands) {
+TEST(Environment, IsReflectedInTheRightDirection) {
     ArenaBuilder builder;
     // Blue towards +x, red towards −x.
     add_environment(builder, [](std::uint32_t x) { return x < 4 ? glm::vec3(1, 0, 0) : glm::vec3(0, 0, 1); });

@@ -67,7 +67,7 @@ void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &ra
 
 } // namespace
 
-TEST_P(LeafPackets, GiveTheScalarsResults) {
+TEST_P(LeafPackets, MatchTheScalarFunctions) {
     if (!GetParam().is_there)
         GTEST_SKIP() << "this processor has no " << GetParam().name;
     // turn_of is exact to 2e-6 turns, which a fisheye's ninth power multiplies; all else is closer.
@@ -93,7 +93,7 @@ TEST_P(LeafPackets, GiveTheScalarsResults) {
         }
 }
 
-TEST(LeafCalls, LeaveNoLeafFunctionOut) {
+TEST(LeafCalls, ListEveryLeafFunction) {
     std::size_t declared = 0;
     for (const auto &entry :
          std::filesystem::directory_iterator(ARHOST_SOURCE_DIRECTORY "/core/shading/include/arhost/shading/leaf")) {

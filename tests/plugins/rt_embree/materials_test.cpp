@@ -61,7 +61,7 @@ std::optional<double> cosine_on_ball(int x, int y) {
 
 } // namespace
 
-TEST(Metal, ReflectsBySchlicksTerm) {
+TEST(Metal, FollowsSchlick) {
     arhost_material metal = scene::make_material(ARHOST_MATERIAL_METAL);
     set3(metal.reflectivity, 0.5f, 0.3f, 0.1f);
     ArenaBuilder builder = in_a_room_of_light(0.6f);
@@ -75,7 +75,7 @@ TEST(Metal, ReflectsBySchlicksTerm) {
             }
 }
 
-TEST(Glass, LosesNoLight) {
+TEST(Glass, ConservesEnergy) {
     for (const char *way : {"tree", "path"}) {
         arhost_material glass = clear_glass();
         set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // as bright as all else, for what is still inside in the end
@@ -95,7 +95,7 @@ TEST(Glass, LosesNoLight) {
     }
 }
 
-TEST(Glass, BendsRaysAsSnellSays) {
+TEST(Glass, RefractsBySnellsLaw) {
     // A slab over a floor that is black to the left of y = 7 and white to the right.
     constexpr double top = 40, bottom = 10, index = 1.5;
     ArenaBuilder builder = in_a_room_of_light(0);
@@ -145,7 +145,7 @@ TEST(Glass, AbsorbsByBouguersLaw) {
     }
 }
 
-TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
+TEST(Glass, ShowsItsCutoffColourForCutOffRays) {
     const auto with = [](auto change) {
         arhost_material glass = clear_glass();
         set3(glass.cutoff_colour, 0.34f, 0.55f, 0.85f);
@@ -167,7 +167,7 @@ TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 0.05f; }), thin);
 }
 
-TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
+TEST(Glass, ReflectanceFollowsTheMaterialsExponentWithinItsLimits) {
     for (const double exponent : {0.7, 1.5, 3.0}) {
         arhost_material glass = clear_glass();
         set3(glass.refraction, 0, 0, 0);
@@ -188,7 +188,7 @@ TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
     }
 }
 
-TEST(Glass, CountsReflectedAndRefractedRaysDepthsApart) {
+TEST(Glass, LimitsReflectionAndRefractionDepthSeparately) {
     // Straight through the ball: 4 % are reflected on entering, and again at each try to leave.
     constexpr double r = 0.04, t = 0.96, all = 60;
     for (const auto &[reflection_depth, refraction_depth, arriving] : {std::array{all, 0.0, r},
@@ -210,7 +210,7 @@ TEST(Glass, CountsReflectedAndRefractedRaysDepthsApart) {
     }
 }
 
-TEST(Glass, TheChosenPathsMeanIsTheTree) {
+TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
     const auto scene = [] {
         ArenaBuilder builder = in_a_room_of_light(0.9f);
         builder.settings.ambient = glm::vec3(0.5f);
@@ -234,7 +234,7 @@ TEST(Glass, TheChosenPathsMeanIsTheTree) {
     EXPECT_NEAR(mean("path") / mean("tree"), 1, 0.03) << "3000 pixels of noise";
 }
 
-TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
+TEST(Glass, ShadowAlphaOnACatcherIs77AndOfOpaqueObjects153) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_CATCHER);
@@ -249,7 +249,7 @@ TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
     EXPECT_GT(counts.at(153), 100);
 }
 
-TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
+TEST(Glass, ShadowAlphaIs77ForAnySampleCount) {
     const auto under_glass = [] {
         ArenaBuilder builder;
         builder.add_object("floor", builder.add_triangles(square(400)),
@@ -270,7 +270,7 @@ TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
     }
 }
 
-TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
+TEST(Glass, ShadowAlphaIs77ForAnyNumberOfLamps) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_CATCHER);
@@ -282,7 +282,7 @@ TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
     EXPECT_EQ(counts, (std::map<int, int>{{77, 200 * 150}}));
 }
 
-TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
+TEST(Glass, ShadowIsColouredIfTheSceneEnablesIt) {
     const auto shadow = [](bool coloured) {
         ArenaBuilder builder;
         builder.settings.coloured_shadows = coloured;
@@ -303,7 +303,7 @@ TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
     EXPECT_NEAR(green[3], 0.84 * 153, 2);
 }
 
-TEST(Glass, ItsShadowTintsTheLightOnObjects) {
+TEST(Glass, ShadowTintsTheLightOnObjects) {
     ArenaBuilder builder = in_a_room_of_light(0);
     arhost_material glass = clear_glass();
     set3(glass.shadow_attenuation, 0.5f, 0.8f, 0.2f);
@@ -316,7 +316,7 @@ TEST(Glass, ItsShadowTintsTheLightOnObjects) {
         EXPECT_TRUE(is_code_of(pixel[i], glass.shadow_attenuation[i] * glass.shadow_attenuation[i], 1e-4));
 }
 
-TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
+TEST(Rough, WhiteMetalLosesOnlyMaskedLight) {
     for (const float roughness : {0.0f, 0.3f, 0.6f, 1.0f}) {
         arhost_material metal = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
         set3(metal.diffuse, 1, 1, 1);
@@ -341,7 +341,7 @@ TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
     }
 }
 
-TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
+TEST(Rough, PlasticPlaneMatchesTheGltfFormulas) {
     arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
     plastic.metallic = 0.25f;

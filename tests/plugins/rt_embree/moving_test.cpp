@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What moves looks like what was built in that place.
+#include "bvh_quality.hpp"
 #include "embree_scene.hpp"
 #include "scene/motion.hpp"
 #include "tracer.hpp"
-#include "tree_quality.hpp"
 
 #include <glm/trigonometric.hpp>
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
 } // namespace
 
 // Catchers that stand still have a tree of their own, others lie in the common one: the picture is the same.
-TEST(Moving, CatchersCatchWhereverTheyLie) {
+TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
     const auto scene = [](const glm::mat4x3 &place, bool moves, float raised) {
         ArenaBuilder builder = with_floor_and_light();
         builder.settings.duration_s = 1;
@@ -121,7 +121,7 @@ TEST(Moving, CatchersCatchWhereverTheyLie) {
     EXPECT_NE(elsewhere.pixels(), plain.pixels());
 }
 
-TEST(Moving, AnObjectIsWhereItsNodeIs) {
+TEST(Moving, ObjectFollowsItsNode) {
     ArenaBuilder moving = with_floor_and_light();
     moving.settings.duration_s = 1;
     const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
@@ -136,7 +136,7 @@ TEST(Moving, AnObjectIsWhereItsNodeIs) {
     expect_alike(at_time(std::move(moving), 0.75), Tracer(std::move(still)).render(from_the_side()));
 }
 
-TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
+TEST(Moving, MeshFollowsItsMorphTargets) {
     ArenaBuilder deforming = with_floor_and_light();
     deforming.settings.duration_s = 1;
     const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
@@ -153,7 +153,7 @@ TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
 }
 
 // Lambert: cos 60° of what it was. Were the normals left behind, it would be as bright as before.
-TEST(Moving, ASkinTurnsItsNormals) {
+TEST(Moving, SkinRotatesNormals) {
     const auto turning = [] {
         ArenaBuilder builder = under_the_sun();
         const std::uint32_t joint = builder.add_node({.animated = true, .morph_weights = {}});
@@ -178,7 +178,7 @@ TEST(Moving, ASkinTurnsItsNormals) {
 }
 
 // The square stays where it is. In the middle of the morph its normals lean by 60°: 0.5 · 2 tan 60° to the side.
-TEST(Moving, AMorphTargetLeansItsNormals) {
+TEST(Moving, MorphTargetTiltsNormals) {
     const auto leaning = [] {
         ArenaBuilder builder = under_the_sun();
         const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
@@ -195,19 +195,19 @@ TEST(Moving, AMorphTargetLeansItsNormals) {
     EXPECT_TRUE(is_code_of(at_time(leaning(), 1, from_above()).at(100, 75)[1], albedo * 0.5));
 }
 
-TEST(TreeQuality, StaysWhileAMeshIsMovedScaledAndBent) {
+TEST(BvhQuality, IsUnaffectedByTranslationScalingAndSlightDeformation) {
     scene::TriangleMesh mesh = sheet(4);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(mesh));
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-9);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(mesh));
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 1e-9);
     for (glm::vec3 &p : mesh.positions)
         p = p * 3.0f + glm::vec3(100, 0, 0);
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-3);
-    EXPECT_LT(quality.decay(view_of(sheet(5))), 1.3);
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 1e-3);
+    EXPECT_LT(quality.degradation(view_of(sheet(5))), 1.3);
 }
 
 // Without a skin, glTF's meshes move and deform at once.
-TEST(Moving, AMeshMayMoveAndDeform) {
+TEST(Moving, MeshCanMoveAndDeform) {
     ArenaBuilder both = with_floor_and_light();
     both.settings.duration_s = 1;
     const std::uint32_t node = both.add_node({.animated = true, .morph_weights = {0}});
@@ -229,7 +229,7 @@ TEST(Moving, AMeshMayMoveAndDeform) {
 }
 
 // Tiles of the image where no object is are not traced.
-TEST(Moving, AMeshIsSeenWhereItsShapeGoes) {
+TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     constexpr float left = -60, right = 60;
     ArenaBuilder deforming = under_the_sun(), still = under_the_sun();
     const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
@@ -254,18 +254,18 @@ scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     return mesh;
 }
 
-TEST(TreeQuality, DecaysWhereNeighboursPart) {
+TEST(BvhQuality, DegradesWhenNeighboursSeparate) {
     const scene::TriangleMesh whole = sheet(4), torn = sheared(40);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(whole));
-    EXPECT_LT(quality.decay(view_of(sheared(0.5f))), 1.3);
-    EXPECT_GT(quality.decay(view_of(torn)), 1.3);
-    quality.built(view_of(torn));
-    EXPECT_NEAR(quality.decay(view_of(torn)), 1, 1e-9);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(whole));
+    EXPECT_LT(quality.degradation(view_of(sheared(0.5f))), 1.3);
+    EXPECT_GT(quality.degradation(view_of(torn)), 1.3);
+    quality.record_build(view_of(torn));
+    EXPECT_NEAR(quality.degradation(view_of(torn)), 1, 1e-9);
 }
 
 // A deforming sheet of 80,000 triangles, of which the measure takes a sample.
-TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
+TEST(BvhQuality, TriggersRebuilds) {
     scene::TriangleMesh mesh = sheet(4, 200);
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
     ArenaBuilder builder;
@@ -298,15 +298,15 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
 }
 
 // No tree is good then, and a new one is no better.
-TEST(TreeQuality, StaysWhereTrianglesGrowAtRandom) {
+TEST(BvhQuality, IsUnaffectedByRandomDisplacement) {
     scene::TriangleMesh mesh = sheet(4);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(mesh));
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(mesh));
     std::minstd_rand random(1);
     std::uniform_real_distribution<float> unit(-1, 1);
     for (glm::vec3 &p : mesh.positions)
         p += 20.0f * glm::vec3(unit(random), unit(random), unit(random));
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 0.2);
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 0.2);
 }
 
 } // namespace arhost::test

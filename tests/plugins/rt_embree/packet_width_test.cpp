@@ -57,7 +57,7 @@ protected:
 
 } // namespace
 
-TEST_P(PacketWidth, MakesNoDifferenceToHits) {
+TEST_P(PacketWidth, DoesNotChangeHits) {
     if (!is_native())
         GTEST_SKIP() << "this processor has no packets of " << GetParam();
     Query query = make_query(Coherence::coherent);
@@ -69,7 +69,7 @@ TEST_P(PacketWidth, MakesNoDifferenceToHits) {
     }
 }
 
-TEST_P(PacketWidth, MakesNoDifferenceToShadows) {
+TEST_P(PacketWidth, DoesNotChangeOcclusion) {
     if (!is_native())
         GTEST_SKIP() << "this processor has no packets of " << GetParam();
     Query query = make_query(Coherence::incoherent);

@@ -90,7 +90,7 @@ arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> k)
     return in;
 }
 
-TEST(Silhouette, OfASphereIsWhereTheLensPutsIt) {
+TEST(Silhouette, OfASphereMatchesTheLensModel) {
     const arhost_intrinsics lenses[] = {with_lens(ARHOST_DISTORTION_NONE, {}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.01}),
@@ -107,7 +107,7 @@ TEST(Silhouette, OfASphereIsWhereTheLensPutsIt) {
         }
 }
 
-TEST(Silhouette, OfASphereOnTheAxisIsCentredOnThePrincipalPixel) {
+TEST(Silhouette, OfASphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
     arhost_intrinsics in = pinhole(101, 81);
     in.cx = 30; // pixel centres are integers, so the picture is symmetric about this column and row
     in.cy = 50;
@@ -120,7 +120,7 @@ TEST(Silhouette, OfASphereOnTheAxisIsCentredOnThePrincipalPixel) {
     EXPECT_EQ(picture.alpha(30, 50), 255);
 }
 
-TEST(Silhouette, ASphereBehindAFisheyeCameraIsSeen) {
+TEST(Silhouette, OfASphereBehindAFisheyeCameraIsVisible) {
     arhost_intrinsics in = pinhole(300, 300, 60);
     in.distortion = ARHOST_DISTORTION_FISHEYE;
     in.coefficient_count = 4;
@@ -142,7 +142,7 @@ ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_ROLE_CATCHER) {
     return builder;
 }
 
-TEST(Alpha, IsZeroInTheLight153InTheShadowAnd255OnObjects) {
+TEST(Alpha, IsZeroInLight153InShadowAnd255OnObjects) {
     const auto counts = Tracer(sphere_over_catcher()).render(from_the_side()).alphas();
     EXPECT_EQ(counts.size(), 3u);
     EXPECT_GT(counts.at(0), 10000);
@@ -150,7 +150,7 @@ TEST(Alpha, IsZeroInTheLight153InTheShadowAnd255OnObjects) {
     EXPECT_GT(counts.at(255), 300);
 }
 
-TEST(Alpha, TheShadowLiesWhereTheLightsRaysAreStopped) {
+TEST(Alpha, ShadowIsWhereTheLightIsBlocked) {
     const arhost_camera view = from_the_side();
     const Picture picture = Tracer(sphere_over_catcher()).render(view);
     // The ball's centre, seen from the light, falls on the floor at t = 200 / 175 of the way.
@@ -162,7 +162,7 @@ TEST(Alpha, TheShadowLiesWhereTheLightsRaysAreStopped) {
     EXPECT_EQ(shadow, (Pixel{0, 0, 0, 153})) << "black, at " << x << " " << y;
 }
 
-TEST(Alpha, ACatcherFacingAwayIsNotThere) {
+TEST(Alpha, CatcherFacingAwayIsInvisible) {
     ArenaBuilder builder = sphere_over_catcher();
     const Picture from_below = Tracer(std::move(builder)).render(camera({0, -150, -110}, {0, 0, 0}, {0, 0, 1}));
     const auto counts = from_below.alphas();
@@ -171,7 +171,7 @@ TEST(Alpha, ACatcherFacingAwayIsNotThere) {
 }
 
 // A room of catchers that face inwards, with a mirror ball in it.
-TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
+TEST(Alpha, InwardFacingCatchersAreInvisibleFromOutsideButReflected) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
     builder.settings.background = glm::vec3(0, 0, 1); // seen nowhere: the room is closed
@@ -195,7 +195,7 @@ TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
     }
 }
 
-TEST(Alpha, OfShadowsIsTheScenes) {
+TEST(Alpha, OfShadowsIsSetByTheScene) {
     ArenaBuilder builder;
     builder.settings.shadow_alpha_opaque = 0.8f;
     builder.settings.shadow_alpha_translucent = 0.1f;
@@ -212,7 +212,7 @@ TEST(Alpha, OfShadowsIsTheScenes) {
     EXPECT_GT(counts.at(204), 100);
 }
 
-TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
+TEST(Alpha, OnlyTheFirstCatcherAlongARayReceivesTheShadow) {
     // A table top between the ball and the floor: the shadow falls on the top, and through it on the floor,
     // where the top hides it.
     ArenaBuilder builder = sphere_over_catcher();
@@ -223,7 +223,7 @@ TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
     EXPECT_EQ(Tracer(std::move(builder)).render(from_the_side()).alphas().at(153), with_top_only);
 }
 
-TEST(Alpha, AVirtualObjectBehindACatcherIsSeen) {
+TEST(Alpha, VirtualObjectBehindACatcherIsVisible) {
     ArenaBuilder builder = sphere_over_catcher();
     builder.add_object("sunken", builder.add_spheres({{40, 0, -20, 10}}), builder.add_material(flat(1, 0, 0)));
     const Picture with = Tracer(std::move(builder)).render(from_the_side());
@@ -231,7 +231,7 @@ TEST(Alpha, AVirtualObjectBehindACatcherIsSeen) {
     EXPECT_GT(with.alphas().at(255), without.alphas().at(255) + 100);
 }
 
-TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
+TEST(Alpha, SeveralLightsShareTheShadowByIrradiance) {
     ArenaBuilder builder = sphere_over_catcher();
     builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong, no falloff
     const Picture picture = Tracer(std::move(builder)).render(from_the_side());
@@ -251,7 +251,7 @@ TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
     EXPECT_GT(both, 20);
 }
 
-TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
+TEST(Alpha, LightBehindACatcherCastsNoShadowOnIt) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
                        ARHOST_ROLE_CATCHER);
@@ -261,7 +261,7 @@ TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
     EXPECT_EQ(counts.count(153), 0u);
 }
 
-TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
+TEST(Alpha, OccluderHidesObjectsAndShadowsBehindIt) {
     ArenaBuilder builder = sphere_over_catcher();
     const arhost_camera view = from_the_side();
     // A screen right in front of the camera, over the picture's left half.
@@ -285,7 +285,7 @@ TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
     EXPECT_GT(hidden, 300);
 }
 
-TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
+TEST(Alpha, OccluderBehindAnObjectHidesNothing) {
     ArenaBuilder builder = one_sphere({0, 0, 200, 40});
     builder.add_object("wall", builder.add_triangles(square(500, 300)), builder.add_material(flat(1, 1, 1)),
                        ARHOST_ROLE_OCCLUDER);
@@ -293,7 +293,7 @@ TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
               Tracer(one_sphere({0, 0, 200, 40})).render(opencv_axes(pinhole())).pixels());
 }
 
-TEST(Alpha, AnEmptySceneIsTransparentEverywhere) {
+TEST(Alpha, EmptySceneIsTransparent) {
     const Picture picture = Tracer(ArenaBuilder()).render(from_the_side());
     EXPECT_EQ(picture.alphas(), (std::map<int, int>{{0, 200 * 150}}));
     EXPECT_EQ(picture.info.has_region, 1);
@@ -302,7 +302,7 @@ TEST(Alpha, AnEmptySceneIsTransparentEverywhere) {
 
 // ---- Light -----------------------------------------------------------------------------------------
 
-TEST(Light, APlaneIsAsBrightAsLambertSays) {
+TEST(Light, PlaneFollowsLambert) {
     for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
         ArenaBuilder builder;
         builder.settings.ambient = {0.1f, 0.2f, 0.3f};
@@ -326,7 +326,7 @@ TEST(Light, APlaneIsAsBrightAsLambertSays) {
     }
 }
 
-TEST(Light, ASpecularPlaneAddsPhongsLobe) {
+TEST(Light, SpecularPlaneAddsPhongLobe) {
     ArenaBuilder builder;
     const arhost_material material = shiny(0.2f, 0.5f, 20);
     builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(material));
@@ -341,7 +341,7 @@ TEST(Light, ASpecularPlaneAddsPhongsLobe) {
         }
 }
 
-TEST(Light, CatchersAndOccludersDarkenObjectsBehindThem) {
+TEST(Light, CatchersAndOccludersShadowObjects) {
     for (const arhost_role role : {ARHOST_ROLE_CATCHER, ARHOST_ROLE_OCCLUDER}) {
         ArenaBuilder builder = one_sphere({0, 0, 20, 20}, diffuse(0.5f, 0.5f, 0.5f));
         builder.settings.ambient = glm::vec3(0.2f);
@@ -383,7 +383,7 @@ ArenaBuilder mirror_and_ball(std::uint32_t max_depth = 5) {
     return builder;
 }
 
-TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
+TEST(Mirror, ShowsWhatTheReflectedRayHits) {
     const arhost_camera view = camera({0, -200, 200}, {0, 0, 0}, {0, 0, 1});
     const Picture picture = Tracer(mirror_and_ball()).render(view);
     const glm::dvec3 eye(0, -200, 200), w = glm::normalize(eye), u(1, 0, 0), v = glm::cross(w, u);
@@ -412,14 +412,14 @@ TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
     EXPECT_GT(backgrounds, 2000);
 }
 
-TEST(Mirror, TakesTheBackgroundOfTheWindowOnlyByReflection) {
+TEST(Mirror, ReflectsTheBackgroundWhichIsOtherwiseTransparent) {
     // Primary rays that miss are transparent, whatever the background.
     const Picture picture = Tracer(one_sphere({0, 0, 300, 30}, mirror(1))).render(opencv_axes(pinhole()));
     EXPECT_EQ(picture.at(0, 0), nothing_alpha);
     EXPECT_EQ(picture.at(99, 74), (Pixel{255, 255, 255, 255})) << "the default background is white";
 }
 
-TEST(Mirror, LosesNoLight) {
+TEST(Mirror, ConservesEnergy) {
     ArenaBuilder builder;
     builder.settings.background = glm::vec3(0.6f);
     builder.settings.max_depth = 100;
@@ -431,7 +431,7 @@ TEST(Mirror, LosesNoLight) {
         }
 }
 
-TEST(Mirror, FollowsAtMostMaxDepthBounces) {
+TEST(Mirror, TracesAtMostMaxDepthBounces) {
     // Between two parallel mirrors, each bounce leaves 0.5; the ray leaves after the third.
     const auto brightness = [](std::uint32_t max_depth) {
         ArenaBuilder builder;
@@ -494,7 +494,7 @@ double over(const Pixel &pixel, int channel, double background) {
     return background * (1 - alpha) + pixel[channel] * alpha;
 }
 
-TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
+TEST(Samples, DoNotDependOnPreviousFrames) {
     Tracer tracer(one_sphere({10, 5, 200, 40}), {{"samples", "4"}});
     const arhost_camera view = opencv_axes(pinhole());
     ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
@@ -508,7 +508,7 @@ TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
         EXPECT_TRUE(render() == first) << frame;
 }
 
-TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
+TEST(Samples, AccumulateWhileTheCameraIsStatic) {
     const auto scene = [] {
         ArenaBuilder builder = sphere_over_catcher();
         arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
@@ -542,7 +542,7 @@ TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
     EXPECT_EQ(render(still), first) << "it begins anew";
 }
 
-TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
+TEST(Samples, StopChangingTheImageAtTheAccumulationLimit) {
     ArenaBuilder builder = sphere_over_catcher();
     arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
     set3(bulb.position, -60, -20, 200);
@@ -567,7 +567,7 @@ TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
     EXPECT_EQ(after(20), enough);
 }
 
-TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
+TEST(Samples, CompositeToTheMeanOfPerSampleComposites) {
     constexpr int count = 8;
     const arhost_intrinsics in = pinhole();
     const Picture all = Tracer(sphere_over_catcher(), {{"samples", std::to_string(count)}}).render(from_the_side(in));
@@ -616,7 +616,7 @@ ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     return builder;
 }
 
-TEST(Sameness, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST(Equivalence, IsIdenticalForAnyThreadCount) {
     for (const std::string samples : {"1", "4"}) {
         const auto trace = [&](const std::string &threads) {
             return Tracer(busy_scene(), {{"threads", threads}, {"samples", samples}})
@@ -629,7 +629,7 @@ TEST(Sameness, AnyNumberOfThreadsGivesTheSameBytes) {
     }
 }
 
-TEST(Sameness, AgainAndAgainTheSameBytes) {
+TEST(Equivalence, IsIdenticalForRepeatedFrames) {
     Tracer tracer(busy_scene(), {{"threads", "2"}});
     const auto first = tracer.render(from_the_side()).pixels();
     Picture again(pinhole());
@@ -639,7 +639,7 @@ TEST(Sameness, AgainAndAgainTheSameBytes) {
     }
 }
 
-TEST(Sameness, EveryInstructionSetGivesTheSameBytes) {
+TEST(Equivalence, IsIdenticalForEveryInstructionSet) {
     const auto base =
         Tracer(busy_scene(), {{"instruction_set", "base"}, {"samples", "3"}}).render(from_the_side()).pixels();
 #if defined(__x86_64__)
@@ -672,7 +672,7 @@ double share_that_differs(const Picture &a, const Picture &b) {
     return static_cast<double>(differ) / static_cast<double>(p.size());
 }
 
-TEST(Sameness, MovingTheSceneWithItsCameraChangesNothing) {
+TEST(Equivalence, MovingSceneAndCameraTogetherChangesNothing) {
     glm::mat4 moved = glm::translate(glm::mat4(1), glm::vec3(300, -200, 150));
     moved = glm::rotate(moved, 1.1f, glm::normalize(glm::vec3(1, -2, 0.5f)));
     const auto apply = [&](glm::dvec4 p) {
@@ -685,7 +685,7 @@ TEST(Sameness, MovingTheSceneWithItsCameraChangesNothing) {
     EXPECT_LT(share_that_differs(here, there), 0.003);
 }
 
-TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
+TEST(Equivalence, InstancesLookLikeWorldSpaceVertices) {
     const glm::mat4 m = glm::scale(
         glm::rotate(glm::translate(glm::mat4(1), glm::vec3(5, -10, 15)), 0.7f, glm::normalize(glm::vec3(1, 2, 3))),
         glm::vec3(30, 20, 12));
@@ -716,7 +716,7 @@ TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
     EXPECT_LT(far, 10);
 }
 
-TEST(Sameness, SoupLooksLikeTheIndexedMesh) {
+TEST(Equivalence, TriangleSoupLooksLikeTheIndexedMesh) {
     const scene::TriangleMesh indexed = cube(25);
     scene::TriangleMesh soup;
     for (const auto &triangle : indexed.triangles) {
@@ -735,7 +735,7 @@ TEST(Sameness, SoupLooksLikeTheIndexedMesh) {
     EXPECT_TRUE(build(soup) == build(indexed));
 }
 
-TEST(Sameness, RobustTraversalGivesThePictureOfTheFastOne) {
+TEST(Equivalence, RobustTraversalMatchesTheFastOne) {
     EXPECT_LT(share_that_differs(Tracer(busy_scene(), {{"robust", "true"}}).render(from_the_side()),
                                  Tracer(busy_scene()).render(from_the_side())),
               0.001);
@@ -743,7 +743,7 @@ TEST(Sameness, RobustTraversalGivesThePictureOfTheFastOne) {
 
 // ---- Regions and sizes -----------------------------------------------------------------------------
 
-TEST(Region, HoldsAllAlphaAndLittleElse) {
+TEST(Region, ContainsAllAlphaTightly) {
     for (const glm::vec4 &sphere :
          {glm::vec4(0, 0, 300, 20), glm::vec4(-150, 60, 300, 30), glm::vec4(60, 0, 200, 90)}) {
         const Picture picture = Tracer(one_sphere(sphere), {{"samples", "4"}}).render(opencv_axes(pinhole()));
@@ -767,7 +767,7 @@ TEST(Region, HoldsAllAlphaAndLittleElse) {
     }
 }
 
-TEST(Region, SkippingTilesLosesNothing) {
+TEST(Region, SkippedTilesAreEmpty) {
     // Objects all over, some behind the camera and some astride its plane, against rays of one pixel each.
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
@@ -800,7 +800,7 @@ TEST(Region, SkippingTilesLosesNothing) {
         }
 }
 
-TEST(Sizes, OddOnesAreWrittenWholeAndNotBeyond) {
+TEST(Sizes, OddImageSizesAreWrittenExactly) {
     for (const auto &[width, height] :
          {std::pair{1u, 1u}, {3u, 5u}, {5u, 2u}, {33u, 65u}, {31u, 1u}, {1u, 100u}, {67u, 35u}})
         for (const char *samples : {"1", "2"}) {
@@ -829,7 +829,7 @@ TEST(OddScenes, DegenerateTrianglesAreHarmless) {
 }
 
 // Their normals have no length in floats, and Embree ends the process for rays that are none.
-TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
+TEST(OddScenes, FacetsTooSmallForTheirNormalsAreRendered) {
     for (const float side : {1e-12f, 1e-16f, 1e-20f})
         for (const bool glass : {false, true}) {
             ArenaBuilder builder;
@@ -846,7 +846,7 @@ TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
         }
 }
 
-TEST(OddScenes, ACameraBeyondAllRaysIsRefused) {
+TEST(OddScenes, CameraBeyondFloatRangeIsRejected) {
     Tracer tracer(one_sphere({0, 0, 200, 30}));
     const arhost_camera far = camera({0, -1e19, 0}, {0, 0, 0}, {0, 0, 1});
     ASSERT_EQ(tracer.start(far.intrinsics), ARHOST_STATUS_OK);
@@ -868,14 +868,14 @@ TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
     }
 }
 
-TEST(OddScenes, ACameraInsideAnObjectSeesItsInside) {
+TEST(OddScenes, CameraInsideAnObjectSeesItsInside) {
     const Picture picture = Tracer(one_sphere({0, 0, 0, 50}, diffuse(1, 1, 1))).render(opencv_axes(pinhole()));
     EXPECT_EQ(picture.alphas(), (std::map<int, int>{{255, 200 * 150}}));
     EXPECT_EQ(picture.info.region_width, 200u);
     EXPECT_EQ(picture.info.region_height, 150u);
 }
 
-TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
+TEST(OddScenes, CameraInsideGlassSeesThroughIt) {
     // Inside a ball about the eye every ray leaves along its own direction, and light is lost at the one surface
     // only.
     for (const char *way : {"tree", "path"}) {
@@ -909,17 +909,17 @@ protected:
     Tracer tracer{one_sphere({0, 0, 200, 30})};
 };
 
-TEST_F(Refusal, OfAnUpThatIsParallelToTheView) {
+TEST_F(Refusal, OfAnUpParallelToTheView) {
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("up is parallel"));
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfALookAtThatIsTheEye) {
+TEST_F(Refusal, OfALookAtEqualToTheEye) {
     EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfNumbersThatAreNotFinite) {
+TEST_F(Refusal, OfNonFiniteNumbers) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -927,19 +927,19 @@ TEST_F(Refusal, OfNumbersThatAreNotFinite) {
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("not finite"));
 }
 
-TEST_F(Refusal, OfOtherIntrinsicsThanThoseOfTheStart) {
+TEST_F(Refusal, OfIntrinsicsOtherThanAtStart) {
     arhost_camera other = opencv_axes(pinhole());
     other.intrinsics.cx += 1;
     EXPECT_EQ(render(other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfAnImageOfAnotherSize) {
+TEST_F(Refusal, OfAnImageOfADifferentSize) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     Picture small(pinhole(100, 150));
     EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
+TEST_F(Refusal, OfInvalidIntrinsics) {
     arhost_intrinsics in = pinhole();
     in.fx = 0;
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -954,26 +954,26 @@ TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, ToGoOnOnceCancelled) {
+TEST_F(Refusal, OfStartOnceCancelled) {
     tracer.plugin().cancel();
     EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST_F(Refusal, ToFinishAnImageOnceCancelled) {
+TEST_F(Refusal, OfRenderOnceCancelled) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     tracer.plugin().cancel();
     Picture picture(pinhole());
     EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), picture), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST(Plugin, DeclaresThatItTracesTheLens) {
+TEST(Plugin, DeclaresLensDistortionSupport) {
     const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
     EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
     EXPECT_STREQ(descriptor.id, "rt_embree");
     EXPECT_TRUE(descriptor.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
 }
 
-TEST(Plugin, CanBeStartedAgainAfterAStop) {
+TEST(Plugin, CanBeRestartedAfterStop) {
     Tracer tracer(busy_scene());
     const auto first = tracer.render(from_the_side()).pixels();
     tracer.render(opencv_axes(pinhole(64, 48)));
@@ -986,11 +986,11 @@ class LargeSurfaces : public testing::TestWithParam<LargeSurface> {};
 INSTANTIATE_TEST_SUITE_P(All, LargeSurfaces, testing::ValuesIn(large_surfaces),
                          [](const auto &info) { return info.param.name; });
 
-TEST_P(LargeSurfaces, CastNoShadowOnThemselves) {
+TEST_P(LargeSurfaces, DoNotShadowThemselves) {
     EXPECT_EQ(pixels_out_of_light(GetParam(), "rt_embree"), 0);
 }
 
-TEST(LargeFloor, KeepsTheShadowsOfWhatIsFlatOnIt) {
+TEST(LargeFloor, KeepsShadowsOfThinObjectsOnIt) {
     for (const float side_mm : {1e2f, 1e6f})
         EXPECT_TRUE(has_its_shadow(Tracer(plate_on_floor(side_mm)).render(camera_over_plate()))) << side_mm;
 }
