@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What it costs that things move and deform: moving.py [--quick]
+"""Cost of moving and deforming objects: moving.py [--quick]
 
-config/scenes/moving.yaml is traced by the ray tracer alone (arhost replay) from a camera that stands still, and so is a
-copy of it without motion; both again with a mesh of about 100,000 triangles. One sample a pixel, one shadow ray to the
-lamp. CPU time is that of the ray tracer's process, which works out where things are, too; other programs disturb it less.
-Leaves build/moving/moving.json."""
+Traces config/scenes/moving.yaml with the ray tracer alone (arhost replay) from a static camera, and a copy of it without
+motion; both also with a mesh of about 100,000 triangles. One sample per pixel, one shadow ray to the lamp. CPU time is
+that of the ray tracer's process, which includes evaluating the motion; it is less sensitive to other load than wall time.
+Writes build/moving/moving.json."""
 import json
 import os
 import pathlib
@@ -18,19 +18,19 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "tools")]
-from replays import HEIGHT, ROOT, WIDTH, frames_a_second, replay, write_trajectory  # noqa: E402
+from replays import HEIGHT, ROOT, WIDTH, frames_per_second, replay, write_trajectory  # noqa: E402
 from scene_views import MOVING_VIEW  # noqa: E402
 
 OUT = ROOT / "build/moving"
 SCENES = ROOT / "config/scenes"
-SHORT = 10  # frames of the run that tells what the start takes
+SHORT = 10  # frames of the run that measures the start-up time
 
 
 def without_motion(scene):
-    """The scene's text with everything where it is at first."""
+    """The scene's text with all objects fixed at their initial positions."""
     def placed(motion):
-        way = re.search(r"at_s: 0, translate: (\[[^]]*\])", motion.group())
-        return f"    transform: [{{translate: {way.group(1)}}}]\n" if way else ""
+        initial = re.search(r"at_s: 0, translate: (\[[^]]*\])", motion.group())
+        return f"    transform: [{{translate: {initial.group(1)}}}]\n" if initial else ""
 
     return re.sub(r"(?m)^    motion:\n(?:      .*\n)+", placed, re.sub(r"(?m)^    animation: .*\n", "", scene))
 
@@ -42,7 +42,8 @@ def triangles(glb):
 
 
 def lay_out(folder, faces):
-    """The scene and its copy without motion, beside a mesh of so many triangles, or of the shipped one's."""
+    """Writes the scene and its copy without motion, with a mesh of `faces` triangles or, if None, the shipped one. Returns
+    the number of triangles."""
     folder.mkdir(parents=True)
     (folder / "textures").symlink_to(SCENES / "textures")
     mesh = folder / "meshes/tentacles.glb"
@@ -57,10 +58,10 @@ def lay_out(folder, faces):
 
 
 def measure(scene, trajectory, frames):
-    """Frames a second, and CPU time a frame in ms without that of the start."""
+    """Frames per second, and CPU time per frame in ms without start-up."""
     short, (stats, timeline, _) = (replay(scene, trajectory, count, "--set", "raytracer.options.light_samples=1") for count in (SHORT, SHORT + frames))
     cpu_s = stats["cpu_seconds"]["raytracer"] - short[0]["cpu_seconds"]["raytracer"]
-    return frames_a_second(timeline), 1e3 * cpu_s / frames
+    return frames_per_second(timeline), 1e3 * cpu_s / frames
 
 
 def main():
@@ -69,9 +70,9 @@ def main():
     OUT.mkdir(parents=True)
     trajectory = OUT / "still.jsonl"
     write_trajectory(trajectory, [MOVING_VIEW] * (SHORT + frames), False)
-    print(f"moving: {WIDTH}x{HEIGHT}, {os.cpu_count()} cores, medians of {rounds} rounds in turn\n"
-          f"  {'triangles':>12}   {'frames a second':^24}   {'CPU time a frame, ms':^24}\n"
-          f"  {'that deform':>12}   {'still':>8} {'moving':>8}           {'still':>8} {'moving':>8} {'ratio':>7}")
+    print(f"moving: {WIDTH}x{HEIGHT}, {os.cpu_count()} cores, medians of {rounds} alternating rounds\n"
+          f"  {'deforming':>12}   {'frames per second':^24}   {'CPU time per frame, ms':^24}\n"
+          f"  {'triangles':>12}   {'static':>8} {'moving':>8}           {'static':>8} {'moving':>8} {'ratio':>7}")
     results = []
     for name, faces in (("shipped", None), ("100k", 100_000)):
         deforming = lay_out(OUT / name, faces)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Blender Cycles' side of tools/bench peers: peer_cycles.py FOLDER THREADS (served.py)."""
+"""Blender Cycles for tools/bench peers: peer_cycles.py FOLDER THREADS (served.py)."""
 import math
 import os
 import sys
@@ -13,7 +13,7 @@ from served import Scene, serve
 
 wanted = Scene(sys.argv[1])
 threads = int(sys.argv[2])
-# Axes stay as they are (Blender's "up" means nothing to the tracer); 1 unit is 1 mm.
+# Axes are kept (Blender's "up" is irrelevant to Cycles); 1 unit is 1 mm.
 
 
 def material(name, kind, **inputs):
@@ -45,7 +45,7 @@ def mesh(scene, name, positions, normals, indices, surface):
 
 
 def limit(scene, bounces):
-    """One more is traced, to lamps and surroundings only."""
+    """Cycles traces one more bounce, to lamps and environment only."""
     scene.cycles.max_bounces = scene.cycles.glossy_bounces = scene.cycles.transmission_bounces = bounces
 
 
@@ -55,7 +55,7 @@ def scene_of(case):
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y, render.resolution_percentage = wanted.width, wanted.height, 100
     render.threads_mode, render.threads = "FIXED", threads
-    render.use_persistent_data = True  # the mesh and its hierarchy stay from frame to frame
+    render.use_persistent_data = True  # keep mesh and BVH between frames
     render.use_compositing = render.use_sequencer = False
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode = "RGBA"
@@ -72,7 +72,7 @@ def scene_of(case):
     cycles.blur_glossy = 0
     cycles.caustics_reflective = cycles.caustics_refractive = True
     limit(scene, {"diffuse": 0, "mirror": wanted.mirror_depth - 1, "glass-path": wanted.glass_depth - 1}[case])
-    # arhost does not follow light from one matt surface to another.
+    # rt_embree has no diffuse interreflection.
     cycles.diffuse_bounces = 0
 
     surface = {
@@ -87,7 +87,7 @@ def scene_of(case):
     white = 0 if case == "diffuse" else 1
     world.node_tree.nodes["Background"].inputs["Color"].default_value = grey(white)
     world.cycles.sampling_method = "NONE"
-    # Only what mirrors and glass show; the ground gets its light from the lamp.
+    # The environment is visible only in mirrors and glass; the ground is lit by the lamp.
     world.cycles_visibility.diffuse = False
     scene.world = world
     if case != "glass-path":
@@ -97,7 +97,7 @@ def scene_of(case):
              material("ground", "ShaderNodeBsdfDiffuse", Color=grey(wanted.ground_grey)))
         lamp = bpy.data.lights.new("lamp", "POINT")
         lamp.shadow_soft_size = 0
-        # Radiant intensity is W / 4π²; Lambert's 1/π is in arhost's, π in Blender's.
+        # Blender's radiant intensity is W / 4π², including π; arhost's intensity includes Lambert's 1/π.
         lamp.energy = wanted.lamp_intensity * 4 * math.pi ** 2
         lamp.cycles.use_multiple_importance_sampling = False
         lamp = bpy.data.objects.new("lamp", lamp)
@@ -109,7 +109,7 @@ def scene_of(case):
     camera.angle_y = math.radians(wanted.fov_y_degrees)
     camera.clip_start, camera.clip_end = 1, 10000
     camera = bpy.data.objects.new("camera", camera)
-    # It looks along its −z, as the scene's does.
+    # A Blender camera looks along its −z axis, and so does the scene's.
     assert wanted.eye[0] == wanted.look_at[0] and wanted.eye[1] == wanted.look_at[1] and wanted.eye[2] > wanted.look_at[2]
     camera.matrix_world = Matrix.Translation(wanted.eye)
     scene.collection.objects.link(camera)
@@ -129,7 +129,7 @@ def scene(case):
 def render(case, seed):
     seen = scene(case)
     seen.cycles.seed = seed
-    seen.update_tag()  # or the seed stays as it was
+    seen.update_tag()  # otherwise the new seed is ignored
     bpy.ops.render.render(scene=case)
 
 
@@ -160,7 +160,7 @@ def image(case, samples):
 
 
 def own_ms(case, seed):
-    """A sample's time without what a frame costs besides: synchronisation, start and end of a render."""
+    """Time per sample without the per-frame overhead of synchronisation, start and end of a render."""
     seen = scene(case)
     seen.cycles.seed = seed
     wall = []
@@ -175,12 +175,12 @@ def own_ms(case, seed):
 
 
 def rays(case):
-    """As peer_mitsuba.py counts them."""
+    """Counted as in peer_mitsuba.py."""
     seen = scene(case)
     bunny = seen.collection.objects[0]
     socket = bunny.active_material.node_tree.nodes["Glass BSDF"].inputs["Color"]
     socket.default_value = grey(1)
-    # Primary rays, and the one that follows each hit whatever the limit.
+    # Primary rays, and one ray after each hit regardless of the limit.
     seen.render.film_transparent = True
     count = 1 + float((rendered(case, 1)[..., 3] > 0).mean())
     seen.render.film_transparent = False

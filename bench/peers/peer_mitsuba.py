@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3's side of tools/bench peers: peer_mitsuba.py FOLDER THREADS (served.py)."""
+"""Mitsuba 3 for tools/bench peers: peer_mitsuba.py FOLDER THREADS (served.py)."""
 import sys
 
 import drjit as dr
@@ -13,7 +13,7 @@ dr.set_thread_count(int(sys.argv[2]))
 
 
 class DirectDiffuse(mi.BSDF):
-    """Lambert, whose paths end there: arhost does not follow light from one matt surface to another."""
+    """Lambert without indirect light: rt_embree has no diffuse interreflection."""
 
     def __init__(self, properties):
         mi.BSDF.__init__(self, properties)
@@ -81,22 +81,22 @@ def scene_of(case):
         matt = {"type": "diffuse", "reflectance": grey(wanted.ground_grey)} if case == "diffuse" else \
             {"type": "directdiffuse", "value": wanted.ground_grey}
         parts["ground"] = mesh("ground", corners, None, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), matt)
-        # Lambert's 1/π is in arhost's intensity.
+        # arhost's intensity includes Lambert's 1/π.
         parts["lamp"] = {"type": "point", "position": wanted.lamp_position,
                          "intensity": grey(wanted.lamp_intensity * np.pi)}
     if case != "diffuse":
-        # Only what mirrors and glass show; the ground gets its light from the lamp.
+        # The environment is visible only in mirrors and glass; the ground is lit by the lamp.
         parts["white"] = {"type": "constant", "radiance": grey(1), "sampling_weight": 0 if "lamp" in parts else 1}
     return mi.load_dict(parts)
 
 
-# arhost's depths count bounces, Mitsuba's rays; no Russian roulette.
+# arhost's depth counts bounces, Mitsuba's counts rays; no Russian roulette.
 def path(rays):
     return {"type": "path", "max_depth": rays, "rr_depth": 10_000}
 
 
 integrators = {
-    # A ray and a shadow ray, as ours.
+    # A primary and a shadow ray, as in rt_embree.
     "diffuse": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
     "mirror": path(wanted.mirror_depth + 1),
     "glass-path": path(wanted.glass_depth + 1),
@@ -113,7 +113,7 @@ def scene(case):
 def render(case, seed):
     if case not in frames:
         integrator = mi.load_dict(integrators[case])
-        # Records the kernel once: without, Python traces it anew each frame.
+        # Record the kernel once; otherwise Python traces it again each frame.
         frames[case] = dr.freeze(lambda seen, number: mi.render(seen, integrator=integrator, spp=1, seed=number))
     np.array(frames[case](scene(case), mi.UInt32(seed)))
 
@@ -121,7 +121,7 @@ def render(case, seed):
 def image(case, samples):
     seen = scene(case)
     light = np.array(mi.render(seen, integrator=mi.load_dict(integrators[case]), spp=samples, seed=0))
-    # What primary rays hit, in the middle of each pixel as ours.
+    # Primary hits at pixel centres, as in rt_embree.
     sensor = seen.sensors()[0]
     number = np.arange(wanted.width * wanted.height)
     middle = mi.Point2f((number % wanted.width + 0.5) / wanted.width, (number // wanted.width + 0.5) / wanted.height)
@@ -131,8 +131,8 @@ def image(case, samples):
 
 
 def rays(case):
-    """Of white glass, a path of at most k rays has brought light if it got out with them: the share of pixels
-    without is that of the paths that trace ray k + 1."""
+    """With lossless glass in white surroundings, a path limited to k rays is black unless it has left the glass, so the
+    fraction of black pixels is the fraction of paths that trace ray k + 1."""
     seen = scene(case)
     values = mi.traverse(seen)
     keys = [key for key in values.keys() if "specular_" in key and key.endswith("value")]

@@ -10,7 +10,7 @@
 namespace arhost {
 namespace {
 
-// The matrices of ITU-R BT.601-7 and BT.709-6 in floating point, written out from their primaries.
+// The matrices of ITU-R BT.601-7 and BT.709-6 in floating point, derived from their primaries.
 struct Exact {
     double kr, kb;
     bool limited;

@@ -27,7 +27,7 @@ arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width
     return format;
 }
 
-// A frame of random bytes, its grey plane included; `fill` is fill_grey or its reference.
+// A frame of random bytes including its grey plane; `fill` is fill_grey or its reference.
 template <class Fill> std::vector<std::uint8_t> filled(const arhost_frame_format &format, const Fill &fill) {
     std::mt19937 random(3);
     std::vector<std::uint8_t> bytes(format.byte_size);
@@ -59,7 +59,7 @@ TEST(Grey, WritesNothingForFormatsWithALumaPlane) {
     }
 }
 
-// Every colour there is: 65536 rows of 256.
+// All 2^24 colours.
 TEST(Grey, IsWithinOneOfOpenCvForEveryColour) {
     const auto format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4096, 4096);
     std::vector<std::uint8_t> bytes(format.byte_size);

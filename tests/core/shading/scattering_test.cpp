@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fresnel terms, glass and microfacets: against their sources' values, and against integrals.
+// Fresnel terms, glass and microfacets, compared with published values and numerical integrals.
 #include <arhost/shading/scalar.hpp>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ Vec3 direction(double theta, double phi) {
     return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-// ∫ f over the directions with z > 0, by the midpoint rule, finest round the pole.
+// ∫ f over the directions with z > 0, by the midpoint rule, finest near the pole.
 template <class F> double integral_over_hemisphere(F f, int rows = 600, int columns = 300) {
     double sum = 0;
     for (int row = 0; row < rows; ++row) {
@@ -84,12 +84,12 @@ TEST(Glass, ReflectsTotallyBeyondTheCriticalAngle) {
     const double critical = std::asin(1 / 1.5);
     EXPECT_GT(refracted_cosine_squared(std::cos(critical - 1e-6), 1.5), 0);
     EXPECT_LT(refracted_cosine_squared(std::cos(critical + 1e-6), 1.5), 0);
-    const auto share = [](double angle) {
+    const auto reflectance = [](double angle) {
         return glass_reflected_fraction(true, std::cos(angle), refracted_cosine_squared(std::cos(angle), 1.5), 5,
                                         0.04, 0.7);
     };
-    EXPECT_LE(share(critical - 1e-6), 0.7);
-    EXPECT_EQ(share(critical + 1e-6), 1) << "whatever the maximum";
+    EXPECT_LE(reflectance(critical - 1e-6), 0.7);
+    EXPECT_EQ(reflectance(critical + 1e-6), 1) << "whatever the maximum";
 }
 
 TEST(Glass, ReflectanceIsTheSameFromInsideAndOutside) {
@@ -155,9 +155,9 @@ TEST(Ggx, VisibleMicrofacetAreaIsTheProjectedSurfaceArea) {
         }
 }
 
-// 8 × 8 cells of the hemisphere, of even steps of θ and φ.
+// Histogram over 8 × 8 cells of the hemisphere, equally spaced in θ and φ.
 TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
-    constexpr int cells = 8, finer = 60;
+    constexpr int cells = 8, steps = 60; // per side: cells, integration steps per cell
     for (const double alpha : {0.2, 0.5, 1.0})
         for (const double theta : {0.0, 0.6, 1.3}) {
             const Vec3 eye = direction(theta, 2.0);
@@ -174,12 +174,12 @@ TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
             for (int row = 0; row < cells; ++row)
                 for (int column = 0; column < cells; ++column) {
                     double expected = 0;
-                    for (int i = 0; i < finer * finer; ++i) {
-                        const double t = (row + (i / finer + 0.5) / finer) / cells * pi / 2;
-                        const double p = ((column + (i % finer + 0.5) / finer) / cells - 0.5) * 2 * pi;
+                    for (int i = 0; i < steps * steps; ++i) {
+                        const double t = (row + (i / steps + 0.5) / steps) / cells * pi / 2;
+                        const double p = ((column + (i % steps + 0.5) / steps) / cells - 0.5) * 2 * pi;
                         const Vec3 n = direction(t, p);
                         expected += ggx_masking(eye.z, alpha) * std::max(dot(eye, n), 0.0) / eye.z *
-                                    ggx_distribution(n.z, alpha) * std::sin(t) * pi * pi / std::pow(cells * finer, 2);
+                                    ggx_distribution(n.z, alpha) * std::sin(t) * pi * pi / std::pow(cells * steps, 2);
                     }
                     ASSERT_NEAR(chosen.at(static_cast<std::size_t>(row * cells + column)), expected, 2e-3)
                         << alpha << " " << theta << " " << row << " " << column;
@@ -187,7 +187,7 @@ TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
         }
 }
 
-// A white surface in a white furnace: microfacets that reflect all but mask each other give back less, never more.
+// White furnace test: with perfectly reflecting microfacets, masking loses some light, but none is gained.
 TEST(Ggx, LampsAndSampledRaysConserveEnergy) {
     for (const double alpha : {0.1, 0.3, 0.7, 1.0})
         for (const double theta : {0.0, 0.7, 1.2, 1.4}) {
@@ -200,7 +200,7 @@ TEST(Ggx, LampsAndSampledRaysConserveEnergy) {
                 const Vec3 light = mirror_direction(-eye, ggx_half_vector(up, eye, alpha, u, v));
                 return light.z > 0 ? ggx_masking(light.z, alpha) : 0;
             });
-            // What rays stand for: masking and shadowing each on its own, which is a little darker.
+            // Sampled rays use uncorrelated masking and shadowing, which is slightly darker.
             const double expected = integral_over_hemisphere([&](Vec3 light) {
                 return ggx_distribution(half_vector(light), alpha) * ggx_masking(light.z, alpha) *
                        ggx_masking(eye.z, alpha) / (4 * eye.z);

@@ -51,7 +51,7 @@ TEST(Alpha, ClassesGiveTheirCodes) {
     EXPECT_EQ(code_8bit(shadow_alpha(0, 0, 0.6, 0.3)), 0);
     EXPECT_EQ(code_8bit(shadow_alpha(1, 0, 0.6f, 0.3f)), 153);
     EXPECT_EQ(code_8bit(shadow_alpha(0, 1, 0.6f, 0.3f)), 77);
-    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "to the last bit: 76.5 is rounded";
+    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "bit-exact: 76.5 is rounded";
 }
 
 TEST(Alpha, SeveralLightsAreWeightedByIrradiance) {
@@ -76,12 +76,12 @@ TEST(Light, SpotIsFullInsideTheInnerConeAndDarkOutsideTheOuterCone) {
     EXPECT_NEAR(spot_attenuation(0.75, 0.9, 0.7), 5.0 / 32, 1e-12); // 3 t² − 2 t³ at a quarter
     EXPECT_EQ(spot_attenuation(0.7, 0.9, 0.7), 0);
     EXPECT_EQ(spot_attenuation(-1, 0.9, 0.7), 0);
-    EXPECT_EQ(spot_attenuation(0.81, 0.8, 0.8), 1) << "cones of one width: a sharp edge";
+    EXPECT_EQ(spot_attenuation(0.81, 0.8, 0.8), 1) << "equal cones: a sharp edge";
     EXPECT_EQ(spot_attenuation(0.79, 0.8, 0.8), 0);
 }
 
 TEST(Light, WhiteSurfaceUnderUniformlySampledWhiteSkyIsWhite) {
-    // The mean of a cosine that is cut at 0 is 1/4 over the sphere.
+    // The mean of max(cos, 0) over the sphere is 1/4.
     EXPECT_NEAR(irradiance_of_density(1 / (4 * pi)) / 4, 1, 1e-12);
     EXPECT_TRUE(std::isfinite(irradiance_of_density(0)));
 }
@@ -136,8 +136,8 @@ TEST(Sampling, AxesFormAnOrthonormalBasis) {
 
 TEST(Sampling, RectanglesAreCoveredFromCornerToCorner) {
     const Vec3 centre{1, 2, 3}, u{4, 0, 0}, v{0, 0, 5};
-    const auto is = [&](double at_u, double at_v, Vec3 wanted) {
-        const Vec3 error = vector_to_rectangle(centre, u, v, at_u, at_v) - wanted;
+    const auto is = [&](double at_u, double at_v, Vec3 expected) {
+        const Vec3 error = vector_to_rectangle(centre, u, v, at_u, at_v) - expected;
         EXPECT_EQ(dot(error, error), 0);
     };
     is(0, 0, {-3, 2, -2});
@@ -159,7 +159,7 @@ TEST(Sampling, SphereDiscFacesTheViewerAndIsSampledUniformly) {
         mean_square += dot(r, r) / n / n;
     }
     EXPECT_NEAR(length(mean), 0, 1e-12);
-    EXPECT_NEAR(mean_square, 18, 1e-9); // half the radius' square, as of any even disc
+    EXPECT_NEAR(mean_square, 18, 1e-9); // radius² / 2 for a uniform disc
 }
 
 TEST(Sampling, FractionOfStepIsLinearAndClamped) {
@@ -190,7 +190,7 @@ TEST(Surface, TangentsPointAlongIncreasingTextureCoordinates) {
         const Vec3 error = normalize(a) - normalize(b);
         EXPECT_NEAR(length(error), 0, 1e-12);
     };
-    // Corners in either order, and a texture that lies mirrored.
+    // Corners in either order, and a mirrored texture.
     for (const auto &[u1, v1, u2, v2] :
          {std::array{1.0, 0.0, 0.2, 1.0}, {0.2, 1.0, 1.0, 0.0}, {-1.0, 0.3, 0.5, 2.0}}) {
         is_along(tangent_along_u(edge(u1, v1), edge(u2, v2), u1, u2, v1, v2), per_u);
@@ -199,16 +199,16 @@ TEST(Surface, TangentsPointAlongIncreasingTextureCoordinates) {
 }
 
 TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
-    const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not across the normal
-    const auto is = [&](Vec3 texel, Vec3 wanted) {
-        const Vec3 bent = perturbed_normal(up, up, u, v, texel);
-        EXPECT_NEAR(length(normalize(bent) - wanted), 0, 1e-12);
+    const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not orthogonal to the normal
+    const auto is = [&](Vec3 texel, Vec3 expected) {
+        const Vec3 mapped = perturbed_normal(up, up, u, v, texel);
+        EXPECT_NEAR(length(normalize(mapped) - expected), 0, 1e-12);
     };
     is({0.5, 0.5, 1}, up);
     is({0.8, 0.5, 0.9}, {0.6, 0, 0.8});
     is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
     is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
-    const auto stays = [&](Vec3 bent) { EXPECT_EQ(length(bent - up), 0); };
+    const auto stays = [&](Vec3 normal) { EXPECT_EQ(length(normal - up), 0); };
     stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // it would point inwards
     stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // no direction along u
     is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the facet's side does not matter
@@ -242,7 +242,7 @@ TEST(Srgb8Table, MatchesTheFormulaAtAndBetweenCodeThresholds) {
         const float x = std::bit_cast<float>(bits);
         const int code = table(x);
         ASSERT_EQ(code, srgb8_exact(x)) << x;
-        if (code != last) { // all floats round the edge that has just been passed
+        if (code != last) { // check every float since the previous sample
             for (std::int32_t near = bits - 97; near < bits; ++near)
                 ASSERT_EQ(table(std::bit_cast<float>(near)), srgb8_exact(std::bit_cast<float>(near)));
             ASSERT_EQ(code, last + 1);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every leaf function of arhost/shading/, to be called with numbers from an array. Included in a namespace that has
-// included the leaf files, so that Float is one number or a packet of them.
+// Calls every leaf function of arhost/shading/ with arguments from an array. Included in a namespace that includes
+// the leaf files; Float is a scalar or a packet.
 
-// All that leaf functions take and return are Floats side by side, but for Bool.
+// Arguments and results of leaf functions consist of Floats, except Bool.
 template <class T> constexpr int numbers_of = sizeof(T) / sizeof(Float);
 template <> constexpr int numbers_of<Bool> = 1;
 
@@ -32,7 +32,7 @@ void call(Result (*f)(Parameters...), const Float *arguments, Float *results) {
     call(f, arguments, results, Types<Parameters...>{});
 }
 
-// A bit for each of the arguments' numbers, set where a Vec3 begins.
+// A bit per argument value, set where a Vec3 begins.
 template <class Result, class... Parameters> constexpr unsigned vectors_of(Result (*)(Parameters...)) {
     unsigned vectors = 0;
     int at = 0;

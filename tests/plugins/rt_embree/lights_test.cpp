@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Lamps of every kind over a white plane, against what the formulas say.
+// All light types over a white plane, compared with the formulas.
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>
@@ -36,7 +36,7 @@ arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity)
     return lamp;
 }
 
-// A ball over a catcher: how many pixels have which alpha.
+// A ball over a catcher: pixel counts by alpha.
 std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
@@ -70,10 +70,10 @@ TEST(SpotLight, LightsOnlyItsCone) {
     expect_irradiance(
         over_a_plane(spot),
         [&](glm::dvec3 p) {
-            const glm::dvec3 way = p - glm::dvec3(30, -20, 90);
-            const double d = glm::length(way), cosine = glm::dot(way / d, axis);
+            const glm::dvec3 to_point = p - glm::dvec3(30, -20, 90);
+            const double d = glm::length(to_point), cosine = glm::dot(to_point / d, axis);
             const double t = std::clamp((cosine - double{0.8f}) / (double{0.9f} - double{0.8f}), 0.0, 1.0);
-            return 5000 * -way.z / (d * d * d) * t * t * (3 - 2 * t);
+            return 5000 * -to_point.z / (d * d * d) * t * t * (3 - 2 * t);
         },
         2e-3);
 }
@@ -108,8 +108,8 @@ TEST(SphereLight, WithZeroRadiusIsAPointLight) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {30, -20, 90}, 0.7f);
     bulb.radius = 1e-3f;
     expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {
-        const glm::dvec3 way = glm::dvec3(30, -20, 90) - p;
-        return 0.7 * way.z / glm::length(way);
+        const glm::dvec3 to_point = glm::dvec3(30, -20, 90) - p;
+        return 0.7 * to_point.z / glm::length(to_point);
     });
 }
 
