@@ -38,8 +38,8 @@ else:
     found = {}
     for case in names:
         a, b = ours(case), peers(what, case)
-        seen = (a[..., 3] > 0.5) & (b[..., 3] > 0.5)
+        both_hit = (a[..., 3] > 0.5) & (b[..., 3] > 0.5)
         found[case] = {"mask": float(np.abs(a[..., 3] - b[..., 3]).mean()),
-                       "our_light": float(a[seen, :3].mean()), "light": float(np.clip(b[seen, :3], 0, 1).mean()),
-                       "difference": float(np.abs(a[seen, :3] - np.clip(b[seen, :3], 0, 1)).mean())}
+                       "our_light": float(a[both_hit, :3].mean()), "light": float(np.clip(b[both_hit, :3], 0, 1).mean()),
+                       "difference": float(np.abs(a[both_hit, :3] - np.clip(b[both_hit, :3], 0, 1)).mean())}
     print(json.dumps(found))

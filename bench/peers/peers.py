@@ -158,7 +158,7 @@ def main():
     print(f"  {cpu_model()}, {len(available)} processors, load {load:.1f}")
     for name, renderer in renderers.items():
         print(f"  {renderer.about['name']}: {renderer.about['version']}")
-    middle = {name: {case: {key: statistics.median(values) for key, values in got.items() if values}
+    medians = {name: {case: {key: statistics.median(values) for key, values in got.items() if values}
                      for case, got in by_case.items()} for name, by_case in times.items()}
     results = []
     print(f"  {'case':11} {'peer':8} {'peer ms':>8} {'ours ms':>8} {'ratio':>6} {'of CPU time':>11}   target")
@@ -166,7 +166,7 @@ def main():
         if name == "ours":
             continue
         for case in cases:
-            peer, ours = middle[name][case], middle["ours"][case]
+            peer, ours = medians[name][case], medians["ours"][case]
             wall, cpu = peer["wall_ms"] / ours["wall_ms"], peer["cpu_ms"] / ours["cpu_ms"]
             own = peer["own_ms"] / ours["wall_ms"] if "own_ms" in peer else None
             target = targets[name][case]
@@ -179,7 +179,7 @@ def main():
     print("  glass, million rays per second of CPU time (and of wall time)")
     rates = {}
     for name, case in [("ours", "glass-path"), ("ours", ours_alone), *((n, "glass-path") for n in rays if n != "ours")]:
-        cpu, wall = (rays[name][case] / middle[name][case][key] / 1e3 for key in ("cpu_ms", "wall_ms"))
+        cpu, wall = (rays[name][case] / medians[name][case][key] / 1e3 for key in ("cpu_ms", "wall_ms"))
         rates[f"{name} {case}"] = {"rays": rays[name][case], "cpu": cpu, "wall": wall}
         print(f"    {name:8} {case:11} {rays[name][case]:10.0f} rays {cpu:7.2f} ({wall:.2f})")
     for name in rays:
@@ -189,7 +189,7 @@ def main():
         met = min(ratio.values()) >= targets[name][ours_alone]
         results.append({"case": ours_alone, "peer": name, "ratio_wall": ratio["wall"], "ratio_cpu": ratio["cpu"],
                         "target": targets[name][ours_alone], "met": met})
-        print(f"    our tree to {name}: {ratio['wall']:.2f}, of CPU time {ratio['cpu']:.2f}   "
+        print(f"    ray tree relative to {name}: {ratio['wall']:.2f}, of CPU time {ratio['cpu']:.2f}   "
               f"{targets[name][ours_alone]}: {'met' if met else 'MISSED'}")
     same = True
     for name, by_case in differences.items():
@@ -201,7 +201,7 @@ def main():
         json.dump({"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "quick": quick, "cpu": cpu_model(),
                    "processors": len(available), "load": load, "threads": threads, "scene": scene,
                    "versions": {name: renderer.about for name, renderer in renderers.items()},
-                   "median": middle, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
+                   "median": medians, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
                    "results": results}, file, indent=1)
     print("  all numbers: build/peers/peers.json; pictures: build/peers/peers.png")
     if not same:

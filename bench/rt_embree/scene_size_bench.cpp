@@ -112,11 +112,11 @@ Bare commit_bare(const Arena &arena) {
     const RTCScene scene = rtcNewScene(device);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
     const RTCGeometry triangles = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
+    const auto set_buffer = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
         rtcSetSharedGeometryBuffer(triangles, type, 0, format, bytes, buffer.offset, buffer.stride, buffer.count);
     };
-    share(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, geometry->positions);
-    share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, geometry->indices);
+    set_buffer(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, geometry->positions);
+    set_buffer(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, geometry->indices);
     rtcCommitGeometry(triangles);
     rtcAttachGeometry(scene, triangles);
     const auto start = Clock::now();

@@ -64,10 +64,10 @@ ImageView LensWarp::warp(const ImageView &image, const Region &region) {
                 continue;
             const std::uint8_t *pixel =
                 image.rgba + static_cast<std::size_t>(y) * image.stride + 4 * static_cast<std::size_t>(x);
-            const float share = (corner & 1 ? across : 1 - across) * (corner >> 1 ? down : 1 - down);
+            const float weight = (corner & 1 ? across : 1 - across) * (corner >> 1 ? down : 1 - down);
             for (int c = 0; c < 3; ++c)
-                sum[c] += share * static_cast<float>(pixel[3]) * static_cast<float>(pixel[c]);
-            sum[3] += share * static_cast<float>(pixel[3]);
+                sum[c] += weight * static_cast<float>(pixel[3]) * static_cast<float>(pixel[c]);
+            sum[3] += weight * static_cast<float>(pixel[3]);
         }
         if (sum[3] <= 0)
             continue;

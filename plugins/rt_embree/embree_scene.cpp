@@ -334,13 +334,13 @@ GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
     const bool spheres = from.type == ARHOST_GEOMETRY_SPHERES;
     GeometryHandle geometry(
         rtcNewGeometry(device_.get(), spheres ? RTC_GEOMETRY_TYPE_SPHERE_POINT : RTC_GEOMETRY_TYPE_TRIANGLE));
-    const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
+    const auto set_buffer = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
         rtcSetSharedGeometryBuffer(geometry.get(), type, 0, format, &arena_, buffer.offset, buffer.stride,
                                    buffer.count);
     };
-    share(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
+    set_buffer(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
     if (!spheres)
-        share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
+        set_buffer(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
     if (const HitFilter filter = hit_filter_of(objects_[number], textures_.data()); filter.is_needed())
         set_hit_filter(geometry.get(), *hit_filters_.emplace_back(std::make_unique<HitFilter>(filter)));
     return geometry;

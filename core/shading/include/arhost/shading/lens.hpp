@@ -110,15 +110,15 @@ private:
     }
 
     // Newton's method with a central-difference 2×2 Jacobian, halving steps that do not reduce the error.
-    std::optional<Vec3T<double>> undistort_brown(Point2 wanted) const {
+    std::optional<Vec3T<double>> undistort_brown(Point2 target) const {
         const auto error_at = [&](Point2 p) {
             const Point2 q = brown(p);
-            return Point2{q.x - wanted.x, q.y - wanted.y};
+            return Point2{q.x - target.x, q.y - target.y};
         };
         const auto size = [](Point2 p) { return std::hypot(p.x, p.y); };
         // Start within the limit, in the direction of the target.
-        const double start = std::min(1.0, 0.9 * limit_ / std::max(size(wanted), 1e-30));
-        Point2 p{wanted.x * start, wanted.y * start};
+        const double start = std::min(1.0, 0.9 * limit_ / std::max(size(target), 1e-30));
+        Point2 p{target.x * start, target.y * start};
         Point2 error = error_at(p);
         for (int step = 0; step < max_steps && !(size(error) < tolerance); ++step) {
             constexpr double h = 1e-6;
@@ -131,8 +131,8 @@ private:
                 return {};
             const Point2 move{(d * error.x - b * error.y) / determinant, (a * error.y - c * error.x) / determinant};
             bool better = false;
-            for (double share = 1; share > 1e-4 && !better; share /= 2) {
-                const Point2 next{p.x - share * move.x, p.y - share * move.y};
+            for (double scale = 1; scale > 1e-4 && !better; scale /= 2) {
+                const Point2 next{p.x - scale * move.x, p.y - scale * move.y};
                 const Point2 next_error = error_at(next);
                 // Beyond the limit lies another solution, which is not physical.
                 if (size(next) <= limit_ && size(next_error) < size(error)) {
@@ -150,8 +150,8 @@ private:
     }
 
     // Bracketed Newton's method: always converges, as the curve increases up to the limit.
-    std::optional<Vec3T<double>> undistort_fisheye(Point2 wanted) const {
-        const double r = std::hypot(wanted.x, wanted.y);
+    std::optional<Vec3T<double>> undistort_fisheye(Point2 target) const {
+        const double r = std::hypot(target.x, target.y);
         double low = 0, high = limit_;
         if (!(r <= kannala_brandt_radius(fisheye_, high)))
             return {};
@@ -166,7 +166,7 @@ private:
                 theta = (low + high) / 2;
         }
         const double scale = r > 0 ? std::sin(theta) / r : 0;
-        return Vec3T<double>{wanted.x * scale, wanted.y * scale, std::cos(theta)};
+        return Vec3T<double>{target.x * scale, target.y * scale, std::cos(theta)};
     }
 
     arhost_intrinsics intrinsics_;
