@@ -86,7 +86,7 @@ def print_tables(seconds):
             _, rows_whole, _ = replay(scene, trajectory, frames, True)
             ours_alone, ours_whole = frames_per_second(rows_alone), frames_per_second(rows_whole)
             tracer = [statistics.median(row["raytracer_ms"] for row in rows) for rows in (rows_whole, rows_alone)]
-            stand_in = "   a stand-in for the scan" if "stands in for it" in said else ""
+            stand_in = "   a stand-in for the scan" if "stand-in" in said else ""
             note = stand_in or coarser(scene, said)
             print(f"  {name:6} {whole:7.2f} {alone:7.2f} {whole / alone:7.3f}   {ours_whole:8.2f} {ours_alone:8.2f} "
                   f"{ours_whole / ours_alone:7.3f}  {tracer[0]:.2f} / {tracer[1]:.2f}{note}", flush=True)

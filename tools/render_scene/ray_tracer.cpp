@@ -21,7 +21,7 @@ using namespace arhost;
 
 namespace {
 
-// Relative to this program, in a build folder as well as installed.
+// Beside this program, in a build folder as in an installed arhost.
 std::filesystem::path built_in_plugins() {
     return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/arhost/plugins";
 }
@@ -39,7 +39,7 @@ constexpr arhost_host host = {sizeof(arhost_host),
                               [](const arhost_host *) { return 0; },
                               [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 
-// Higher default than the plugin's for still pictures, if the option's range permits.
+// More than the plugin's 1, for pictures that stand still, where it can take as many.
 void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
     for (const ipc::OptionDeclaration &o : plugin.options)
         if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
@@ -47,11 +47,11 @@ void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
             options.override_value("samples", "16");
 }
 
-// Occupies whole pages, as arhost/raytracer.h requires.
+// Pages of their own, as arhost/raytracer.h promises.
 class ImageMemory {
 public:
     explicit ImageMemory(std::size_t size)
-        : bytes_(static_cast<std::uint8_t *>(std::aligned_alloc(page, rounded_up(size)))) {
+        : bytes_(static_cast<std::uint8_t *>(std::aligned_alloc(page, whole(size)))) {
         if (!bytes_)
             throw std::bad_alloc();
     }
@@ -59,7 +59,7 @@ public:
 
 private:
     static constexpr std::size_t page = 4096;
-    static std::size_t rounded_up(std::size_t size) { return (size + page - 1) / page * page; }
+    static std::size_t whole(std::size_t size) { return (size + page - 1) / page * page; }
     struct Free {
         void operator()(std::uint8_t *bytes) const { std::free(bytes); }
     };
@@ -69,15 +69,14 @@ private:
 } // namespace
 
 RayTracer::RayTracer(const std::string &name, yaml::Node options) {
-    const yaml::Node requested = yaml::Node::scalar(name, "--raytracer");
-    const std::filesystem::path file = run_config::PluginPath({}, built_in_plugins()).resolve(requested);
+    const yaml::Node asked = yaml::Node::scalar(name, "--raytracer");
+    const std::filesystem::path file = run_config::PluginPath({}, built_in_plugins()).resolve(asked);
     plugin_ = &worker::negotiate(file, worker::open_library(file));
     const ipc::PluginDescription plugin = ipc::description_from_json(ipc::to_json(*plugin_->descriptor));
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
-        requested.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
+        asked.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
-    const std::vector<ipc::OptionValue> values =
-        run_config::resolve_options(plugin, options, std::nullopt, requested);
+    const std::vector<ipc::OptionValue> values = run_config::resolve_options(plugin, options, std::nullopt, asked);
     std::vector<arhost_option> passed;
     passed.reserve(values.size());
     for (const ipc::OptionValue &v : values)
@@ -88,7 +87,7 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
 }
 
 void RayTracer::expect_ok(const char *call, arhost_status status) const {
-    if (status != ARHOST_STATUS_OK) // the plugin has logged the reason
+    if (status != ARHOST_STATUS_OK) // its reason has been logged
         throw std::runtime_error(std::string(plugin_->descriptor->id) + ": " + call + ": " +
                                  ipc::status_text(status));
 }
@@ -101,7 +100,7 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
     const arhost_image image{sizeof image, stride, width, height, memory.get()};
     arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr};
     arhost_motion motion;
-    std::optional<arhost::scene::MotionEvaluator> evaluator; // owns the memory of `motion`
+    std::optional<arhost::scene::MotionEvaluator> evaluator; // whose memory it is in
     if (scene.duration_s > 0) {
         motion = evaluator.emplace(scene).at(time_s);
         request.motion = &motion;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A ray tracer plugin, loaded into this process like in arhost-worker, but without a sandbox.
+// A ray tracer's plugin, opened in this process by the rules of arhost-worker. Nothing keeps it from what this
+// process may do.
 #pragma once
 
 #include "yaml/yaml.hpp"
@@ -13,14 +14,14 @@
 
 class RayTracer {
 public:
-    // `name`: plugin name or path, as in a configuration. `options`: map of plugin options; missing ones get the
-    // plugin's default, except `samples`, which defaults to 16 if supported. Throws std::runtime_error.
+    // `name`: as in a configuration, a plugin's name or a path. `options`: a map of the plugin's own; what it lacks
+    // takes the plugin's default, but `samples` 16 where the plugin has that. Throws std::runtime_error.
     RayTracer(const std::string &name, arhost::yaml::Node options);
     ~RayTracer() { plugin_->destroy(instance_); }
     RayTracer(const RayTracer &) = delete;
     RayTracer &operator=(const RayTracer &) = delete;
 
-    // RGBA, straight alpha. Throws std::runtime_error.
+    // One picture: RGBA, straight alpha. Throws std::runtime_error.
     cv::Mat render(const arhost_scene &scene, const arhost_camera &camera, double time_s) const;
 
 private:

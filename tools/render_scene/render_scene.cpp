@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders a picture of a scene file with any ray tracer plugin, without video, tracker or marker.
+// A picture of a scene file from a given place, by any ray tracer's plugin: without a video, a tracker or a marker.
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "base/usage.hpp"
@@ -55,7 +55,7 @@ arhost_camera camera_of(const View &view) {
     return camera;
 }
 
-// Straight alpha over a grey checkerboard, as in image editors.
+// Straight alpha over a checkerboard of two greys, as painting programs show what is transparent.
 cv::Mat over_checkerboard(const cv::Mat &rgba) {
     cv::Mat picture(rgba.size(), CV_8UC3);
     for (int y = 0; y < rgba.rows; ++y)
@@ -73,10 +73,9 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
                const std::string &output) {
     arhost::scene::LoadCallbacks callbacks;
     callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", base::printable(text).c_str()); };
-    callbacks.reads = [&, output_identity = base::identity_of(output)](const std::filesystem::path &read) {
-        if (const auto [path, node] = base::identity_of(read);
-            path == output_identity.path || node == output_identity.node)
-            throw std::runtime_error(output + ": the scene reads this file; choose another output file");
+    callbacks.reads = [&, of_output = base::identity_of(output)](const std::filesystem::path &read) {
+        if (const auto [path, node] = base::identity_of(read); path == of_output.path || node == of_output.node)
+            throw std::runtime_error(output + ": is a file that the scene reads; choose another");
     };
     callbacks.reads(file);
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
@@ -87,7 +86,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);
 }
 
-// The plugin's options; `--set` overrides `--samples` and `--light-samples`.
+// The plugin's options: those that have a name of their own here, and above them what `--set` says.
 arhost::yaml::Node options_of(const std::optional<int> &samples, const std::optional<int> &light_samples,
                               const std::vector<std::string> &settings) {
     arhost::yaml::Node options = arhost::yaml::Node::parse("{}", "render-scene");
@@ -107,9 +106,9 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // report a closed pipe and a file size limit as errors
+    std::signal(SIGPIPE, SIG_IGN); // a full disk, and who reads no more, are errors
     std::signal(SIGXFSZ, SIG_IGN);
-    CLI::App app("Renders a scene file over a checkerboard to a PNG, JPEG or PPM file. Lengths are in mm.");
+    CLI::App app("Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
     std::string scene, output, label, ray_tracer = "rt_embree";
     View view;
     std::optional<int> samples, light_samples;
@@ -117,43 +116,44 @@ int main(int argc, char **argv) {
     double time_s = 0;
     bool transparent = false;
     app.add_option("scene", scene, "The scene file")->required();
-    app.add_option("--eye", view.eye, "Camera position")->delimiter(',')->type_name("X,Y,Z")->capture_default_str();
-    app.add_option("--look-at", view.look_at, "Point at the centre of the picture")
+    app.add_option("--eye", view.eye, "Where the camera is")
         ->delimiter(',')
         ->type_name("X,Y,Z")
         ->capture_default_str();
-    app.add_option("--up", view.up, "Up direction of the picture; default: the scene's up axis")
+    app.add_option("--look-at", view.look_at, "What is in the picture's middle")
+        ->delimiter(',')
+        ->type_name("X,Y,Z")
+        ->capture_default_str();
+    app.add_option("--up", view.up, "What is up in the picture; without it, what is up in the scene")
         ->delimiter(',')
         ->type_name("X,Y,Z");
-    app.add_option("--fov", view.field_of_view, "Vertical field of view, degrees")
+    app.add_option("--fov", view.field_of_view, "From the picture's top to its bottom, degrees")
         ->check(CLI::Range(1.0, 170.0))
         ->capture_default_str();
-    app.add_option("--size", view.size, "Picture size, px")
+    app.add_option("--size", view.size, "Of the picture, px")
         ->delimiter('x')
         ->type_name("WIDTHxHEIGHT")
         ->check(CLI::Range(1, 16384))
         ->default_str(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
-    app.add_option("--time", time_s, "Time in s; moving scenes repeat")
+    app.add_option("--time", time_s, "When, in s; a scene that moves begins again when it is over")
         ->check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
             return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
         })
         ->capture_default_str();
-    app.add_option("--raytracer", ray_tracer, "Ray tracer plugin, as in a configuration")
+    app.add_option("--raytracer", ray_tracer, "The plugin that traces, as a configuration names it")
         ->type_name("NAME|PATH")
         ->capture_default_str();
-    app.add_option("--set", settings, "Plugin option (repeatable); see arhost plugins --options")
+    app.add_option("--set", settings, "One of the plugin's options (again for more): arhost plugins --options")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
-    app.add_option("--samples", samples,
-                   "Plugin option 'samples': samples per pixel; default 16 if the plugin has it")
+    app.add_option("--samples", samples, "The plugin's option 'samples', a pixel; without it 16, if it has that")
         ->check(CLI::Range(1, 256));
-    app.add_option("--light-samples", light_samples,
-                   "Plugin option 'light_samples': shadow rays per sample and area light")
+    app.add_option("--light-samples", light_samples, "Its option 'light_samples': shadow rays from each of them")
         ->check(CLI::Range(1, 256));
-    app.add_option("--label", label, "A line of text to draw into the picture");
-    app.add_flag("--transparent", transparent, "Keep alpha (PNG) instead of the checkerboard");
-    app.add_option("--output,-o", output, "Output file")->required();
+    app.add_option("--label", label, "A line of text to write into the picture");
+    app.add_flag("--transparent", transparent, "Keep alpha (PNG) in place of the checkerboard");
+    app.add_option("--output,-o", output, "The file to write")->required();
     app.failure_message(base::usage_failure);
     try {
         app.parse(argc, argv);
@@ -163,7 +163,7 @@ int main(int argc, char **argv) {
     try {
         const std::string kind = std::filesystem::path(output).extension();
         if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
-            throw std::runtime_error(output + ": the file name must end in .png, .jpg or .ppm");
+            throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
         base::WholeFile file(output);
         const cv::Mat rgba =
             render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)), output);
@@ -179,7 +179,7 @@ int main(int argc, char **argv) {
                             colour, width, cv::LINE_AA);
         std::vector<unsigned char> bytes;
         if (!cv::imencode(kind, picture, bytes))
-            throw std::runtime_error(output + ": the picture cannot be encoded");
+            throw std::runtime_error(output + ": the picture can't be encoded");
         file.write({bytes.begin(), bytes.end()});
     } catch (const std::exception &error) {
         std::fprintf(stderr, "render-scene: %s\n", base::printable(error.what()).c_str());
