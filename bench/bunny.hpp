@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the ray tracer's benchmarks share: the mesh, and a host that only prints.
+// Shared by the ray tracer benchmarks: the mesh, and a host that only prints.
 #pragma once
 
 #include "scene/arena.hpp"
@@ -17,7 +17,7 @@
 
 namespace arhost::bench {
 
-// A ball of about so many triangles, dented so that it hides parts of itself.
+// A ball of about `triangles` triangles with dents that occlude each other.
 inline scene::TriangleMesh dented_ball(unsigned triangles) {
     scene::TriangleMesh mesh;
     const auto rings = static_cast<unsigned>(std::lround(std::sqrt(triangles / 2.0))), sides = rings + 1;
@@ -43,12 +43,12 @@ struct NamedMesh {
     const char *name;
 };
 
-// The bunny of `shared_data`, or a ball that stands in for it: 100 mm high, on the plane y = 0.
+// The bunny of `shared_data`, or a dented ball if it is missing: 100 mm high, on the plane y = 0.
 inline NamedMesh bunny(const std::filesystem::path &shared_data) {
     const std::filesystem::path file = shared_data / "meshes/bunny_69451.ply.gz";
-    const bool there = std::filesystem::exists(file);
-    NamedMesh named{there ? scene::load_mesh(file, {.smooth = true}) : dented_ball(69'451),
-                    there ? "bunny" : "dented ball"};
+    const bool exists = std::filesystem::exists(file);
+    NamedMesh named{exists ? scene::load_mesh(file, {.smooth = true}) : dented_ball(69'451),
+                    exists ? "bunny" : "dented ball"};
     std::vector<glm::vec3> &positions = named.mesh.positions;
     glm::vec3 low = positions[0], high = low;
     for (const glm::vec3 &p : positions) {
@@ -60,7 +60,7 @@ inline NamedMesh bunny(const std::filesystem::path &shared_data) {
     return named;
 }
 
-// What it is told goes to stderr.
+// Prints log messages to stderr.
 inline arhost_host printing_host(const char *name) {
     return {sizeof(arhost_host),
             ARHOST_ABI_VERSION,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories of the benchmarks' own, and replays of them (docs/trajectories.md)."""
+"""Writes the benchmarks' trajectories and replays them (docs/trajectories.md)."""
 import csv
 import json
 import pathlib
@@ -8,12 +8,13 @@ import subprocess
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/release"
 if not (BUILD / "bin/arhost").exists():
-    raise SystemExit(f"{BUILD}/bin/arhost is not there: build it with tools/test")
+    raise SystemExit(f"{BUILD}/bin/arhost is missing: build it with tools/test")
 WIDTH, HEIGHT = 800, 600
 
 
 def write_trajectory(file, eyes_and_targets, y_up):
-    """Eyes and points looked at, in mm, one a frame at 30 a second, through the dissertation's lens of 45 degrees."""
+    """`eyes_and_targets`: eye and look-at point in mm per frame; 30 frames per second, the dissertation's field of view of
+    45 degrees."""
     focal = HEIGHT / 2 / 0.41421356237309503
     header = {"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 30,
               "camera": {"width": WIDTH, "height": HEIGHT, "fx": focal, "fy": focal, "cx": (WIDTH - 1) / 2,
@@ -26,7 +27,7 @@ def write_trajectory(file, eyes_and_targets, y_up):
 
 
 def replay(scene_file, trajectory, frames, *arguments):
-    """A run's statistics, its timeline and what it said. Leaves stats.json and timeline.csv beside the trajectory."""
+    """Returns a run's statistics, timeline and stderr. Writes stats.json and timeline.csv next to the trajectory."""
     stats, timeline = trajectory.with_name("stats.json"), trajectory.with_name("timeline.csv")
     command = [BUILD / "bin/arhost", "replay", "--trajectory", trajectory, "--scene", scene_file,
                "--frames", str(frames), "--stats", stats, "--timeline", timeline,
@@ -39,7 +40,7 @@ def replay(scene_file, trajectory, frames, *arguments):
     return json.loads(stats.read_text()), rows, done.stderr
 
 
-def frames_a_second(rows):
-    """Over the later part of a run: the first frames meet cold caches and an empty pipeline."""
+def frames_per_second(rows):
+    """Without the first fifth of a run, which has cold caches and an empty pipeline."""
     rows = rows[len(rows) // 5:]
     return (len(rows) - 1) / (rows[-1]["shown_s"] - rows[0]["shown_s"])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Viewpoints and times of the scenes in config/scenes, for pictures and measurements."""
+"""Cameras and times for pictures and measurements of the scenes of config/scenes."""
 
-# Scene → (eye, look_at) far and close, mm; z is up in demo and optix-*, y in vkray-*. Scenes that are
-# links in config/scenes are close views of another scene.
+# Scene → (eye, look_at) far and close, mm; z is up in demo and optix-*, y in vkray-*. The dissertation's scenes that are
+# close views of another scene are links in config/scenes and are covered by that scene's close view.
 FAR, CLOSE = ((0, -340, 170), (0, 0, 55)), ((0, -250, 110), (0, 0, 55))
 FAR_Y, CLOSE_Y = ((0, 170, 340), (0, 55, 0)), ((0, 110, 250), (0, 55, 0))
 ROOM_FAR, ROOM_CLOSE = ((45, -265, 150), (27, -60, 38)), ((35, -168, 90), (27, -60, 30))
@@ -25,5 +25,5 @@ VIEWS = {
     "demo": (((0, -260, 170), (0, 0, 20)), ((0, -150, 100), (0, 0, 20))),
 }
 
-# The animated scene is shown from one viewpoint at several times, in seconds.
+# The scene `moving`: one camera, several times in seconds.
 MOVING_VIEW, MOVING_TIMES = ((0, -250, 135), (6, 0, 40)), (0, 1, 2, 3, 4, 5)

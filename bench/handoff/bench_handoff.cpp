@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One-way latency of a command from the host to a worker and of its result back, with a sleeping and with
-// a polling receiver, beside a bare pair of futexes and of eventfds in the same run. Two processes.
+// One-way latency of a command from host to worker and of its result back, with sleeping and polling receivers,
+// compared with bare futexes and eventfds in the same run. Two processes.
 #include "ipc/memory.hpp"
 #include "ipc/protocol.hpp"
 
@@ -28,22 +28,22 @@ std::int64_t now_ns() {
 }
 
 struct Latencies {
-    std::vector<std::int64_t> there, back; // ns
+    std::vector<std::int64_t> forward, back; // ns
     void print(const char *name) {
-        const auto percentile = [](std::vector<std::int64_t> &samples, double share) {
+        const auto percentile = [](std::vector<std::int64_t> &samples, double fraction) {
             std::sort(samples.begin(), samples.end());
             return static_cast<double>(
-                       samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1))]) *
+                       samples[static_cast<std::size_t>(fraction * static_cast<double>(samples.size() - 1))]) *
                    1e-3;
         };
-        std::printf("%-28s  %8.1f %8.1f %8.1f  %8.1f %8.1f %8.1f\n", name, percentile(there, 0.5),
-                    percentile(there, 0.99), percentile(there, 0.999), percentile(back, 0.5), percentile(back, 0.99),
-                    percentile(back, 0.999));
+        std::printf("%-28s  %8.1f %8.1f %8.1f  %8.1f %8.1f %8.1f\n", name, percentile(forward, 0.5),
+                    percentile(forward, 0.99), percentile(forward, 0.999), percentile(back, 0.5),
+                    percentile(back, 0.99), percentile(back, 0.999));
         std::fflush(stdout);
     }
 };
 
-// The project's own way: command ring and futex there, result ring and doorbell back.
+// arhost's link: command ring and futex forward, result ring and doorbell back.
 Latencies link(int rounds, bool polling) {
     const SharedMemory host_memory = SharedMemory::create("host", sizeof(HostPage));
     const SharedMemory worker_memory = SharedMemory::create("worker", sizeof(WorkerPage));
@@ -63,7 +63,7 @@ Latencies link(int rounds, bool polling) {
                 continue;
             }
             Result result{};
-            result.frame.capture_ns = now_ns() - command.capture_ns; // the way there
+            result.frame.capture_ns = now_ns() - command.capture_ns; // forward latency
             result.busy_ns = now_ns();
             results.push(result);
             ring_doorbell(bell.worker.get());
@@ -89,18 +89,18 @@ Latencies link(int rounds, bool polling) {
                 drain_doorbell(bell.host.get());
             }
         latencies.back.push_back(now_ns() - result.busy_ns);
-        latencies.there.push_back(result.frame.capture_ns);
+        latencies.forward.push_back(result.frame.capture_ns);
         drain_doorbell(bell.host.get());
     }
     ::waitpid(worker, nullptr, 0);
     return latencies;
 }
 
-// The least that wakes a process that sleeps: a futex each way, in a page with the time stamps.
+// Lower bound for waking a sleeping process: a futex per direction, in a page with the time stamps.
 Latencies futexes(int rounds) {
     struct Page {
-        std::atomic<std::uint32_t> questions, answers;
-        std::int64_t asked_ns, way_there_ns, answered_ns;
+        std::atomic<std::uint32_t> requests, responses;
+        std::int64_t requested_ns, forward_ns, responded_ns;
     };
     const SharedMemory memory = SharedMemory::create("futexes", 4096);
     const Mapping mapping = memory.map(Access::read_write);
@@ -116,38 +116,38 @@ Latencies futexes(int rounds) {
     const pid_t worker = ::fork();
     if (worker == 0) {
         for (int i = 1; i <= rounds; ++i) {
-            wait_until(page.questions, static_cast<std::uint32_t>(i));
-            page.way_there_ns = now_ns() - page.asked_ns;
-            page.answered_ns = now_ns();
-            count_and_wake(page.answers);
+            wait_until(page.requests, static_cast<std::uint32_t>(i));
+            page.forward_ns = now_ns() - page.requested_ns;
+            page.responded_ns = now_ns();
+            count_and_wake(page.responses);
         }
         ::_exit(0);
     }
     Latencies latencies;
     for (int i = 1; i <= rounds; ++i) {
         ::usleep(200);
-        page.asked_ns = now_ns();
-        count_and_wake(page.questions);
-        wait_until(page.answers, static_cast<std::uint32_t>(i));
-        latencies.back.push_back(now_ns() - page.answered_ns);
-        latencies.there.push_back(page.way_there_ns);
+        page.requested_ns = now_ns();
+        count_and_wake(page.requests);
+        wait_until(page.responses, static_cast<std::uint32_t>(i));
+        latencies.back.push_back(now_ns() - page.responded_ns);
+        latencies.forward.push_back(page.forward_ns);
     }
     ::waitpid(worker, nullptr, 0);
     return latencies;
 }
 
-// The same by two eventfds, which can be waited for among others.
+// The same with two eventfds, which can be polled together with other descriptors.
 Latencies eventfds(int rounds) {
     const SharedMemory memory = SharedMemory::create("times", 4096);
     const Mapping page = memory.map(Access::read_write);
     auto *stamps = reinterpret_cast<volatile std::int64_t *>(page.bytes().data());
-    const arhost::base::UniqueFd there(::eventfd(0, EFD_CLOEXEC)), back(::eventfd(0, EFD_CLOEXEC));
+    const arhost::base::UniqueFd forward(::eventfd(0, EFD_CLOEXEC)), back(::eventfd(0, EFD_CLOEXEC));
     const std::uint64_t one = 1;
     std::uint64_t count = 0;
     const pid_t worker = ::fork();
     if (worker == 0) {
         for (int i = 0; i < rounds; ++i) {
-            if (::read(there.get(), &count, sizeof count) < 0)
+            if (::read(forward.get(), &count, sizeof count) < 0)
                 ::_exit(1);
             stamps[1] = now_ns() - stamps[0];
             stamps[2] = now_ns();
@@ -160,10 +160,10 @@ Latencies eventfds(int rounds) {
     for (int i = 0; i < rounds; ++i) {
         ::usleep(200);
         stamps[0] = now_ns();
-        if (::write(there.get(), &one, sizeof one) < 0 || ::read(back.get(), &count, sizeof count) < 0)
+        if (::write(forward.get(), &one, sizeof one) < 0 || ::read(back.get(), &count, sizeof count) < 0)
             std::abort();
         latencies.back.push_back(now_ns() - stamps[2]);
-        latencies.there.push_back(std::int64_t(stamps[1]));
+        latencies.forward.push_back(std::int64_t(stamps[1]));
     }
     ::waitpid(worker, nullptr, 0);
     return latencies;

@@ -16,7 +16,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "tools")]
-from replays import HEIGHT, ROOT, WIDTH, frames_a_second, replay, write_trajectory  # noqa: E402
+from replays import HEIGHT, ROOT, WIDTH, frames_per_second, replay, write_trajectory  # noqa: E402
 from scene_views import MOVING_VIEW  # noqa: E402
 
 OUT = ROOT / "build/moving"
@@ -52,7 +52,7 @@ def measure(scene, trajectory, frames):
     """Frames per second, and CPU time per frame in ms without startup."""
     short, (stats, timeline, _) = (replay(scene, trajectory, count, "--set", "raytracer.options.light_samples=1") for count in (SHORT, SHORT + frames))
     cpu_s = stats["cpu_seconds"]["raytracer"] - short[0]["cpu_seconds"]["raytracer"]
-    return frames_a_second(timeline), 1e3 * cpu_s / frames
+    return frames_per_second(timeline), 1e3 * cpu_s / frames
 
 
 def main():

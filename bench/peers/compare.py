@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""compare.py FOLDER PEER CASE…: how far a peer's pictures are from ours, as JSON.
-compare.py FOLDER picture CASE… PEER…: all of them side by side, in peers.png."""
+"""compare.py FOLDER PEER CASE…: prints differences between a peer's pictures and rt_embree's as JSON.
+compare.py FOLDER picture CASE… PEER…: writes all pictures side by side to peers.png."""
 import json
 import os
 import sys
@@ -15,7 +15,7 @@ shape = (scene["height"], scene["width"], 4)
 
 
 def ours(case):
-    """Linear, over what primary rays see past the objects."""
+    """Linear, composited over the background that peers render."""
     rgba = np.fromfile(os.path.join(folder, f"ours-{case}.rgba"), np.uint8).reshape(shape) / 255
     light = np.where(rgba <= 0.04045, rgba / 12.92, ((rgba + 0.055) / 1.055) ** 2.4)[..., :3]
     alpha = rgba[..., 3:]
@@ -38,8 +38,8 @@ else:
     found = {}
     for case in names:
         a, b = ours(case), peers(what, case)
-        seen = (a[..., 3] > 0.5) & (b[..., 3] > 0.5)
+        both_hit = (a[..., 3] > 0.5) & (b[..., 3] > 0.5)
         found[case] = {"mask": float(np.abs(a[..., 3] - b[..., 3]).mean()),
-                       "our_light": float(a[seen, :3].mean()), "light": float(np.clip(b[seen, :3], 0, 1).mean()),
-                       "difference": float(np.abs(a[seen, :3] - np.clip(b[seen, :3], 0, 1)).mean())}
+                       "our_light": float(a[both_hit, :3].mean()), "light": float(np.clip(b[both_hit, :3], 0, 1).mean()),
+                       "difference": float(np.abs(a[both_hit, :3] - np.clip(b[both_hit, :3], 0, 1)).mean())}
     print(json.dumps(found))

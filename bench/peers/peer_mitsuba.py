@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3's side of tools/bench peers: peer_mitsuba.py FOLDER THREADS (served.py)."""
+"""Mitsuba 3 for tools/bench peers: peer_mitsuba.py FOLDER THREADS (served.py)."""
 import sys
 
 import drjit as dr
@@ -13,7 +13,7 @@ dr.set_thread_count(int(sys.argv[2]))
 
 
 class DirectDiffuse(mi.BSDF):
-    """Lambert, whose paths end there: arhost does not follow light from one matt surface to another."""
+    """Lambert without indirect light: rt_embree has no diffuse interreflection."""
 
     def __init__(self, properties):
         mi.BSDF.__init__(self, properties)
@@ -36,7 +36,7 @@ class DirectDiffuse(mi.BSDF):
 
 
 mi.register_bsdf("directdiffuse", DirectDiffuse)
-wanted = Scene(sys.argv[1])
+spec = Scene(sys.argv[1])
 
 
 def grey(value):
@@ -58,53 +58,53 @@ def mesh(name, positions, normals, indices, bsdf):
 
 def scene_of(case):
     surface = {
-        "diffuse": {"type": "diffuse", "reflectance": grey(wanted.bunny_grey)},
-        "mirror": {"type": "conductor", "material": "none", "specular_reflectance": grey(wanted.mirror_grey)},
-        "glass-path": {"type": "dielectric", "int_ior": wanted.glass_index, "ext_ior": 1.0,
-                       "specular_reflectance": grey(wanted.glass_grey),
-                       "specular_transmittance": grey(wanted.glass_grey)},
+        "diffuse": {"type": "diffuse", "reflectance": grey(spec.bunny_grey)},
+        "mirror": {"type": "conductor", "material": "none", "specular_reflectance": grey(spec.mirror_grey)},
+        "glass-path": {"type": "dielectric", "int_ior": spec.glass_index, "ext_ior": 1.0,
+                       "specular_reflectance": grey(spec.glass_grey),
+                       "specular_transmittance": grey(spec.glass_grey)},
     }[case]
     parts = {
         "type": "scene",
         "sensor": {
-            "type": "perspective", "fov": wanted.fov_y_degrees, "fov_axis": "y", "near_clip": 1, "far_clip": 10000,
-            "to_world": mi.ScalarTransform4f().look_at(origin=wanted.eye, target=wanted.look_at, up=[0, 1, 0]),
+            "type": "perspective", "fov": spec.fov_y_degrees, "fov_axis": "y", "near_clip": 1, "far_clip": 10000,
+            "to_world": mi.ScalarTransform4f().look_at(origin=spec.eye, target=spec.look_at, up=[0, 1, 0]),
             "sampler": {"type": "independent", "sample_count": 1},
-            "film": {"type": "hdrfilm", "width": wanted.width, "height": wanted.height, "rfilter": {"type": "box"},
+            "film": {"type": "hdrfilm", "width": spec.width, "height": spec.height, "rfilter": {"type": "box"},
                      "pixel_format": "rgb", "component_format": "float32"},
         },
-        "bunny": mesh("bunny", wanted.positions, wanted.normals, wanted.indices, surface),
+        "bunny": mesh("bunny", spec.positions, spec.normals, spec.indices, surface),
     }
     if case != "glass-path":
-        a = wanted.ground_half_side
+        a = spec.ground_half_side
         corners = np.array([[-a, 0, -a], [-a, 0, a], [a, 0, a], [a, 0, -a]], np.float32)
-        matt = {"type": "diffuse", "reflectance": grey(wanted.ground_grey)} if case == "diffuse" else \
-            {"type": "directdiffuse", "value": wanted.ground_grey}
+        matt = {"type": "diffuse", "reflectance": grey(spec.ground_grey)} if case == "diffuse" else \
+            {"type": "directdiffuse", "value": spec.ground_grey}
         parts["ground"] = mesh("ground", corners, None, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), matt)
-        # Lambert's 1/π is in arhost's intensity.
-        parts["lamp"] = {"type": "point", "position": wanted.lamp_position,
-                         "intensity": grey(wanted.lamp_intensity * np.pi)}
+        # arhost's intensity includes Lambert's 1/π.
+        parts["lamp"] = {"type": "point", "position": spec.lamp_position,
+                         "intensity": grey(spec.lamp_intensity * np.pi)}
     if case != "diffuse":
-        # Only what mirrors and glass show; the ground gets its light from the lamp.
+        # The environment is visible only in mirrors and glass; the ground is lit by the lamp.
         parts["white"] = {"type": "constant", "radiance": grey(1), "sampling_weight": 0 if "lamp" in parts else 1}
     return mi.load_dict(parts)
 
 
-# arhost's depths count bounces, Mitsuba's rays; no Russian roulette.
+# arhost's depth counts bounces, Mitsuba's counts rays; no Russian roulette.
 def path(rays):
     return {"type": "path", "max_depth": rays, "rr_depth": 10_000}
 
 
 integrators = {
-    # A ray and a shadow ray, as ours.
+    # A primary and a shadow ray, as in rt_embree.
     "diffuse": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
-    "mirror": path(wanted.mirror_depth + 1),
-    "glass-path": path(wanted.glass_depth + 1),
+    "mirror": path(spec.mirror_depth + 1),
+    "glass-path": path(spec.glass_depth + 1),
 }
 scenes, frames = {}, {}
 
 
-def scene(case):
+def cached_scene(case):
     if case not in scenes:
         scenes[case] = scene_of(case)
     return scenes[case]
@@ -113,28 +113,28 @@ def scene(case):
 def render(case, seed):
     if case not in frames:
         integrator = mi.load_dict(integrators[case])
-        # Records the kernel once: without, Python traces it anew each frame.
-        frames[case] = dr.freeze(lambda seen, number: mi.render(seen, integrator=integrator, spp=1, seed=number))
-    np.array(frames[case](scene(case), mi.UInt32(seed)))
+        # Record the kernel once; otherwise Python traces it again each frame.
+        frames[case] = dr.freeze(lambda scene, number: mi.render(scene, integrator=integrator, spp=1, seed=number))
+    np.array(frames[case](cached_scene(case), mi.UInt32(seed)))
 
 
 def image(case, samples):
-    seen = scene(case)
-    light = np.array(mi.render(seen, integrator=mi.load_dict(integrators[case]), spp=samples, seed=0))
-    # What primary rays hit, in the middle of each pixel as ours.
-    sensor = seen.sensors()[0]
-    number = np.arange(wanted.width * wanted.height)
-    middle = mi.Point2f((number % wanted.width + 0.5) / wanted.width, (number // wanted.width + 0.5) / wanted.height)
-    rays, _ = sensor.sample_ray(0, 0.5, middle, mi.Point2f(0.5))
-    alpha = np.array(seen.ray_test(rays)).reshape(wanted.height, wanted.width, 1)
+    scene = cached_scene(case)
+    light = np.array(mi.render(scene, integrator=mi.load_dict(integrators[case]), spp=samples, seed=0))
+    # Primary hits at pixel centres, as in rt_embree.
+    sensor = scene.sensors()[0]
+    number = np.arange(spec.width * spec.height)
+    centres = mi.Point2f((number % spec.width + 0.5) / spec.width, (number // spec.width + 0.5) / spec.height)
+    rays, _ = sensor.sample_ray(0, 0.5, centres, mi.Point2f(0.5))
+    alpha = np.array(scene.ray_test(rays)).reshape(spec.height, spec.width, 1)
     return np.concatenate([light, alpha], 2)
 
 
 def rays(case):
-    """Of white glass, a path of at most k rays has brought light if it got out with them: the share of pixels
-    without is that of the paths that trace ray k + 1."""
-    seen = scene(case)
-    values = mi.traverse(seen)
+    """With lossless glass in white surroundings, a path limited to k rays is black unless it has left the glass, so the
+    fraction of black pixels is the fraction of paths that trace ray k + 1."""
+    scene = cached_scene(case)
+    values = mi.traverse(scene)
     keys = [key for key in values.keys() if "specular_" in key and key.endswith("value")]
 
     def colour(value):
@@ -144,11 +144,11 @@ def rays(case):
 
     colour(1)
     count = 1.0
-    for k in range(1, wanted.glass_depth + 1):
-        picture = np.array(mi.render(seen, integrator=mi.load_dict(path(k)), spp=1, seed=k))
+    for k in range(1, spec.glass_depth + 1):
+        picture = np.array(mi.render(scene, integrator=mi.load_dict(path(k)), spp=1, seed=k))
         count += (picture[..., 0] == 0).mean()
-    colour(wanted.glass_grey)
-    return float(count * wanted.width * wanted.height)
+    colour(spec.glass_grey)
+    return float(count * spec.width * spec.height)
 
 
 serve(sys.argv[1],

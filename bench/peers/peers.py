@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""rt_embree beside Mitsuba 3 (llvm) and Blender Cycles: `tools/bench peers [--quick]`. What is measured and
-how: bench/peers/README.md.
+"""Compares rt_embree with Mitsuba 3 (llvm) and Blender Cycles: `tools/bench peers [--quick]`. Method:
+bench/peers/README.md.
 
-Leaves build/peers/peers.json (all numbers) and build/peers/peers.png (the pictures side by side). Exits
-with 1 where the pictures show that the scenes are not the same; a target that is missed is only said."""
+Writes build/peers/peers.json (all numbers) and build/peers/peers.png (the pictures side by side). Exits with 1 if the
+pictures show that the scenes differ; missed targets are only reported."""
 import glob
 import importlib.metadata
 import json
@@ -24,24 +24,24 @@ binaries = os.path.join(root, "build", "release", "bin")
 venv_python = os.path.join(venv, "bin", "python")
 
 threads = 2
-# With Python 3.11, Debian 12's; numpy as bpy wants it.
+# For Python 3.11 (Debian 12); bpy determines the numpy version.
 packages = {"mitsuba": "3.9.1", "bpy": "5.0.1", "pillow": "11.3.0"}
 llvm_package = "libllvm19"
 cases = ["diffuse", "mirror", "glass-path"]
 ours_alone = "glass-tree"
-# How many times as fast as the peer (issue "peers").
+# Required speed relative to the peer.
 targets = {"mitsuba": {"diffuse": 3, "mirror": 3, "glass-path": 2, "glass-tree": 2},
            "cycles": {"diffuse": 8, "mirror": 8, "glass-path": 4, "glass-tree": 2}}
 largest_mask_difference = 0.005
 
 
 def install():
-    """The peers into build/peers-venv, and LLVM where there is none that Mitsuba can load."""
+    """Installs the peers into build/peers-venv, and LLVM if Mitsuba finds none."""
     if not glob.glob("/usr/lib/*/libLLVM*.so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*"):
-        print(f"To be installed by apt-get, for Mitsuba: {llvm_package}", flush=True)
+        print(f"Installing for Mitsuba with apt-get: {llvm_package}", flush=True)
         as_root = [] if os.geteuid() == 0 else ["sudo"] if shutil.which("sudo") else None
         if as_root is None:
-            print(f"Neither root nor sudo: without {llvm_package} Mitsuba is left out.")
+            print(f"Neither root nor sudo available: Mitsuba is skipped, as it needs {llvm_package}.")
         else:
             subprocess.run([*as_root, "apt-get", "update", "-q"], check=False)
             subprocess.run([*as_root, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-q", "-y",
@@ -51,21 +51,21 @@ def install():
                    if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
                                               stderr=subprocess.DEVNULL, check=False).returncode == 0]
         if not fitting:
-            raise SystemExit("peers: they need Python 3.11 with venv (Debian 12: python3-venv)")
+            raise SystemExit("peers: Python 3.11 with venv is required (Debian 12: python3-venv)")
         subprocess.run([fitting[0], "-m", "venv", venv], check=True)
     for name, version in packages.items():
         there = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
                                capture_output=True, text=True, check=False).stdout.strip()
         if there == version:
             continue
-        print(f"To be installed by pip into {os.path.relpath(venv, root)}: {name} {version}", flush=True)
+        print(f"Installing with pip into {os.path.relpath(venv, root)}: {name} {version}", flush=True)
         if subprocess.run([venv_python, "-m", "pip", "install", "-q", "--disable-pip-version-check",
                            f"{name}=={version}"], check=False).returncode:
-            print(f"  pip could not: it is left out.")
+            print(f"  pip failed: {name} is skipped.")
 
 
 class Renderer:
-    """A renderer that answers lines (served.py, rt_embree_peers.cpp). Its own words go to a log."""
+    """A renderer process that answers request lines (served.py, rt_embree_peers.cpp). Its stderr goes to a log."""
 
     def __init__(self, command, log):
         with open(os.path.join(folder, log), "w", encoding="utf-8") as file:
@@ -95,7 +95,7 @@ def cpu_model():
 
 
 def measure(renderers, rounds, frames):
-    """Times by renderer and case. They take turns, so that each has its share of what else the machine does."""
+    """Times by renderer and case. Renderers take turns, so that other load affects all of them."""
     times = {name: {case: {"wall_ms": [], "cpu_ms": [], "own_ms": []} for case in cases} for name in renderers}
     times["ours"][ours_alone] = {"wall_ms": [], "cpu_ms": [], "own_ms": []}
     for _ in range(rounds):
@@ -112,13 +112,13 @@ def measure(renderers, rounds, frames):
 def main():
     quick = "--quick" in sys.argv[1:]
     if not os.path.exists(os.path.join(binaries, "rt-embree-peers")):
-        raise SystemExit("peers: build/release/bin/rt-embree-peers is not there: build it with tools/test")
+        raise SystemExit("peers: build/release/bin/rt-embree-peers is missing: build it with tools/test")
     os.makedirs(folder, exist_ok=True)
     install()
 
     available = sorted(os.sched_getaffinity(0))
     if len(available) > threads:
-        os.sched_setaffinity(0, available[:threads])  # and all that are started from here
+        os.sched_setaffinity(0, available[:threads])  # inherited by the renderers
     renderers = {"ours": Renderer([os.path.join(binaries, "rt-embree-peers"), folder, str(threads)], "ours.log")}
     counter = Renderer([os.path.join(binaries, "rt-embree-peers-rays"), folder, str(threads)], "rays.log")
     for name in ("mitsuba", "cycles"):
@@ -126,7 +126,7 @@ def main():
             renderers[name] = Renderer([venv_python, os.path.join(here, f"peer_{name}.py"), folder, str(threads)],
                                        f"{name}.log")
         except RuntimeError as error:
-            print(f"{name} is left out: {error}")
+            print(f"{name} is skipped: {error}")
     with open(os.path.join(folder, "scene.json"), encoding="utf-8") as file:
         scene = json.load(file)
 
@@ -154,11 +154,11 @@ def main():
                     *(name for name in renderers if name != "ours")], check=True)
 
     print(f"peers: {scene['mesh']} of {scene['triangles']} triangles, {scene['width']}x{scene['height']}, 1 sample, "
-          f"{threads} threads, p50 of {rounds * frames} frames{' (a smoke test, no measurement)' if quick else ''}")
+          f"{threads} threads, p50 of {rounds * frames} frames{' (smoke test, not a measurement)' if quick else ''}")
     print(f"  {cpu_model()}, {len(available)} processors, load {load:.1f}")
     for name, renderer in renderers.items():
         print(f"  {renderer.about['name']}: {renderer.about['version']}")
-    middle = {name: {case: {key: statistics.median(values) for key, values in got.items() if values}
+    medians = {name: {case: {key: statistics.median(values) for key, values in got.items() if values}
                      for case, got in by_case.items()} for name, by_case in times.items()}
     results = []
     print(f"  {'case':11} {'peer':8} {'peer ms':>8} {'ours ms':>8} {'ratio':>6} {'of CPU time':>11}   target")
@@ -166,7 +166,7 @@ def main():
         if name == "ours":
             continue
         for case in cases:
-            peer, ours = middle[name][case], middle["ours"][case]
+            peer, ours = medians[name][case], medians["ours"][case]
             wall, cpu = peer["wall_ms"] / ours["wall_ms"], peer["cpu_ms"] / ours["cpu_ms"]
             own = peer["own_ms"] / ours["wall_ms"] if "own_ms" in peer else None
             target = targets[name][case]
@@ -176,10 +176,10 @@ def main():
             print(f"  {case:11} {name:8} {peer['wall_ms']:8.1f} {ours['wall_ms']:8.1f} {wall:6.2f} {cpu:11.2f}   "
                   f"{target}: {'met' if met else 'MISSED'}"
                   + (f"   (without its synchronisation {peer['own_ms']:.1f} ms: {own:.2f})" if own else ""))
-    print("  glass, million rays a second of CPU time (and of wall time)")
+    print("  glass, million rays per second of CPU time (and of wall time)")
     rates = {}
     for name, case in [("ours", "glass-path"), ("ours", ours_alone), *((n, "glass-path") for n in rays if n != "ours")]:
-        cpu, wall = (rays[name][case] / middle[name][case][key] / 1e3 for key in ("cpu_ms", "wall_ms"))
+        cpu, wall = (rays[name][case] / medians[name][case][key] / 1e3 for key in ("cpu_ms", "wall_ms"))
         rates[f"{name} {case}"] = {"rays": rays[name][case], "cpu": cpu, "wall": wall}
         print(f"    {name:8} {case:11} {rays[name][case]:10.0f} rays {cpu:7.2f} ({wall:.2f})")
     for name in rays:
@@ -189,7 +189,7 @@ def main():
         met = min(ratio.values()) >= targets[name][ours_alone]
         results.append({"case": ours_alone, "peer": name, "ratio_wall": ratio["wall"], "ratio_cpu": ratio["cpu"],
                         "target": targets[name][ours_alone], "met": met})
-        print(f"    our tree to {name}: {ratio['wall']:.2f}, of CPU time {ratio['cpu']:.2f}   "
+        print(f"    ray tree relative to {name}: {ratio['wall']:.2f}, of CPU time {ratio['cpu']:.2f}   "
               f"{targets[name][ours_alone]}: {'met' if met else 'MISSED'}")
     same = True
     for name, by_case in differences.items():
@@ -201,11 +201,11 @@ def main():
         json.dump({"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "quick": quick, "cpu": cpu_model(),
                    "processors": len(available), "load": load, "threads": threads, "scene": scene,
                    "versions": {name: renderer.about for name, renderer in renderers.items()},
-                   "median": middle, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
+                   "median": medians, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
                    "results": results}, file, indent=1)
-    print(f"  all numbers: build/peers/peers.json; pictures: build/peers/peers.png")
+    print("  all numbers: build/peers/peers.json; pictures: build/peers/peers.png")
     if not same:
-        raise SystemExit("peers: the masks differ by more than 0.5 %: these are not the same scenes")
+        raise SystemExit("peers: the masks differ by more than 0.5 %: the scenes are not the same")
 
 
 main()

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Our side of tools/bench peers: `rt-embree-peers FOLDER THREADS` leaves the scene in FOLDER as the peers
-// shall load it (scene.json, and the mesh as raw numbers), then answers each line "CASE FRAMES" of its input
-// with the times of that many frames, as a line of JSON. Each case's last image is left in FOLDER as
-// ours-CASE.rgba. Built with COUNT_RAYS it tells how many rays a frame takes as well, and its times are void.
+// rt_embree for tools/bench peers: `rt-embree-peers FOLDER THREADS` writes the scene to FOLDER for the peers
+// (scene.json, and the mesh as raw numbers), then answers each input line "CASE FRAMES" with the times of that many
+// frames as a line of JSON, and writes the last image to FOLDER/ours-CASE.rgba. Built with COUNT_RAYS, it also
+// reports rays per frame; its times are then meaningless.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -31,7 +31,7 @@ std::atomic<std::uint64_t> rays_traced{0};
 }
 
 #ifdef COUNT_RAYS
-// The linker sends the kernel's calls of Embree through here (CMakeLists.txt).
+// The linker redirects the kernel's Embree calls to these wrappers (CMakeLists.txt).
 namespace {
 void count(const int *valid, int width) {
     std::uint64_t active = 0;
@@ -73,7 +73,7 @@ constexpr float eye[3] = {0, 50, 170}, look_at[3] = {0, 50, 0};
 constexpr float lamp_position[3] = {80, 200, 150}, lamp_intensity = 40'000; // over d², d in mm
 constexpr float ground_half_side = 200;                                     // mm, at y = 0
 constexpr float bunny_grey = 0.6f, ground_grey = 0.5f, mirror_grey = 0.9f;
-// A little is lost at each bounce, so that the picture shows how long its paths are.
+// Each bounce loses a little light, so that different path lengths are visible in the picture.
 constexpr float glass_grey = 0.95f, glass_index = 1.5f;
 constexpr std::uint32_t mirror_depth = 8, glass_depth = 20; // bounces
 
@@ -115,11 +115,10 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
         material = grey(ARHOST_MATERIAL_GLASS, glass_grey);
         material.index = glass_index;
         material.fresnel_minimum = std::pow((glass_index - 1) / (glass_index + 1), 2.0f);
-        // What is not followed: nothing but what the depth limits ("path", as the peers do), the customary
-        // share of a hundredth ("tree").
+        // "path": limited by depth only, as in the peers; "tree": the customary cutoff of a hundredth.
         material.importance_cutoff = name == "glass-tree" ? 0.01f : 0;
         builder.settings.max_depth = glass_depth;
-        made.settings.one_path = name == "glass-path";
+        made.settings.single_path = name == "glass-path";
     } else if (name != "diffuse") {
         throw std::runtime_error("unknown case: " + name);
     }
@@ -182,7 +181,7 @@ void write(const std::filesystem::path &file, const void *bytes, std::size_t cou
     std::ofstream out(file, std::ios::binary);
     out.write(static_cast<const char *>(bytes), static_cast<std::streamsize>(count));
     if (!out.flush())
-        throw std::runtime_error("can't write " + file.string());
+        throw std::runtime_error("cannot write " + file.string());
 }
 
 void write_scene(const std::filesystem::path &folder, const TriangleMesh &mesh, const std::string &name) {
@@ -217,7 +216,7 @@ void serve(const std::filesystem::path &folder, unsigned threads) {
         std::unique_ptr<Trial> &trial = trials[name];
         if (!trial)
             trial = std::make_unique<Trial>(make_case(name, mesh, threads));
-        trial->render(); // what others did to the caches since is not ours
+        trial->render(); // warm the caches
         std::string wall, cpu;
         const std::uint64_t rays = rays_traced;
         for (int i = 0; i < frames; ++i) {

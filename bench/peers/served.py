@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the peers have in common: the scene that rt-embree-peers left, and the loop that answers its caller."""
+"""Shared by the peers: the scene written by rt-embree-peers, and the request loop."""
 import json
 import os
 import sys
@@ -22,12 +22,12 @@ class Scene:
 
 
 def serve(folder, hello, render, image, rays, own_ms=None):
-    """Answers lines of the input with a line of JSON each.
+    """Answers each input line with a line of JSON.
 
-    "CASE FRAMES": times of that many frames, render(case, seed); own_ms(case, seed), of one.
-    "image CASE": leaves image(case, samples), linear RGBA, in FOLDER as NAME-CASE.f32.
-    "rays CASE": rays(case), of a frame."""
-    # What the peer prints is not an answer.
+    "CASE FRAMES": times of that many calls of render(case, seed), and own_ms(case, seed).
+    "image CASE": writes image(case, samples), linear RGBA, to FOLDER/NAME-CASE.f32.
+    "rays CASE": rays(case), the rays per frame."""
+    # Redirect the peer's own output to stderr.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
@@ -44,7 +44,7 @@ def serve(folder, hello, render, image, rays, own_ms=None):
         elif first == "rays":
             answer({"rays": rays(second)})
         else:
-            for _ in range(3):  # compiles the kernels, builds what is built once
+            for _ in range(3):  # warm-up: compiles kernels, builds acceleration structures
                 seed += 1
                 render(first, seed)
             wall, cpu = [], []

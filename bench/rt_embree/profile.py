@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Where the time of rt_embree's frames goes: profile.py [PROGRAM]
+"""CPU profile of rt_embree by part of the renderer: profile.py [PROGRAM]
 
-Runs rt-embree-bench, or PROGRAM (one of an older version, say), under Linux' perf, one case after the other, and adds
-up the samples by part of the renderer (half a minute). Shares hardly depend on what else the machine does."""
+Runs each case of rt-embree-bench, or of PROGRAM (e.g. an older version), under Linux perf and sums up the samples by
+part (half a minute). The fractions hardly depend on other load."""
 import collections
 import pathlib
 import re
@@ -14,9 +14,9 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CASES = ["primary", "diffuse", "mirror", "glass"]
-# The first that matches counts. Most of the kernel is inlined into these functions of its own.
-PARTS = [("inside Embree", r"libembree"), ("what was hit, textures", r"surface_at"),
-         ("lamps and shadow rays", r"direct_light|caught_shadow"), ("materials", r"shade"),
+# The first match counts. Most of the kernel is inlined into these functions.
+PARTS = [("inside Embree", r"libembree"), ("hit surfaces, textures", r"surface_at"),
+         ("lamps and shadow rays", r"direct_light|catcher_shadow"), ("materials", r"shade"),
          ("rays, queues, pixels", r"render_tile"), ("threads, clearing, start", r"")]
 
 
@@ -38,9 +38,9 @@ def profile(program, case):
 def main():
     program = next((word for word in sys.argv[1:] if word != "--quick"), ROOT / "build/release/bin/rt-embree-bench")
     if not shutil.which("perf"):
-        raise SystemExit("perf isn't installed: apt-get install linux-perf")
+        raise SystemExit("perf is not installed: apt-get install linux-perf")
     rows = {case: profile(program, case) for case in CASES}
-    print("rt_embree, the bunny of 69,451 triangles, 800x600, 1 sample: shares of a run's CPU time, %")
+    print("rt_embree, the bunny of 69,451 triangles, 800x600, 1 sample: share of CPU time, %")
     print(f"  {'':26}" + "".join(f"{case:>10}" for case in CASES))
     for name, _ in PARTS:
         print(f"  {name:26}" + "".join(f"{rows[case][name]:10.1f}" for case in CASES))

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From which decay on a tree that is only refitted costs rays more than building it anew does: for meshes that are
-// bent further and further, TreeQuality's measure beside the time of the rays through the refitted and through a
-// new tree. `rt-embree-refit`
+// Determines the degradation at which rebuilding a BVH pays off: for increasingly deformed meshes, prints
+// BvhQuality's measure and the trace times through the refitted and through a rebuilt BVH. `rt-embree-refit`
 #include "bunny.hpp"
 #include "embree_scene.hpp"
 
@@ -33,13 +32,13 @@ double median_of(int runs, const std::function<void()> &work) {
     return times[static_cast<std::size_t>(runs / 2)];
 }
 
-class Tree {
+class Bvh {
 public:
-    Tree(RTCDevice device, std::vector<glm::vec3> &positions, const TriangleMesh &mesh)
+    Bvh(RTCDevice device, std::vector<glm::vec3> &positions, const TriangleMesh &mesh)
         : scene_(rtcNewScene(device)), geometry_(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE)) {
         rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_DYNAMIC);
         rtcSetSceneBuildQuality(scene_.get(),
-                                RTC_BUILD_QUALITY_LOW); // a tree for each geometry: only so can one be refitted
+                                RTC_BUILD_QUALITY_LOW); // a BVH per geometry, which can be refitted
         rtcSetSharedGeometryBuffer(geometry_.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions.data(), 0,
                                    sizeof(glm::vec3), positions.size());
         rtcSetSharedGeometryBuffer(geometry_.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(),
@@ -55,7 +54,7 @@ public:
         rtcCommitGeometry(geometry_.get());
         rtcCommitScene(scene_.get());
     }
-    // As many rays as a frame of 640×480 has, towards the mesh from 200 mm away, in packets.
+    // The primary rays of a 640×480 frame from 200 mm away, in packets.
     void trace() const {
         alignas(64) int valid[16];
         std::fill_n(valid, 16, -1);
@@ -86,33 +85,33 @@ private:
 };
 
 void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<float> amounts,
-             const std::function<glm::vec3(glm::vec3, glm::vec3 noise, float amount)> &bend) {
+             const std::function<glm::vec3(glm::vec3, glm::vec3 noise, float amount)> &deform) {
     const rt_embree::DeviceHandle device(rtcNewDevice("threads=2,set_affinity=0"));
     std::vector<glm::vec3> positions = mesh.positions;
-    positions.reserve(positions.size() + 2); // Embree reads past the last
+    positions.reserve(positions.size() + 2); // Embree reads past the last vertex
     const rt_embree::MeshView view{reinterpret_cast<const std::byte *>(positions.data()),
                                    reinterpret_cast<const std::byte *>(mesh.triangles.data()), sizeof(glm::vec3),
                                    sizeof mesh.triangles[0], static_cast<std::uint32_t>(mesh.triangles.size())};
-    Tree refitted(device.get(), positions, mesh), rebuilt(device.get(), positions, mesh);
-    rt_embree::TreeQuality quality;
-    quality.built(view);
+    Bvh refitted(device.get(), positions, mesh), rebuilt(device.get(), positions, mesh);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view);
     std::printf("%s, %zu triangles\n%8s %8s %10s %10s %10s %12s %12s %16s\n", name, mesh.triangles.size(), "amount",
-                "decay", "told in ms", "refit ms", "build ms", "rays: refit", "rays: new", "building pays in");
+                "degr.", "measure ms", "refit ms", "build ms", "rays: refit", "rays: new", "rebuild pays in");
     for (const float amount : amounts) {
         std::minstd_rand random(1);
         std::uniform_real_distribution<float> unit(-1, 1);
         for (std::size_t i = 0; i < positions.size(); ++i) {
             const glm::vec3 noise(unit(random), unit(random), unit(random));
-            positions[i] = bend(mesh.positions[i], noise, amount);
+            positions[i] = deform(mesh.positions[i], noise, amount);
         }
         const double refit = ms_of([&] { refitted.update(RTC_BUILD_QUALITY_REFIT); });
         const double build = ms_of([&] { rebuilt.update(RTC_BUILD_QUALITY_MEDIUM); });
         const double old_rays = median_of(5, [&] { refitted.trace(); }),
                      new_rays = median_of(5, [&] { rebuilt.trace(); });
-        double decay = 0;
-        const double telling = ms_of([&] { decay = quality.decay(view); });
-        std::printf("%8.2f %8.2f %10.2f %10.2f %10.2f %12.2f %12.2f ", static_cast<double>(amount), decay, telling,
-                    refit, build, old_rays, new_rays);
+        double degradation = 0;
+        const double measuring = ms_of([&] { degradation = quality.degradation(view); });
+        std::printf("%8.2f %8.2f %10.2f %10.2f %10.2f %12.2f %12.2f ", static_cast<double>(amount), degradation,
+                    measuring, refit, build, old_rays, new_rays);
         if (old_rays > new_rays)
             std::printf("%9.1f frames\n", (build - refit) / (old_rays - new_rays));
         else
@@ -124,14 +123,14 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
 
 int main() {
     TriangleMesh ball = arhost::bench::dented_ball(100'000);
-    measure("a ball that crumples", ball, {0, 0.2f, 0.5f, 1, 2, 4, 8, 16},
+    measure("random displacement of a ball", ball, {0, 0.2f, 0.5f, 1, 2, 4, 8, 16},
             [](glm::vec3 p, glm::vec3 noise, float amount) { return p + noise * amount; });
-    measure("a ball that is wrung", ball, {0, 0.5f, 1, 2, 4, 8, 16}, [](glm::vec3 p, glm::vec3, float amount) {
+    measure("twist of a ball", ball, {0, 0.5f, 1, 2, 4, 8, 16}, [](glm::vec3 p, glm::vec3, float amount) {
         const float angle = amount * p.y / 50;
         return glm::vec3(p.x * std::cos(angle) - p.z * std::sin(angle), p.y,
                          p.x * std::sin(angle) + p.z * std::cos(angle));
     });
-    measure("a ball that bursts", ball, {0, 0.1f, 0.25f, 0.5f, 1, 2}, [](glm::vec3 p, glm::vec3, float amount) {
+    measure("explosion of a ball", ball, {0, 0.1f, 0.25f, 0.5f, 1, 2}, [](glm::vec3 p, glm::vec3, float amount) {
         return p + glm::vec3(std::sin(p.y), std::sin(p.z), std::sin(p.x)) * (20 * amount); // strips fly apart
     });
 }

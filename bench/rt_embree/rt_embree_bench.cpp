@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How long the Embree ray tracer takes for an image, and how much of what Embree could do at best is
-// left: `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass]]]`.
+// Frame times of rt_embree, compared with bare Embree calls for the same primary rays:
+// `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass]]]`.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -42,7 +42,7 @@ Arena scene_of(const TriangleMesh &mesh, const arhost_material &material, bool l
     return std::move(builder).build();
 }
 
-// Medians over the frames. `cpu_ms` is of all threads together: other programs' load disturbs it less.
+// Medians over the frames. `cpu_ms`: all threads together; less sensitive to other load.
 struct Timing {
     double ms, cpu_ms;
 };
@@ -114,8 +114,8 @@ private:
     rt_embree::Renderer renderer_;
 };
 
-// Nothing but rtcIntersect16, or in packets of the width that the processor has, over rays that lie ready in
-// memory, in the same blocks, tiles and threads.
+// Only rtcIntersect16, or packets of the processor's native width, on precomputed rays in the same blocks, tiles and
+// threads.
 Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settings, bool native_width) {
     const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
     rt_embree::ThreadPool threads(settings.threads);
@@ -131,9 +131,9 @@ Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settin
             for (int x = tile.pixels.x0; x < tile.pixels.x1; x += 4) {
                 Directions d;
                 for (int i = 0; i < 16; ++i) {
-                    const auto seen =
+                    const auto direction =
                         table.direction(std::min<int>(x + i % 4, width - 1), std::min<int>(y + i / 4, height - 1));
-                    d.x[i] = seen.x, d.y[i] = -seen.y, d.z[i] = -1;
+                    d.x[i] = direction.x, d.y[i] = -direction.y, d.z[i] = -1;
                 }
                 directions.push_back(d);
             }
@@ -186,24 +186,24 @@ int main(int argc, char **argv) {
     flat.normals.clear();
     const std::string only = argc > 3 ? argv[3] : "";
     if (!only.empty() && only != "primary" && only != "diffuse" && only != "mirror" && only != "glass") {
-        std::fprintf(stderr, "rt-embree-bench: there is no case '%s'; there are primary, diffuse, mirror, glass\n",
+        std::fprintf(stderr, "rt-embree-bench: unknown case '%s'; use primary, diffuse, mirror or glass\n",
                      only.c_str());
         return 2;
     }
-    const auto wanted = [&](const char *name) { return only.empty() || only == name; };
+    const auto selected = [&](const char *name) { return only.empty() || only == name; };
 
-    if (wanted("primary")) {
+    if (selected("primary")) {
         const Arena unlit = scene_of(flat, diffuse, false);
         Trial visibility(unlit, settings);
         const Timing visible = visibility.time();
-        std::printf("%s of %zu triangles, %ux%u px, 1 sample, %u threads, %s; it covers %.0f %% of the image; "
+        std::printf("%s of %zu triangles, %ux%u px, 1 sample, %u threads, %s; covers %.0f %% of the image; "
                     "p50 of %d frames\n",
                     name, mesh.triangles.size(), width, height, visibility.renderer().thread_count(),
                     visibility.renderer().kernel_name(), 100 * visibility.covered(), rounds);
         report("primary visibility", visible);
         const auto compare = [&](const char *what, const Timing &bare) {
             report(what, bare);
-            std::printf("%-28s %7.1f %%    %7.1f %%\n", "primary's speed to that", 100 * bare.ms / visible.ms,
+            std::printf("%-28s %7.1f %%    %7.1f %%\n", "primary's relative speed", 100 * bare.ms / visible.ms,
                         100 * bare.cpu_ms / visible.cpu_ms);
         };
         if (only.empty()) {
@@ -212,12 +212,12 @@ int main(int argc, char **argv) {
         }
     }
     const auto time = [&](const char *key, const char *what, const arhost_material &material) {
-        if (!wanted(key))
+        if (!selected(key))
             return;
         const Arena arena = scene_of(mesh, material, true);
         report(what, Trial(arena, settings).time());
     };
     time("diffuse", "diffuse and shadows", diffuse);
     time("mirror", "mirror, up to 10 bounces", mirror);
-    time("glass", "glass, the tree to depth 10", make_material(ARHOST_MATERIAL_GLASS));
+    time("glass", "glass, ray tree to depth 10", make_material(ARHOST_MATERIAL_GLASS));
 }

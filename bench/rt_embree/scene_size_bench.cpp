@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a scene's size costs: from an arena to the first frame beside a bare rtcCommitScene of the same buffers,
-// memory beside Embree's own and the arena, and the time of a frame by triangles and pixels.
+// Cost by scene size: time from an arena to the first frame compared with a bare rtcCommitScene of the same buffers,
+// memory compared with Embree's own plus the arena, and frame times by triangles and pixels.
 //
 //   rt-embree-scene-size [MESH…]     without meshes: dented balls of 5k to 10M triangles
 //
-// Ends with 1 where a given mesh takes more than 1.15 times the bare commit, or 1.3 times the bare memory.
+// Exits with 1 if a given mesh takes more than 1.15 times the bare commit or 1.3 times the bare memory.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -51,7 +51,7 @@ double resident_mb() {
     return 0;
 }
 
-// What a process of its own found: a machine that has just built a tree of 10M triangles is another one.
+// Measures in a separate process: having built a BVH of 10M triangles affects later measurements.
 template <class Result> Result in_a_process(const std::function<Result()> &measure) {
     int ends[2];
     if (::pipe(ends) != 0)
@@ -68,7 +68,7 @@ template <class Result> Result in_a_process(const std::function<Result()> &measu
     ::close(ends[0]);
     ::waitpid(child, nullptr, 0);
     if (!whole) {
-        std::fprintf(stderr, "a measurement died: too little memory?\n");
+        std::fprintf(stderr, "a measurement process died: not enough memory?\n");
         std::exit(1);
     }
     return result;
@@ -87,7 +87,7 @@ Arena scene_of(TriangleMesh mesh) {
     return std::move(builder).build();
 }
 
-// 100 mm across, about the origin: the same part of the image, whatever the mesh.
+// 100 mm across and centred, so that all meshes cover a similar part of the image.
 void normalise(TriangleMesh &mesh) {
     glm::vec3 low = mesh.positions[0], high = low;
     for (const glm::vec3 &p : mesh.positions) {
@@ -104,7 +104,7 @@ struct Bare {
     double commit_ms, mb;
 };
 
-// Nothing but Embree, on the arena's buffers, with the flags and quality that rt_embree asks for.
+// Only Embree, on the arena's buffers, with rt_embree's flags and build quality.
 Bare commit_bare(const Arena &arena) {
     const auto *bytes = reinterpret_cast<const std::byte *>(&arena.scene());
     const auto *geometry = reinterpret_cast<const arhost_geometry *>(bytes + arena.scene().geometries.offset);
@@ -112,11 +112,11 @@ Bare commit_bare(const Arena &arena) {
     const RTCScene scene = rtcNewScene(device);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
     const RTCGeometry triangles = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
+    const auto set_buffer = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
         rtcSetSharedGeometryBuffer(triangles, type, 0, format, bytes, buffer.offset, buffer.stride, buffer.count);
     };
-    share(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, geometry->positions);
-    share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, geometry->indices);
+    set_buffer(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, geometry->positions);
+    set_buffer(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, geometry->indices);
     rtcCommitGeometry(triangles);
     rtcAttachGeometry(scene, triangles);
     const auto start = Clock::now();
@@ -153,7 +153,7 @@ Ours trace(const Arena &arena) {
     rt_embree::Settings settings;
     settings.threads = threads;
     Ours ours{};
-    // 800×600 first: its start is the one that is timed.
+    // 800×600 first: its start-up is timed.
     for (const std::size_t i : {std::size_t{1}, std::size_t{0}, std::size_t{2}}) {
         const arhost_camera camera = camera_of(sizes[i]);
         const auto [width, height] = sizes[i];
@@ -186,7 +186,7 @@ bool measure(const std::string &name, TriangleMesh mesh) {
     if (mesh.normals.empty())
         mesh.normals = smooth_normals(mesh);
     const Arena arena = scene_of(std::move(mesh));
-    // In turns, the best of each: what disturbs makes both slower.
+    // Alternating, best of each: other load only slows them down.
     std::optional<Bare> bare;
     std::optional<Ours> ours;
     for (int i = 0; i < repetitions; ++i) {
@@ -208,8 +208,8 @@ bool measure(const std::string &name, TriangleMesh mesh) {
 
 int main(int argc, char **argv) try {
     std::printf(
-        "best of %d, %d threads; frames: diffuse, one light with shadows, 1 sample; MB resident, the arena among "
-        "them\n%-18s %9s %9s %9s %7s %8s %8s %7s %8s %8s %8s\n",
+        "best of %d, %d threads; frames: diffuse, one light with shadows, 1 sample; MB resident, including the "
+        "arena\n%-18s %9s %9s %9s %7s %8s %8s %7s %8s %8s %8s\n",
         repetitions, threads, "mesh", "triangles", "commit ms", "1st fr.ms", "ratio", "bare MB", "ours MB", "ratio",
         "400x300", "800x600", "1600x1200");
     bool met = true;

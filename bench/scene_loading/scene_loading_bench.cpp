@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How long a mesh takes from its file to a checked arena, beside the bound that no loader of a .gz can
-// beat: reading it and unpacking it with zlib into memory of the right size; and beside a bare parser, which
-// also turns the text's numbers into floats and integers and trusts it blindly. Ends with 1 where loading and
-// the arena take more than 1.5 times the bare parser's time.
+// Time from a mesh file to a validated arena, compared with the lower bound for a .gz file (reading and decompressing
+// it with zlib into a buffer of the right size) and with a minimal parser, which also converts the numbers but checks
+// nothing. Exits with 1 if loading and the arena take more than 1.5 times the minimal parser's time.
 //
 //   scene-loading-bench dragon_vrip.ply.gz [runs]
 #include "scene/arena.hpp"
@@ -29,7 +28,7 @@ namespace {
 
 using namespace arhost::scene;
 
-// The best and the median of its runs, in ms.
+// Run times in ms; prints the best and the median.
 struct Times {
     const char *what;
     std::vector<double> ms;
@@ -45,16 +44,17 @@ struct Times {
     }
 };
 
-// The unpacked size, or the file's where it isn't packed. `out` is as large already from the second run on.
+// Returns the decompressed size, or the file size if not compressed. `out` already has the right size from the second
+// run on.
 std::size_t read_and_unzip(const char *path, std::vector<char> &out) {
     std::ifstream stream(path, std::ios::binary | std::ios::ate);
     std::vector<char> packed(static_cast<std::size_t>(stream.tellg()));
     stream.seekg(0).read(packed.data(), static_cast<std::streamsize>(packed.size()));
     if (!stream || packed.size() < 18 || packed[0] != '\x1f' || packed[1] != '\x8b')
         return packed.size();
-    unsigned char told[4];
-    std::memcpy(told, packed.data() + packed.size() - 4, 4);
-    out.resize(told[0] | told[1] << 8 | told[2] << 16 | std::size_t(told[3]) << 24);
+    unsigned char size[4];
+    std::memcpy(size, packed.data() + packed.size() - 4, 4);
+    out.resize(size[0] | size[1] << 8 | size[2] << 16 | std::size_t(size[3]) << 24);
     z_stream unzip{};
     unzip.next_in = reinterpret_cast<Bytef *>(packed.data());
     unzip.avail_in = static_cast<uInt>(packed.size());
@@ -66,11 +66,11 @@ std::size_t read_and_unzip(const char *path, std::vector<char> &out) {
     return unzip.total_out;
 }
 
-// Reads the numbers of an ASCII PLY of vertices (x y z and perhaps more) and triangles, as it comes.
+// Reads the numbers of an ASCII PLY file of vertices (x y z and optionally more) and triangles without any checks.
 std::size_t parse_blindly(const char *path, std::vector<char> &text, std::vector<float> &floats,
                           std::vector<std::uint32_t> &indices) {
     const std::size_t size = read_and_unzip(path, text);
-    if (text.size() < size) { // not packed
+    if (text.size() < size) { // not compressed
         text.resize(size);
         std::ifstream(path, std::ios::binary).read(text.data(), static_cast<std::streamsize>(size));
     }
@@ -114,7 +114,7 @@ ArenaBuilder scene_of(TriangleMesh mesh) {
 }
 
 bool run(const char *path, int runs) {
-    Times unzip{"read and unzip only (the bound)", {}}, bare{"read, unzip, parse blindly", {}},
+    Times unzip{"read and unzip only (lower bound)", {}}, bare{"read, unzip, parse unchecked", {}},
         load{"load: read, unzip, parse", {}}, normals{"smooth normals", {}}, write{"write the arena (flat)", {}},
         check{"validate it", {}}, write_smooth{"write the arena (with normals)", {}}, check_smooth{"validate it", {}};
     std::vector<char> text;
@@ -124,9 +124,9 @@ bool run(const char *path, int runs) {
         std::vector<float> floats;
         std::vector<std::uint32_t> indices;
         if (bare([&] { return parse_blindly(path, text, floats, indices); }) == 0)
-            throw std::runtime_error("the bare parser knows ASCII PLY only");
+            throw std::runtime_error("the minimal parser supports only ASCII PLY");
         if (indices.back() == 0 || indices.back() >= floats.size() / 3)
-            throw std::runtime_error("the bare parser has lost its way");
+            throw std::runtime_error("the minimal parser failed");
         TriangleMesh mesh = load([&] { return load_mesh(path); });
         triangles = mesh.triangles.size();
         TriangleMesh smooth = mesh;
@@ -148,7 +148,7 @@ bool run(const char *path, int runs) {
     getrusage(RUSAGE_SELF, &usage);
     std::printf("peak memory %ld MB\n", usage.ru_maxrss / 1000);
     const double ratio = (load.ms.front() + write.ms.front() + check.ms.front()) / bare.ms.front();
-    std::printf("load, write and validate to the bare parser: %.2f (target 1.5)\n", ratio);
+    std::printf("load, write and validate relative to the minimal parser: %.2f (target 1.5)\n", ratio);
     return ratio <= 1.5;
 }
 

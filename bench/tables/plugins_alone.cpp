@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the parts of a run cost without arhost round them: source_file, the turning grey that any tracker needs,
-// tracker_aruco, rt_embree and the compositor, one after the other, called directly in this process. Prints the
-// CPU time of a frame of each in ms, as JSON.
+// Cost of the parts of a run without arhost: source_file, the grey conversion, tracker_aruco, rt_embree and the
+// compositor, called directly one after the other in this process. Prints the CPU time per frame of each in ms, as
+// JSON.
 //
 //   plugins-alone SCENE TRAJECTORY PICTURE FRAMES
 #include "camera/trajectory.hpp"
@@ -30,7 +30,7 @@ double cpu_ms() {
     return ms(usage.ru_utime) + ms(usage.ru_stime);
 }
 
-// Of all threads, a call, after ten that do not count: the period of tables.py's trajectories.
+// CPU time per call, all threads, after ten warm-up calls (the period of tables.py's trajectories).
 template <class Call> double cpu_ms_of(int calls, Call &&call) {
     constexpr int warm_up = 10;
     for (int i = 0; i < warm_up; ++i)
@@ -78,7 +78,7 @@ double tracker_alone(const std::string &picture, const arhost_intrinsics &camera
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
 }
 
-// A picture as a frame, BGR8.
+// An image file as a BGR8 frame.
 struct VideoFrame {
     explicit VideoFrame(const std::string &picture) : slot(layout(picture)) {
         for (int y = 0; y < bgr.rows; ++y)
@@ -92,7 +92,7 @@ struct VideoFrame {
         format.width = static_cast<std::uint32_t>(bgr.cols);
         format.height = static_cast<std::uint32_t>(bgr.rows);
         if (!arhost_frame_layout(&format))
-            throw std::runtime_error("can't read " + picture);
+            throw std::runtime_error("cannot read " + picture);
         return format.byte_size;
     }
     cv::Mat bgr;
@@ -151,7 +151,7 @@ int main(int argc, char **argv) try {
     const int frames = std::max(1, std::atoi(argv[4]));
     const arhost::camera::Trajectory trajectory = arhost::camera::read_trajectory(argv[2]);
     if (!trajectory.intrinsics)
-        throw std::runtime_error("the trajectory must tell its intrinsics");
+        throw std::runtime_error("the trajectory must contain intrinsics");
     const VideoFrame video(argv[3]);
     const double source = source_alone(argv[3], frames), grey = grey_alone(video, frames);
     const double tracker = tracker_alone(argv[3], *trajectory.intrinsics, frames);

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The dissertation's tables 3 and 4 and figures 23 and 26, with our figures beside the author's, and what arhost adds
-to the CPU time of its plugins: tables.py [--quick] [overhead] [tables] [figures]
+"""The dissertation's tables 3 and 4 and figures 23 and 26 with arhost's results next to the author's, and arhost's CPU
+overhead over its plugins: tables.py [--quick] [overhead] [tables] [figures]
 
-Each scene is traced twice on the same cameras, by the ray tracer alone (arhost replay, the dissertation's "pure"
-mode) and in the whole chain (--with-pipeline: one preloaded image again and again, tracker_aruco, sink_null).
-Leaves build/tables/tables.json, figure-23.svg and figure-26.svg."""
+Each scene is traced twice with the same cameras: by the ray tracer alone (arhost replay, the dissertation's "pure" mode)
+and in the whole pipeline (--with-pipeline: one preloaded image repeatedly, tracker_aruco, sink_null).
+Writes build/tables/tables.json, figure-23.svg and figure-26.svg."""
 import json
 import math
 import os
@@ -18,14 +18,14 @@ import sys
 HERE = pathlib.Path(__file__).resolve()
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "tools")]
 import replays  # noqa: E402
-from replays import BUILD, HEIGHT, ROOT, WIDTH, frames_a_second, write_trajectory  # noqa: E402
+from replays import BUILD, HEIGHT, ROOT, WIDTH, frames_per_second, write_trajectory  # noqa: E402
 from scene_views import VIEWS  # noqa: E402
 
 OUT = ROOT / "build/tables"
 FRAME = OUT / "frame.png"
 
-# Dissertation's name → scene, view, frames a second with the middleware and of the ray tracer alone (GTX 1060;
-# its camera gave 30 a second).
+# Dissertation's name → scene, view, frames per second with the middleware and of the ray tracer alone (GTX 1060 and a
+# camera of 30 frames per second).
 FAR, CLOSE = 0, 1
 TABLES = {
     "Table 3 (OptiX)": {
@@ -36,8 +36,8 @@ TABLES = {
         "CS": ("vkray-cs", FAR, 30.19, 59.79), "B": ("vkray-b", FAR, 30.15, 59.75),
         "HB": ("vkray-hb", FAR, 30.07, 29.99), "HBF": ("vkray-hbf", FAR, 30.32, 59.51),
         "MD": ("vkray-md", FAR, 15.16, 15.01), "CMD": ("vkray-md", CLOSE, 5.73, 5.98)}}
-# File → title; the scenes that the camera approaches: far, and close where the table has that, too. The circles in the
-# figures are the author's frame rates of the ray tracer alone.
+# File → title, table, scenes that the camera approaches (far view, and close view if the table has one). The circles in
+# the figures are the author's frame rates of the ray tracer alone.
 FIGURES = {
     "figure-23.svg": ("Figure 23: the camera approaches, OptiX scenes", "Table 3 (OptiX)", [("GL", "CGL"), ("GD", "CGD")]),
     "figure-26.svg": ("Figure 26: the camera approaches, VKRay scenes", "Table 4 (VKRay)", [("CS", None), ("MD", "CMD")])}
@@ -48,7 +48,7 @@ def scene_file(scene):
 
 
 def replay(scene, trajectory, frames, with_pipeline):
-    """A run's statistics, its timeline and what it said."""
+    """Returns a run's statistics, timeline and stderr."""
     pipeline = ["--with-pipeline", "--set",
                 f"source={{plugin: source_file, path: \"{FRAME}\", options: {{frames: {frames}}}}}"]
     return replays.replay(scene_file(scene), trajectory, frames, *(pipeline if with_pipeline else []))
@@ -63,7 +63,7 @@ outputs: [{{plugin: sink_images, path: "{FRAME}"}}]
 
 
 def coarser(scene, said):
-    """A note where the mesh has fewer faces than the dissertation's, as the loader counts them."""
+    """A note if the mesh has fewer faces than the dissertation's, as counted by the loader."""
     wanted = re.search(r"stand_in: \{faces: (\d+)", scene_file(scene).read_text())
     found = [int(count) for count in re.findall(r"models/\S+: (\d+) triangles", said)]
     if wanted and found and found[0] < 0.99 * int(wanted[1]):
@@ -74,17 +74,17 @@ def coarser(scene, said):
 def print_tables(seconds):
     results = {}
     for title, scenes in TABLES.items():
-        print(f"{title}: {WIDTH}x{HEIGHT}, frames a second\n"
+        print(f"{title}: {WIDTH}x{HEIGHT}, frames per second\n"
               f"  {'scene':6} {'dissertation':^24}   {'arhost with rt_embree, ' + str(os.cpu_count()) + ' cores':^34}\n"
               f"  {'':6} {'whole':>7} {'alone':>7} {'ratio':>7}   {'whole':>8} {'alone':>8} {'ratio':>7}  tracer's ms")
         for name, (scene, view, whole, alone) in scenes.items():
             trajectory = OUT / "still.jsonl"
             write_trajectory(trajectory, [VIEWS[scene][view]] * 2000, scene.startswith("vkray"))
-            probe = frames_a_second(replay(scene, trajectory, 12, False)[1])
+            probe = frames_per_second(replay(scene, trajectory, 12, False)[1])
             frames = max(24, min(2000, int(seconds * probe)))
             _, rows_alone, said = replay(scene, trajectory, frames, False)
             _, rows_whole, _ = replay(scene, trajectory, frames, True)
-            ours_alone, ours_whole = frames_a_second(rows_alone), frames_a_second(rows_whole)
+            ours_alone, ours_whole = frames_per_second(rows_alone), frames_per_second(rows_whole)
             tracer = [statistics.median(row["raytracer_ms"] for row in rows) for rows in (rows_whole, rows_alone)]
             stand_in = "   a stand-in for the scan" if "stand-in" in said else ""
             note = stand_in or coarser(scene, said)
@@ -99,15 +99,15 @@ def print_tables(seconds):
 
 
 def approach(scene, frames):
-    """From far to close, at a steady speed."""
+    """From far to close at constant speed."""
     (eye, at), (near_eye, near_at) = VIEWS[scene] if scene != "vkray-cs" else (VIEWS[scene][0], ((0, 75, 130), (0, 40, 0)))
     for i in range(frames):
-        share = i / (frames - 1)
-        yield tuple(tuple(a + share * (b - a) for a, b in zip(p, q)) for p, q in ((eye, near_eye), (at, near_at)))
+        fraction = i / (frames - 1)
+        yield tuple(tuple(a + fraction * (b - a) for a, b in zip(p, q)) for p, q in ((eye, near_eye), (at, near_at)))
 
 
 def smoothed(rows):
-    """(Position along the trajectory 0 to 1, frames a second over nine frames about it.)"""
+    """(Position along the trajectory 0 to 1, frames per second over the surrounding nine frames.)"""
     points = []
     for i in range(4, len(rows) - 4):
         points.append((i / (len(rows) - 1), 8 / (rows[i + 4]["shown_s"] - rows[i - 4]["shown_s"])))
@@ -115,8 +115,8 @@ def smoothed(rows):
 
 
 def draw(file, title, curves, marks):
-    """curves: (label, colour, dashed, points); marks: (label, colour, x, frames a second). Frames a second are drawn
-    on a logarithmic axis."""
+    """curves: (label, colour, dashed, points); marks: (label, colour, x, frames per second). The frame rate axis is
+    logarithmic."""
     left, top, width, height = 60, 50, 620, 330
     values = [y for _, _, _, points in curves for _, y in points] + [y for _, _, _, y in marks]
     low, high = math.floor(math.log2(min(values))), math.ceil(math.log2(max(values)))
@@ -127,7 +127,7 @@ def draw(file, title, curves, marks):
     svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 440" font-family="sans-serif" font-size="13">',
            '<rect width="900" height="440" fill="white"/>', f'<text x="{left}" y="28" font-size="16">{title}</text>',
            f'<text x="{left + width / 2}" y="425" text-anchor="middle">along the trajectory: from far to close</text>',
-           f'<text transform="translate(18 {top + height / 2}) rotate(-90)" text-anchor="middle">frames a second</text>']
+           f'<text transform="translate(18 {top + height / 2}) rotate(-90)" text-anchor="middle">frames per second</text>']
     for power in range(low, high + 1):
         _, y = place(0, 2.0 ** power)
         svg.append(f'<path d="M{left} {y:.1f}h{width}" stroke="#ddd"/>'
@@ -163,9 +163,9 @@ def draw_figures(frames):
             for name, x in ((far, 0), (close, 1)):
                 if name:
                     marks += [(f"{far}, dissertation (GTX 1060)", pale, x, TABLES[table][name][3])]
-            ratio = frames_a_second(whole) / frames_a_second(alone)
+            ratio = frames_per_second(whole) / frames_per_second(alone)
             results[f"{title}: {far}"] = {"whole_to_alone": ratio, "whole": smoothed(whole), "alone": smoothed(alone)}
-            print(f"  {title.split(':')[0]}, {far}: {smoothed(alone)[0][1]:.1f} to {smoothed(alone)[-1][1]:.1f} frames a second "
+            print(f"  {title.split(':')[0]}, {far}: {smoothed(alone)[0][1]:.1f} to {smoothed(alone)[-1][1]:.1f} frames per second "
                   f"alone, whole to alone {ratio:.3f}", flush=True)
         draw(OUT / file, title, curves, marks)
         print(f"  {(OUT / file).relative_to(ROOT)}", flush=True)
@@ -173,18 +173,18 @@ def draw_figures(frames):
     return results
 
 
-def cpu_ms_a_frame(scene, trajectory, frames, with_pipeline):
-    """Of each component: the difference between a long run and a short one, which leaves out start and scene. Both are
-    whole rounds of the trajectory."""
+def cpu_ms_per_frame(scene, trajectory, frames, with_pipeline):
+    """By component: the difference between a long and a short run, which excludes start-up and scene loading. Both cover
+    whole periods of the trajectory."""
     short = 10
     a, b = (replay(scene, trajectory, count, with_pipeline)[0]["cpu_seconds"] for count in (short, short + frames))
     return {name: 1e3 * (b[name] - a[name]) / frames for name in b}
 
 
 def print_overhead(frames, rounds):
-    """What the middleware adds: CPU time, which other programs on the machine disturb less than wall time."""
+    """The middleware's overhead in CPU time, which is less sensitive to other load than wall time."""
     results, missed = {}, []
-    print(f"What arhost adds, by CPU time a frame, {WIDTH}x{HEIGHT}, medians of {rounds} rounds in turn (targets 1.03):\n"
+    print(f"arhost's overhead: CPU time per frame, {WIDTH}x{HEIGHT}, medians of {rounds} alternating rounds (target 1.03):\n"
           f"  {'scene':8} {'tracer: whole, alone, ratio':^32}   {'all: whole, sum of parts, ratio':^34}")
     for scene in ("optix-cs", "optix-b", "vkray-b"):
         trajectory = OUT / "approach.jsonl"
@@ -194,8 +194,8 @@ def print_overhead(frames, rounds):
             parts = json.loads(subprocess.run(
                 [BUILD / "bin/plugins-alone", scene_file(scene), trajectory, FRAME, str(frames)],
                 capture_output=True, text=True, check=True).stdout)
-            alone = cpu_ms_a_frame(scene, trajectory, frames, False)
-            whole = cpu_ms_a_frame(scene, trajectory, frames, True)
+            alone = cpu_ms_per_frame(scene, trajectory, frames, False)
+            whole = cpu_ms_per_frame(scene, trajectory, frames, True)
             rows.append((whole["raytracer"], alone["raytracer"], whole["total"], sum(parts.values())))
         tracer_whole, tracer_alone, total, parts = (statistics.median(column) for column in zip(*rows))
         tracer_ratio = statistics.median(row[0] / row[1] for row in rows)
@@ -212,10 +212,10 @@ def main():
     quick = "--quick" in sys.argv[1:]
     parts = [word for word in sys.argv[1:] if word != "--quick"] or ["overhead", "tables", "figures"]
     if unknown := set(parts) - {"overhead", "tables", "figures"}:
-        raise SystemExit(f"{', '.join(sorted(unknown))}: there are the parts overhead, tables and figures")
+        raise SystemExit(f"unknown part: {', '.join(sorted(unknown))}; use overhead, tables or figures")
     OUT.mkdir(parents=True, exist_ok=True)
     make_frame()
-    file = OUT / ("quick.json" if quick else "tables.json")  # parts that are not measured now keep their figures
+    file = OUT / ("quick.json" if quick else "tables.json")  # keep the results of parts not measured now
     results, missed = json.loads(file.read_text()) if file.exists() else {}, []
     if "overhead" in parts:
         results["overhead"], missed = print_overhead(30 if quick else 100, 1 if quick else 15)

@@ -408,7 +408,7 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
         overlay = overlay_of(frame);
         region = region_of(frame.render, format_->width, format_->height);
         if (frame.warp) {
-            overlay = frame.warp->bend(overlay, region);
+            overlay = frame.warp->warp(overlay, region);
             region = {0, 0, format_->width, format_->height};
         }
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What happens to a pixel, in integers. The SIMD kernels of rows.cpp give the same bytes.
+// Integer pixel arithmetic; the SIMD kernels of rows.cpp give the same bytes.
 #pragma once
 
 #include <arhost/frame.h>
@@ -14,20 +14,19 @@ struct Bgr {
     std::uint8_t b, g, r;
 };
 
-// B over A (equation 3.6). 255 is odd, so there are no ties to round.
+// B over A (equation 3.6). 255 is odd, so there are no rounding ties.
 constexpr std::uint8_t blended(int a, int b, int alpha) {
     return static_cast<std::uint8_t>((a * (255 - alpha) + b * alpha + 127) / 255);
 }
 
-// From Y'CbCr to R'G'B'. The factors are for (a·b + 2^14) >> 15, the luma's with a = y·2^7 and the
-// chroma's with a = u·2^8 or v·2^8, so that all products are in 1/64 and everything fits 16 bits.
+// Y'CbCr to R'G'B'. The factors b are for (a·b + 2^14) >> 15, with a = y·2^7 for luma and a = u·2^8 or v·2^8 for
+// chroma, so that products are in units of 1/64 and fit 16 bits.
 struct YuvMatrix {
     std::int16_t y_offset;
     std::int16_t yy, rv, gu, gv, bu;
 };
 
-// `kr` and `kb`: the weights of red and blue in the luma. ITU-R BT.601-7 §2.5 and BT.709-6 §3 differ in
-// them alone.
+// `kr`, `kb`: luma weights of red and blue, the only difference between ITU-R BT.601-7 §2.5 and BT.709-6 §3.
 constexpr YuvMatrix yuv_matrix(double kr, double kb, bool limited) {
     const auto rounded = [](double x) { return static_cast<std::int16_t>(x + 0.5); };
     const double kg = 1 - kr - kb;
@@ -56,7 +55,7 @@ constexpr Bgr bgr_from_yuv(const YuvMatrix &m, int y, int u, int v) {
 
 // 0.299, 0.587 and 0.114 (ITU-R BT.601-7 §2.5.1) in 1/65536; their sum is 1.
 constexpr std::uint16_t red_weight = 19595, green_weight = 38470, blue_weight = 7471;
-// Half of the last place, and the mean loss of the three truncations.
+// Half a code, plus the mean error of the three truncations.
 constexpr std::uint16_t grey_rounding = 129;
 
 constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {
@@ -65,7 +64,7 @@ constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {
         (part(r, red_weight) + part(g, green_weight) + part(b, blue_weight) + grey_rounding) >> 8);
 }
 
-// Luma of limited range (16 to 235) to 0 to 255, rounded to nearest.
+// Expands limited-range luma (16 to 235) to 0 to 255, rounded to nearest.
 constexpr std::uint8_t full_range(int y) {
     return static_cast<std::uint8_t>(((std::clamp(y, 16, 235) - 16) * 255 + 109) / 219);
 }

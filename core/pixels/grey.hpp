@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The grey plane that all trackers share (arhost/frame.h).
+// The grey plane used by all trackers (arhost/frame.h).
 #pragma once
 
 #include <arhost/frame.h>
@@ -9,15 +9,15 @@
 
 namespace arhost {
 
-// Fills the grey plane of a frame, rows of format.grey_stride bytes, where it is a plane of its own:
+// Fills the grey plane of a frame (rows of format.grey_stride bytes) if the format has a separate one:
 // - RGB8, BGR8: 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601-7 §2.5.1), within 1 of OpenCV's BGR2GRAY;
-// - YUYV: Y, expanded from limited range to 0 to 255 where the format says so.
-// For GREY8, NV12 and I420 the grey plane is plane 0 as it stands, whatever its range: trackers want
-// contrast, and a copy would cost more than it gives. Nothing is written then.
+// - YUYV: Y, expanded to 0 to 255 if the range is limited.
+// For GREY8, NV12 and I420, plane 0 itself is the grey plane, whatever its range: trackers only need contrast, which
+// is not worth a copy. Nothing is written then.
 void fill_grey(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                std::uint8_t *grey);
 
-// The same bytes, a pixel at a time: the definition that tests hold `fill_grey` against.
+// Reference implementation for tests: the same bytes, pixel by pixel.
 void fill_grey_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                          std::uint8_t *grey);
 

@@ -18,8 +18,6 @@ namespace arhost::rows::HWY_NAMESPACE {
 using Bytes = const std::uint8_t *;
 
 #if HWY_TARGET == HWY_SCALAR
-// No vectors on this machine.
-
 void blend(Bytes bgr, Bytes rgba, std::uint8_t *out, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i)
         for (std::size_t c = 0; c < 3; ++c)
@@ -74,9 +72,8 @@ using V8 = hn::Vec<decltype(d8)>;
 using V16 = hn::Vec<decltype(d16)>;
 using VI16 = hn::Vec<decltype(di16)>;
 
-// Calls chunk(in, out) on as many pixels as a vector has bytes, again and again. `pair_bytes[i]`: the
-// bytes that two pixels take in in[i]. The row's rest goes through copies on the stack, so that nothing
-// past the row is touched.
+// Calls chunk(in, out) for consecutive runs of as many pixels as a vector has bytes. `pair_bytes[i]`: bytes per two
+// pixels of in[i]. The remainder is processed in stack buffers, so that nothing past the row is accessed.
 template <std::size_t streams, std::size_t out_bytes, class Chunk>
 HWY_INLINE void for_each_chunk(std::array<Bytes, streams> in, const std::array<std::size_t, streams> &pair_bytes,
                                std::uint8_t *out, std::size_t count, const Chunk &chunk) {
@@ -99,7 +96,7 @@ HWY_INLINE void for_each_chunk(std::array<Bytes, streams> in, const std::array<s
     std::memcpy(out, rest_out, out_bytes * count);
 }
 
-// Bytes are worked on as the low and the high ones of 16-bit lanes.
+// Bytes are processed as the low and high halves of 16-bit lanes.
 HWY_INLINE V16 low_bytes(V16 v) {
     return hn::And(v, hn::Set(d16, 0x00ff));
 }
@@ -113,8 +110,8 @@ HWY_INLINE V16 odd(V8 v) {
     return hn::ShiftRight<8>(hn::BitCast(d16, v));
 }
 
-// 256·round(x / 255) + something smaller, for x = 0 to 255²: J. Blinn, "Three Wrongs Make a Right", IEEE
-// Computer Graphics & Applications 15(6), 1995.
+// round(x / 255) in the high byte, for x = 0 to 255² (J. Blinn, "Three Wrongs Make a Right", IEEE Computer Graphics &
+// Applications 15(6), 1995).
 HWY_INLINE V16 over_255_times_256(V16 x) {
     const V16 t = hn::Add(x, hn::Set(d16, 128));
     return hn::Add(t, hn::ShiftRight<8>(t));
@@ -138,7 +135,7 @@ private:
 
 HWY_INLINE void blend_chunk(Bytes bgr, Bytes rgba, std::uint8_t *out) {
     const std::size_t lanes = hn::Lanes(d8), quarter = hn::Lanes(d32);
-    // Most of an overlay is empty, most of the rest opaque: look at the alphas before anything else.
+    // Fast paths: most of an overlay is empty, and most of the rest opaque.
     const auto *pixels = reinterpret_cast<const std::uint32_t *>(rgba);
     const auto p0 = hn::LoadU(d32, pixels), p1 = hn::LoadU(d32, pixels + quarter);
     const auto p2 = hn::LoadU(d32, pixels + 2 * quarter), p3 = hn::LoadU(d32, pixels + 3 * quarter);
@@ -182,8 +179,8 @@ void bgr_from_rgb(Bytes rgb, std::uint8_t *bgr, std::size_t count) {
     });
 }
 
-// Two neighbours share a chroma sample, so even and odd pixels stand in a vector each. A saturated sum is
-// one that is clamped to 255 anyway.
+// Two neighbouring pixels share a chroma sample, so even and odd pixels are in separate vectors. Saturating addition
+// is safe: such sums are clamped to 255 anyway.
 class YuvConverter {
 public:
     HWY_INLINE explicit YuvConverter(const YuvMatrix &matrix) : m_(matrix) {}
@@ -202,7 +199,7 @@ private:
     HWY_INLINE static VI16 chroma(V16 c) {
         return hn::ShiftLeft<8>(hn::Sub(hn::BitCast(di16, c), hn::Set(di16, 128)));
     }
-    HWY_INLINE VI16 luma(V16 y) const { // with the half that rounding needs
+    HWY_INLINE VI16 luma(V16 y) const { // includes the rounding offset
         const VI16 above = hn::Sub(hn::BitCast(di16, y), hn::Set(di16, m_.y_offset));
         return hn::Add(times(hn::ShiftLeft<7>(above), m_.yy), hn::Set(di16, 32));
     }
@@ -244,7 +241,7 @@ void bgr_from_i420(Bytes y, Bytes u, Bytes v, const YuvMatrix &matrix, std::uint
     });
 }
 
-// The bytes in the high halves of the lanes, since MulHigh drops the low half.
+// Inputs are in the high bytes of the lanes, as MulHigh drops the low half of products.
 HWY_INLINE V16 weighted(V16 r, V16 g, V16 b) {
     const V16 sum =
         hn::Add(hn::MulHigh(r, hn::Set(d16, red_weight)),

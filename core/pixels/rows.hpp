@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The SIMD kernels: each does `count` pixels of one row on the best instruction set of this machine, with
-// the results of formulas.hpp. No byte outside those pixels is read or written; nothing need be aligned.
+// SIMD kernels for `count` pixels of a row, using the best available instruction set, with the results of
+// formulas.hpp. They access no bytes outside those pixels and need no alignment.
 #pragma once
 
 #include "pixels/formulas.hpp"
@@ -14,7 +14,7 @@ namespace arhost::rows {
 // out = B over A. `bgr` may be `out`.
 void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count);
 
-// To BGR. The count of YUV pixels is even; chroma is replicated.
+// To BGR. For YUV, `count` must be even; chroma is replicated.
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count);
 void bgr_from_rgb(const std::uint8_t *rgb, std::uint8_t *bgr, std::size_t count);
 void bgr_from_yuyv(const std::uint8_t *yuyv, const YuvMatrix &matrix, std::uint8_t *bgr, std::size_t count);

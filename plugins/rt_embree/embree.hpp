@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What differs between Embree 3 (Debian 12) and Embree 4.
+// Differences between Embree 3 (Debian 12) and Embree 4.
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>) && !defined(ARHOST_EMBREE_3)
@@ -12,12 +12,12 @@
 #include <cstddef>
 #include <type_traits>
 
-// Always, since the kernels are compiled for several instruction sets and must not share a copy.
+// Always inline: the kernels are compiled for several instruction sets and must not share code.
 #define RT_EMBREE_INLINE inline __attribute__((always_inline))
 
 namespace rt_embree {
 
-// What goes along with the rays of one call. The callbacks of geometries get it back.
+// Per-call context, passed through to the geometries' callbacks.
 struct Query {
 #if RTC_VERSION_MAJOR >= 4
     RTCRayQueryContext context;
@@ -25,14 +25,14 @@ struct Query {
 #else
     RTCIntersectContext context;
 #endif
-    bool cull_catchers_facing_away;
+    bool cull_catcher_back_faces;
 };
 
 enum class Coherence { coherent, incoherent };
 
-RT_EMBREE_INLINE Query make_query(Coherence coherence, bool cull_catchers_facing_away = false) {
+RT_EMBREE_INLINE Query make_query(Coherence coherence, bool cull_catcher_back_faces = false) {
     Query query;
-    query.cull_catchers_facing_away = cull_catchers_facing_away;
+    query.cull_catcher_back_faces = cull_catcher_back_faces;
 #if RTC_VERSION_MAJOR >= 4
     rtcInitRayQueryContext(&query.context);
     query.flags = coherence == Coherence::coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
@@ -48,8 +48,8 @@ RT_EMBREE_INLINE const Query &query_of(const RTCFilterFunctionNArguments &argume
     return *reinterpret_cast<const Query *>(arguments.context);
 }
 
-// How many rays Embree traces together on this processor. Wider packets it takes apart into single rays
-// (Embree 4), or into streams that trace the rays that are not valid as well (Embree 3).
+// Embree's packet width on this processor. It splits wider packets into single rays (Embree 4), or into streams that
+// trace the invalid rays as well (Embree 3).
 inline int native_packet_width(RTCDevice device) {
     return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
            : rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
@@ -58,7 +58,7 @@ inline int native_packet_width(RTCDevice device) {
 
 namespace detail {
 
-// Calls one of Embree's rtcIntersect<n> and rtcOccluded<n>.
+// Calls rtcIntersect<n> or rtcOccluded<n>.
 template <auto function, class Rays>
 RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays &rays) {
 #if RTC_VERSION_MAJOR >= 4
@@ -78,9 +78,9 @@ RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays
 #endif
 }
 
-// The same for 16 rays, in narrower packets. Both kinds of packet are rows of 4-byte numbers, one a ray; only those
-// are copied that Embree reads (the ray, and the hit from geomID on) or writes (tfar, the hit). A row is moved as one
-// register: the processor forwards no two stores to one load.
+// The same for 16 rays in narrower packets. Packets are rows of 4-byte values, one per ray; only the rows that Embree
+// reads (the ray, and the hit from geomID on) or writes (tfar, the hit) are copied. A row is copied as one register:
+// the processor does not forward two stores to one load.
 template <auto function, class Part, class Rays>
 RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &query, Rays &rays) {
     constexpr int parts = sizeof(Rays) / sizeof(Part), width = 16 / parts;
@@ -115,7 +115,7 @@ RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &qu
 
 } // namespace detail
 
-// valid: 16 ints, −1 for the rays that are to be traced, aligned to 64 bytes as the rays are.
+// `valid`: 16 ints, −1 for active rays; 64-byte aligned, like `rays`.
 RT_EMBREE_INLINE void intersect16(const int *valid, RTCScene scene, int packet_width, Query &query,
                                   RTCRayHit16 &rays) {
     if (packet_width == 16)

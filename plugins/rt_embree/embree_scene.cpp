@@ -60,7 +60,7 @@ Box empty_box() {
     return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
 }
 
-// Round points of `stride` bytes, which have a radius where they are spheres.
+// Bounding box of points `stride` bytes apart; spheres have their radius as 4th component.
 Box box_of(const std::byte *points, std::uint32_t count, std::uint32_t stride, bool spheres) {
     Box box = empty_box();
     for (std::uint32_t i = 0; i < count; ++i, points += stride) {
@@ -80,7 +80,7 @@ Box local_box(const arhost_scene &arena, const arhost_object &object) {
                   geometry.type == ARHOST_GEOMETRY_SPHERES);
 }
 
-// The box round the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
+// Bounding box of the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
 Box transformed(const Box &local, const float *m) {
     if (local.min[0] > local.max[0])
         return local;
@@ -100,26 +100,27 @@ bool is_instance(const arhost_object &object) {
     return object.deforms || object.moves || !is_identity(object.world_from_object);
 }
 
-// Rays for catchers needn't walk all the other triangles; but a scanned room is not to be built twice.
-bool catchers_deserve_a_tree(const arhost_scene &arena) {
+// A separate BVH keeps catcher rays from traversing all other triangles, but a scanned room should not be built
+// twice.
+bool needs_catcher_bvh(const arhost_scene &arena) {
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
-    std::uint64_t of_catchers = 0, all = 0;
+    std::uint64_t catcher_triangles = 0, all_triangles = 0;
     bool any_catcher = false;
     for (const arhost_object &object : elements<arhost_object>(arena, arena.objects)) {
         const std::uint64_t count = std::max(geometries[object.geometry].indices.count, std::uint32_t{1});
-        all += count;
+        all_triangles += count;
         if (object.role != ARHOST_ROLE_CATCHER)
             continue;
         if (is_instance(object))
             return false;
         any_catcher = true;
-        of_catchers += count;
+        catcher_triangles += count;
     }
-    return any_catcher && 8 * of_catchers <= all;
+    return any_catcher && 8 * catcher_triangles <= all_triangles;
 }
 
-// As an 8-bit code has it: the mean over several samples then rounds to that code.
-float alpha_of_code(float alpha) {
+// Rounded to an 8-bit code, so that the mean over several samples rounds to the same code.
+float quantized_alpha(float alpha) {
     return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
 
@@ -146,16 +147,16 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         if (!rtcGetDeviceProperty(device_.get(), property))
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                           "this build of Embree lacks ray masks, filter functions, triangles "
-                          "or points; install one with its default options");
+                          "or points; install one built with default options");
 
     const auto from = elements<arhost_object>(arena, arena.objects);
     const bool anything_moves =
         std::any_of(from.begin(), from.end(), [](const arhost_object &o) { return o.moves || o.deforms; });
-    // What stays must not be built again whenever the rest moves: it lies in a scene of its own.
+    // Static objects get their own scene, which is not rebuilt when others move.
     root_ = new_scene(anything_moves ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
     if (anything_moves)
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
-    if (catchers_deserve_a_tree(arena))
+    if (needs_catcher_bvh(arena))
         catchers_ = new_scene(RTC_SCENE_FLAG_NONE);
     view_.has_instances = anything_moves;
     for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
@@ -166,7 +167,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
-        places_.push_back({local_box(arena, object), {}});
+        placements_.push_back({local_box(arena, object), {}});
         visible_boxes_.push_back(empty_box());
         place_object(number, object.world_from_object);
         view_.has_catchers |= object.role == ARHOST_ROLE_CATCHER;
@@ -209,8 +210,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.max_depth = arena.max_depth;
     copy3(arena.ambient, view_.ambient);
     copy3(arena.background, view_.background);
-    view_.shadow_alpha_opaque = alpha_of_code(arena.shadow_alpha_opaque);
-    view_.shadow_alpha_translucent = alpha_of_code(arena.shadow_alpha_translucent);
+    view_.shadow_alpha_opaque = quantized_alpha(arena.shadow_alpha_opaque);
+    view_.shadow_alpha_translucent = quantized_alpha(arena.shadow_alpha_translucent);
     view_.coloured_shadows = arena.coloured_shadows != 0;
     for (int code = 0; code < 256; ++code)
         linear_of_srgb8_.push_back(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));
@@ -241,8 +242,8 @@ void EmbreeScene::move(const arhost_motion &motion) {
 }
 
 void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
-    // From here on a tree costs the rays of a few frames more than building a new one does (rt-embree-refit).
-    constexpr double tolerable_decay = 1.3;
+    // Above this, tracing a few frames through the refitted BVH costs more than a rebuild (rt-embree-refit).
+    constexpr double max_degradation = 1.3;
     Object &object = objects_[deformed.object];
     object.positions = deformed.positions;
     object.position_stride = 3 * sizeof(float);
@@ -254,32 +255,32 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
     const MeshView mesh{positions, bytes(arena_) + geometry.indices.offset, 3 * sizeof(float),
                         geometry.indices.stride, geometry.indices.count};
 
-    Deforming &own = deforming_.at(deformed.object);
-    rtcSetSharedGeometryBuffer(own.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0,
+    Deforming &state = deforming_.at(deformed.object);
+    rtcSetSharedGeometryBuffer(state.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0,
                                3 * sizeof(float), deformed.vertex_count);
-    const bool rebuild = own.quality.decay(mesh) > tolerable_decay;
-    rtcSetGeometryBuildQuality(own.geometry.get(), rebuild ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_REFIT);
-    rtcUpdateGeometryBuffer(own.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
-    rtcCommitGeometry(own.geometry.get());
-    commit(own.scene.get());
+    const bool rebuild = state.quality.degradation(mesh) > max_degradation;
+    rtcSetGeometryBuildQuality(state.geometry.get(), rebuild ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_REFIT);
+    rtcUpdateGeometryBuffer(state.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
+    rtcCommitGeometry(state.geometry.get());
+    commit(state.scene.get());
     if (rebuild) {
-        own.quality.built(mesh);
+        state.quality.record_build(mesh);
         ++rebuilds_;
     }
     const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
     rtcCommitGeometry(instance); // its bounds have changed
-    places_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
+    placements_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
     update_bounds(deformed.object);
 }
 
 void EmbreeScene::place_object(std::uint32_t object, const float *world_from_object) {
     set_transform(objects_[object], world_from_object);
-    std::copy_n(world_from_object, 12, places_[object].world_from_object.begin());
+    std::copy_n(world_from_object, 12, placements_[object].world_from_object.begin());
     update_bounds(object);
 }
 
 void EmbreeScene::update_bounds(std::uint32_t object) {
-    const auto &[local, world_from_object] = places_[object];
+    const auto &[local, world_from_object] = placements_[object];
     object_extent(local.min, local.max, world_from_object.data(), objects_[object].reach);
     if (objects_[object].role != ARHOST_ROLE_OCCLUDER)
         visible_boxes_[object] = transformed(local, world_from_object.data());
@@ -312,19 +313,19 @@ void EmbreeScene::attach(RTCScene to, const GeometryHandle &geometry, std::uint3
 RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
-    Deforming &own = deforming_[number];
-    own.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
-    // Only then Embree gives the geometry a tree of its own, and only such a tree can be refitted.
-    rtcSetSceneBuildQuality(own.scene.get(), RTC_BUILD_QUALITY_LOW);
-    own.geometry = new_geometry(number);
-    rtcSetGeometryMask(own.geometry.get(), all_masks);
-    rtcSetGeometryBuildQuality(own.geometry.get(), RTC_BUILD_QUALITY_MEDIUM);
-    rtcCommitGeometry(own.geometry.get());
-    rtcAttachGeometry(own.scene.get(), own.geometry.get());
-    commit(own.scene.get());
-    own.quality.built({bytes(arena_) + from.positions.offset, bytes(arena_) + from.indices.offset,
-                       from.positions.stride, from.indices.stride, from.indices.count});
-    return own.scene.get();
+    Deforming &state = deforming_[number];
+    state.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
+    // Only at low quality does Embree give the geometry its own BVH, which can be refitted.
+    rtcSetSceneBuildQuality(state.scene.get(), RTC_BUILD_QUALITY_LOW);
+    state.geometry = new_geometry(number);
+    rtcSetGeometryMask(state.geometry.get(), all_masks);
+    rtcSetGeometryBuildQuality(state.geometry.get(), RTC_BUILD_QUALITY_MEDIUM);
+    rtcCommitGeometry(state.geometry.get());
+    rtcAttachGeometry(state.scene.get(), state.geometry.get());
+    commit(state.scene.get());
+    state.quality.record_build({bytes(arena_) + from.positions.offset, bytes(arena_) + from.indices.offset,
+                                from.positions.stride, from.indices.stride, from.indices.count});
+    return state.scene.get();
 }
 
 GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
@@ -333,13 +334,13 @@ GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
     const bool spheres = from.type == ARHOST_GEOMETRY_SPHERES;
     GeometryHandle geometry(
         rtcNewGeometry(device_.get(), spheres ? RTC_GEOMETRY_TYPE_SPHERE_POINT : RTC_GEOMETRY_TYPE_TRIANGLE));
-    const auto share = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
+    const auto set_buffer = [&](RTCBufferType type, RTCFormat format, const arhost_buffer &buffer) {
         rtcSetSharedGeometryBuffer(geometry.get(), type, 0, format, &arena_, buffer.offset, buffer.stride,
                                    buffer.count);
     };
-    share(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
+    set_buffer(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
     if (!spheres)
-        share(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
+        set_buffer(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
     if (const HitFilter filter = hit_filter_of(objects_[number], textures_.data()); filter.is_needed())
         set_hit_filter(geometry.get(), *hit_filters_.emplace_back(std::make_unique<HitFilter>(filter)));
     return geometry;
@@ -362,7 +363,7 @@ RTCScene EmbreeScene::instanced_scene(std::uint32_t number) {
 }
 
 void EmbreeScene::commit(RTCScene scene) const {
-    const auto stop_if_cancelled = [&] { // small scenes are built without a report
+    const auto stop_if_cancelled = [&] { // Embree builds small scenes without calling the progress monitor
         if (host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
     };
@@ -374,7 +375,7 @@ void EmbreeScene::commit(RTCScene scene) const {
     check();
 }
 
-// Embree keeps the first error of a thread's calls until it is asked.
+// Throws the thread's first Embree error since the last call.
 void EmbreeScene::check() const {
     switch (const RTCError error = rtcGetDeviceError(device_.get())) {
     case RTC_ERROR_NONE:

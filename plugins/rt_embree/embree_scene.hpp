@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The arena as Embree sees it. Embree's buffers lie in the arena; nothing is copied.
+// Embree scenes of an arena. Embree's buffers lie in the arena; nothing is copied.
 #pragma once
 
-#include "holes.hpp"
-#include "tree_quality.hpp"
+#include "bvh_quality.hpp"
+#include "hit_filter.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
@@ -35,22 +35,21 @@ public:
     EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host);
 
     const Scene &view() const { return view_; }
-    // In the world, of the objects that can give a pixel alpha: virtual ones and catchers.
+    // World bounding boxes, by object. Empty for occluders, which never give a pixel alpha.
     const std::vector<Box> &visible_boxes() const { return visible_boxes_; }
 
-    // Brings what moves to its places; `motion` is valid until the next call or the end of tracing.
+    // Updates transforms and deformed meshes. `motion` must stay valid until the next call or the end of tracing.
     void move(const arhost_motion &motion);
-    std::uint64_t rebuilds() const { return rebuilds_; } // of deforming objects, for which a refit would not do
+    std::uint64_t rebuilds() const { return rebuilds_; } // full BVH rebuilds of deforming objects
 
 private:
-    // An object whose vertices change, in a scene of its own.
+    // A deforming object, in its own scene.
     struct Deforming {
         SceneHandle scene;
         GeometryHandle geometry;
-        TreeQuality quality;
+        BvhQuality quality;
     };
     SceneHandle new_scene(RTCSceneFlags flags) const;
-    // Of an object, by its number.
     GeometryHandle new_geometry(std::uint32_t object);
     RTCScene instanced_scene(std::uint32_t object);
     RTCScene deforming_scene(std::uint32_t object);
@@ -72,16 +71,16 @@ private:
     };
     std::vector<Instanced> instanced_;
     std::map<std::uint32_t, Deforming> deforming_; // by object
-    SceneHandle static_, root_;                    // the former only where something moves
-    SceneHandle catchers_;                         // nothing but them, where that is worth it
-    struct Place {
+    SceneHandle static_, root_;                    // static_ only if something moves
+    SceneHandle catchers_;                         // only if needs_catcher_bvh()
+    struct Placement {
         Box local;
         std::array<float, 12> world_from_object;
     };
     void place_object(std::uint32_t object, const float *world_from_object);
     void update_bounds(std::uint32_t object);
     std::vector<Object> objects_;
-    std::vector<Place> places_;
+    std::vector<Placement> placements_;
     std::vector<Box> visible_boxes_;
     std::uint64_t rebuilds_ = 0;
     std::vector<Texture> textures_;

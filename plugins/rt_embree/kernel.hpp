@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the kernel is given to trace a tile. Plain data, since the kernel is compiled for several
-// instruction sets (kernel/packet.hpp).
+// Input of the kernel. Plain data, since the kernel is compiled for several instruction sets (kernel/packet.hpp).
 #pragma once
 
 #include "embree.hpp"
@@ -17,26 +16,26 @@ namespace rt_embree {
 
 // Bits of Embree's ray masks: which objects a ray can hit.
 enum RoleMask : unsigned {
-    opaque_mask = 1, // virtual objects, but for
-    glass_mask = 2,  // those of glass
+    opaque_mask = 1, // virtual objects except glass
+    glass_mask = 2,  // virtual objects of glass
     catcher_mask = 4,
     occluder_mask = 8,
     virtual_masks = opaque_mask | glass_mask,
     all_masks = 15
 };
 
-// An object as the kernel needs it, looked up by Embree's geometry (or instance) number.
+// Indexed by Embree's geometry or instance ID.
 struct Object {
     const arhost_material *material;
     arhost_role role;
     bool has_transform;
-    // Column-major, from the object to the world: of directions, and of normals (its inverse transposed).
+    // Column-major, object to world: for directions, and for normals (inverse transpose).
     float transform[9], normal_transform[9];
     float reach[3];         // raytracer_common/arena.hpp
     const int *indices;     // of triangles
-    const float *positions; // of their corners
-    const float *normals;   // NULL where the object is flat or a sphere
-    const float *texcoords; // NULL where there are none
+    const float *positions; // of vertices
+    const float *normals;   // NULL if flat-shaded or a sphere
+    const float *texcoords; // NULL if absent
     std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
 };
 
@@ -48,7 +47,7 @@ struct Texture {
 };
 
 struct Environment {
-    const Texture *image; // NULL: there is none
+    const Texture *image; // NULL: no environment
     float intensity;
     float environment_from_world[9];
     const float *rows, *columns; // arhost/scene.h
@@ -56,10 +55,10 @@ struct Environment {
 
 struct Scene {
     RTCScene root;
-    RTCScene catchers;         // nothing but the catchers, or the same as `root`
-    std::int32_t packet_width; // Embree's
-    // The instance that holds all objects that do not move, or −2: there is none. They have the numbers of
-    // their geometries, others those of their instances.
+    RTCScene catchers;         // only the catchers, or the same as `root`
+    std::int32_t packet_width; // native to Embree on this processor
+    // The instance of all static objects, or −2 if none. Static objects are numbered by geometry ID, others by
+    // instance ID.
     std::int32_t static_instance;
     const Object *objects;
     const Texture *textures;
@@ -76,15 +75,15 @@ struct Scene {
     const float *linear_of_srgb8; // 256
 };
 
-// Directions in the camera's axes (x right, y down, z forward), in the order in which the kernel reads
-// them: tile by tile, in each block by block of 4×4 pixels. A block is one array of 16 floats for each of
-// x and y, z unless it is 1 throughout, then, unless there is one sample a pixel, the same of their slopes
-// along the image's rows and of those along its columns, per px. x is NaN where the lens sees nothing.
+// Directions in camera axes (x right, y down, z forward), in the kernel's order: by tile, then by block of 4×4
+// pixels. A block is 16 floats each of x, y and, unless it is always 1, z; with several samples per pixel, followed
+// by the same of the derivatives along image rows and along columns, per px. x is NaN for pixels that no direction
+// maps to.
 struct Rays {
     const float *blocks;
     std::int32_t dimensions; // 2 or 3
-    bool has_slopes;
-    std::int32_t block_size() const { return 16 * dimensions * (has_slopes ? 3 : 1); }
+    bool has_derivatives;
+    std::int32_t block_size() const { return 16 * dimensions * (has_derivatives ? 3 : 1); }
 };
 
 struct Camera {
@@ -98,41 +97,41 @@ struct Frame {
     Camera camera;
     const arhost::view::Sample *samples;
     std::int32_t sample_count;
-    std::uint32_t first_sample; // of all that are averaged: where in their random sequences these begin
-    float *history[4];          // NULL, or the sums of the samples before, of all tiles' pixels (Scratch::sum)
-    std::int32_t light_samples; // shadow rays to an extended light
-    bool one_path;              // glass sends one ray on, chosen at random, in place of two
+    std::uint32_t first_sample; // samples accumulated before this frame: offset into the random sequences
+    float *history[4];          // NULL, or their sums for the pixels of all tiles (as Scratch::sum)
+    std::int32_t light_samples; // shadow rays per area light
+    bool single_path;           // glass spawns one random ray instead of two
     std::uint8_t *rgba;
     std::uint32_t stride;
 };
 
 struct Rectangle {
-    std::int32_t x0, y0, x1, y1; // px; x1 and y1 are outside
+    std::int32_t x0, y0, x1, y1; // px; x1 and y1 are exclusive
 };
 
 struct Tile {
     Rectangle pixels;
-    std::size_t first_block; // of its rays
+    std::size_t first_block; // in Rays::blocks
 };
 
 inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_side; // px
 
-// Rays that wait to be traced, of one depth: `rows` arrays of `capacity` numbers.
-struct WaitingRays {
-    static constexpr int rows = 10; // origin, direction, throughput (floats), pixel (int)
-    float *numbers;
+// Secondary rays of one depth, in `rows` arrays of `capacity` values.
+struct RayQueue {
+    static constexpr int rows = 10; // origin, direction, throughput (floats), pixel index (bits of an int)
+    float *values;
     std::int32_t count, capacity;
 };
 
-// A thread's notes on the tile that it works at. Arrays of pixels are in the blocks' order.
+// A thread's working memory for one tile. Pixels are in block order.
 struct Scratch {
-    float *light[3], *alpha; // of one sample: linear, straight
-    float *sum[4];           // of all: premultiplied, encoded; alpha
-    WaitingRays *waiting;    // by depth, the scene's max_depth + 1 of them
+    float *radiance[3], *alpha; // of one sample: linear, straight alpha
+    float *sum[4];              // of all samples: sRGB-encoded, premultiplied; alpha
+    RayQueue *queues;           // by depth, the scene's max_depth + 1 of them
 };
 
-// Traces and writes the pixels of a tile, and tells in which part of it (to 4 pixels) any alpha is not 0;
-// an empty part has x1 <= x0.
+// Renders a tile. Returns the bounding rectangle of its non-zero alphas, rounded out to blocks of 4×4 pixels; empty:
+// x1 <= x0.
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
 struct Kernel {

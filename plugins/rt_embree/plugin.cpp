@@ -18,9 +18,9 @@ public:
         settings_.robust = options.boolean("robust");
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
-        settings_.one_path = options.text("glass") == "path";
+        settings_.single_path = options.text("glass") == "path";
         settings_.instruction_set = options.text("instruction_set");
-        choose_kernel(settings_.instruction_set); // refuses now what can't run
+        choose_kernel(settings_.instruction_set); // fail early if unsupported
     }
 
     void start(const arhost_raytracer_setup &setup) {
@@ -54,22 +54,18 @@ constexpr const char *glass[] = {"tree", "path", nullptr};
 constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays a pixel, spread evenly over it.", 1, 256),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, evenly spread over it.", 1, 256),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
-                   "Shadow rays from each of these to a light that has an extent, or to the environment.", 1, 256),
-    arhost::option(
-        ARHOST_OPTION_BOOL, "accumulate", "false",
-        "Average over frames while the camera and the scene stand still: an image then depends on the ones "
-        "before."),
+                   "Shadow rays per primary or secondary ray to each area light and to the environment.", 1, 256),
+    arhost::option(ARHOST_OPTION_BOOL, "accumulate", "false",
+                   "Average over frames while camera and scene are static; images then depend on the previous ones."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
-                   "Rays that glass sends on: 'tree' follows both, 'path' one that is chosen at random.", 0, 0,
+                   "Rays traced at glass: 'tree': reflected and refracted; 'path': a random one of them.", 0, 0,
                    glass),
-    arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Threads that trace; 0: one a processor.", 0, 256),
-    arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
-                   "Watertight at the edges that triangles share, about a tenth slower."),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
+    arhost::option(ARHOST_OPTION_BOOL, "robust", "false", "Watertight at shared triangle edges; about 10 % slower."),
     arhost::option(ARHOST_OPTION_TEXT, "instruction_set", "auto",
-                   "The processor's vector instructions to shade with; auto: the widest that it has.", 0, 0,
-                   instruction_sets)};
+                   "Vector instructions used for shading; auto: the widest available.", 0, 0, instruction_sets)};
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_RAYTRACER,
@@ -78,7 +74,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "Ray tracer on the processor: packets of 16 rays through Intel Embree.",
+                                          "CPU ray tracer: packets of 16 rays traced by Intel Embree.",
                                           ARHOST_CAPABILITY_LENS_DISTORTION,
                                           std::size(options),
                                           options,

@@ -11,7 +11,7 @@ namespace {
 using Direction = arhost::shading::Vec3T<double>;
 
 constexpr std::int32_t block = 4, lanes = block * block;
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 constexpr std::int32_t blocks_in(std::int32_t side) {
     return (side + block - 1) / block;
@@ -19,8 +19,8 @@ constexpr std::int32_t blocks_in(std::int32_t side) {
 
 } // namespace
 
-RayTable::RayTable(const arhost_intrinsics &intrinsics, bool has_slopes, ThreadPool &threads)
-    : dimensions_(intrinsics.distortion == ARHOST_DISTORTION_FISHEYE ? 3 : 2), has_slopes_(has_slopes) {
+RayTable::RayTable(const arhost_intrinsics &intrinsics, bool has_derivatives, ThreadPool &threads)
+    : dimensions_(intrinsics.distortion == ARHOST_DISTORTION_FISHEYE ? 3 : 2), has_derivatives_(has_derivatives) {
     const auto width = static_cast<std::int32_t>(intrinsics.width);
     const auto height = static_cast<std::int32_t>(intrinsics.height);
     tiles_across_ = (width + tile_side - 1) / tile_side;
@@ -39,16 +39,14 @@ RayTable::RayTable(const arhost_intrinsics &intrinsics, bool has_slopes, ThreadP
 }
 
 void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {
-    const auto look = [&](double x, double y) {
-        return lens.ray({x, y}).value_or(Direction{nothing, nothing, nothing});
-    };
+    const auto direction_at = [&](double x, double y) { return lens.ray({x, y}).value_or(Direction{nan, nan, nan}); };
     const double infinity = std::numeric_limits<double>::infinity();
     Window window{infinity, infinity, -infinity, -infinity, false};
     const auto widen = [&](Direction d) {
         if (std::isnan(d.x))
             return;
         if (d.z < 1e-3)
-            window.everything = true;
+            window.unbounded = true;
         window.x0 = std::min(window.x0, d.x / d.z);
         window.y0 = std::min(window.y0, d.y / d.z);
         window.x1 = std::max(window.x1, d.x / d.z);
@@ -68,13 +66,13 @@ void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {
             for (std::int32_t lane = 0; lane < lanes; ++lane) {
                 const std::int32_t column = x + lane % block, row = y + lane / block;
                 const double u = column, v = row;
-                const Direction centre = look(u, v);
+                const Direction centre = direction_at(u, v);
                 widen(centre);
                 store(centre, to + lane);
-                if (!has_slopes_)
+                if (!has_derivatives_)
                     continue;
-                const Direction right = look(u + 0.5, v), left = look(u - 0.5, v);
-                const Direction below = look(u, v + 0.5), above = look(u, v - 0.5);
+                const Direction right = direction_at(u + 0.5, v), left = direction_at(u - 0.5, v);
+                const Direction below = direction_at(u, v + 0.5), above = direction_at(u, v - 0.5);
                 const Direction along_row = right - left, along_column = below - above;
                 store(along_row, to + lane + lanes * dimensions_);
                 store(along_column, to + lane + 2 * lanes * dimensions_);

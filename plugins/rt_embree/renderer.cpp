@@ -23,7 +23,7 @@ using Vec3d = arhost::shading::Vec3T<double>;
     throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, message);
 }
 
-// What of the plane z = 1 a box covers: nothing where it lies behind the camera.
+// The part of the plane z = 1 that a box covers; empty if it lies behind the camera.
 Window window_of(const Box &box, const Pose &pose) {
     const double infinity = std::numeric_limits<double>::infinity();
     Window window{infinity, infinity, -infinity, -infinity, false};
@@ -38,19 +38,19 @@ Window window_of(const Box &box, const Pose &pose) {
             continue;
         }
         const double x = dot(p, pose.right) / z, y = dot(p, pose.down) / z;
-        // More than single precision loses in a ray's direction and origin.
+        // Exceeds single-precision errors of a ray's direction and origin.
         const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(pose.eye) / z;
         window.x0 = std::min(window.x0, x - margin);
         window.y0 = std::min(window.y0, y - margin);
         window.x1 = std::max(window.x1, x + margin);
         window.y1 = std::max(window.y1, y + margin);
     }
-    window.everything = behind > 0 && behind < 8;
+    window.unbounded = behind > 0 && behind < 8;
     return window;
 }
 
-// Of a still picture: the noise that is left, and what float sums lose, is below half a code. From then on it stays.
-constexpr std::uint32_t enough_samples = 1u << 16;
+// By then, noise and the rounding of float sums are below half an 8-bit code; the image no longer changes.
+constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
@@ -74,48 +74,49 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
 } // namespace
 
 Kernel choose_kernel(const std::string &instruction_set) {
-    const auto wanted = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
+    const auto requested = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
 #if defined(ARHOST_HAS_AVX512)
-    if (wanted("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+    if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
         return {avx512::render_tile, "avx512"};
 #endif
 #if defined(__x86_64__)
-    if (wanted("avx2") && __builtin_cpu_supports("avx2"))
+    if (requested("avx2") && __builtin_cpu_supports("avx2"))
         return {avx2::render_tile, "avx2"};
 #endif
-    if (wanted("base"))
+    if (requested("base"))
         return {base::render_tile, "base"};
-    throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "option 'instruction_set': this processor or build has no " +
-                                                       instruction_set + "; set it to 'auto'");
+    throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                  "option 'instruction_set': this processor or build does not support " + instruction_set +
+                      "; set it to 'auto'");
 }
 
-ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) {
-    // Two rays a pixel may wait after the first hit, fewer than three packets after others (scatter.inl). A
-    // packet is read whole, so that each row has room for one more.
+ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
+    // Up to two queued rays per pixel after the first hit, fewer than three packets after others (scatter.inl).
+    // Packets are read whole, so each row needs one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = 8;
-    numbers_.resize(std::size_t{pixel_rows} * tile_pixels +
-                    std::size_t{WaitingRays::rows} * (first_capacity + std::size_t{max_depth} * capacity));
-    float *next = numbers_.data();
+    storage_.resize(std::size_t{pixel_rows} * tile_pixels +
+                    std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
+    float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
-    for (float **row : {&scratch_.light[0], &scratch_.light[1], &scratch_.light[2], &scratch_.alpha, &scratch_.sum[0],
-                        &scratch_.sum[1], &scratch_.sum[2], &scratch_.sum[3]})
+    for (float **row : {&scratch_.radiance[0], &scratch_.radiance[1], &scratch_.radiance[2], &scratch_.alpha,
+                        &scratch_.sum[0], &scratch_.sum[1], &scratch_.sum[2], &scratch_.sum[3]})
         *row = take(tile_pixels);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
         const std::int32_t size = depth == 0 ? first_capacity : capacity;
-        waiting_[depth] = {take(WaitingRays::rows * size), 0, size};
+        queues_[depth] = {take(RayQueue::rows * size), 0, size};
     }
-    scratch_.waiting = waiting_.data();
+    scratch_.queues = queues_.data();
 }
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
       kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
-      samples_a_frame_(settings.samples), samples_(arhost::view::sample_positions(settings.samples)),
+      samples_per_frame_(settings.samples), samples_(arhost::view::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
-      one_path_(settings.one_path) {
+      single_path_(settings.single_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)
@@ -124,10 +125,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!same(camera.intrinsics, intrinsics_))
-        refuse("the camera's intrinsics are not those of start");
+        refuse("the camera's intrinsics differ from those passed to start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width)
-        refuse("the image to write is not of the size of start");
+        refuse("the output image's size differs from the one passed to start");
     const Pose pose(camera);
     if (motion)
         scene_.move(*motion);
@@ -138,11 +139,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
     std::array<float *, 4> history{};
     if (!history_.empty()) {
-        if (motion || !still_camera_ || !same_view(*still_camera_, camera))
+        if (motion || !history_camera_ || !same_view(*history_camera_, camera))
             history_samples_ = 0;
-        still_camera_ = camera;
-        samples_ = arhost::view::sample_positions(history_samples_,
-                                                  history_samples_ < enough_samples ? samples_a_frame_ : 0);
+        history_camera_ = camera;
+        samples_ = arhost::view::sample_positions(
+            history_samples_, history_samples_ < max_accumulated_samples ? samples_per_frame_ : 0);
         for (std::size_t i = 0; i < 4; ++i)
             history[i] = history_.data() + i * (history_.size() / 4);
     }
@@ -154,7 +155,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                       history_samples_,
                       {history[0], history[1], history[2], history[3]},
                       light_samples_,
-                      one_path_,
+                      single_path_,
                       image.rgba,
                       image.stride};
     const std::vector<Tile> &tiles = ray_table_.tiles();
@@ -162,9 +163,10 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     std::mutex drawn_mutex;
     threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {
         const Tile &tile = tiles[i];
-        const bool worthwhile = std::any_of(windows.begin(), windows.end(),
-                                            [&](const Window &window) { return ray_table_.window(i).meets(window); });
-        if (!worthwhile || host_.cancelled())
+        const bool visible = std::any_of(windows.begin(), windows.end(), [&](const Window &window) {
+            return ray_table_.window(i).intersects(window);
+        });
+        if (!visible || host_.cancelled())
             return clear(image, tile.pixels);
         const Rectangle part = kernel_.render_tile(frame, tile, *scratch_[thread]);
         if (part.x0 < part.x1) {
@@ -173,7 +175,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         }
     });
     if (host_.cancelled()) {
-        still_camera_.reset(); // what has been summed up has holes
+        history_camera_.reset(); // the sums are incomplete
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while an image was traced");
     }
     if (!history_.empty())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From a camera to an image: which tiles are worth tracing, and who traces them.
+// Renders an image for a camera: selects the visible tiles and distributes them over threads.
 #pragma once
 
 #include "embree_scene.hpp"
@@ -16,24 +16,24 @@
 namespace rt_embree {
 
 struct Settings {
-    std::uint32_t samples = 1; // a pixel
-    unsigned threads = 0;      // 0: one a processor
+    std::uint32_t samples = 1; // per pixel
+    unsigned threads = 0;      // 0: one per processor
     bool robust = false;
-    std::int32_t light_samples = 4; // shadow rays to an extended light, from each sample
-    bool accumulate = false;        // average over frames while the camera stands still
-    bool one_path = false;          // glass sends one ray on, chosen at random, in place of two
+    std::int32_t light_samples = 4; // shadow rays per ray and area light
+    bool accumulate = false;        // average over frames while camera and scene are static
+    bool single_path = false;       // glass spawns one random ray instead of two
     std::string instruction_set = "auto";
 };
 
-// A thread's scratch memory.
+// Owns a thread's `Scratch`.
 class ScratchMemory {
 public:
     explicit ScratchMemory(std::uint32_t max_depth);
     Scratch &operator*() { return scratch_; }
 
 private:
-    std::vector<float> numbers_;
-    std::vector<WaitingRays> waiting_;
+    std::vector<float> storage_;
+    std::vector<RayQueue> queues_;
     Scratch scratch_{};
 };
 
@@ -41,8 +41,8 @@ class Renderer {
 public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host);
 
-    // Returns the part of the image that holds all alpha above 0; empty: x1 <= x0. `motion` may be NULL:
-    // everything is where it was.
+    // Returns a rectangle that contains all non-zero alphas; empty: x1 <= x0. `motion` may be NULL: nothing has
+    // moved.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
     const EmbreeScene &scene() const { return scene_; }
 
@@ -55,20 +55,20 @@ private:
     Kernel kernel_;
     ThreadPool threads_;
     RayTable ray_table_;
-    std::uint32_t samples_a_frame_;
+    std::uint32_t samples_per_frame_;
     std::vector<arhost::view::Sample> samples_; // of this frame
     EmbreeScene scene_;
-    std::vector<ScratchMemory> scratch_; // one a thread
+    std::vector<ScratchMemory> scratch_; // one per thread
     std::int32_t light_samples_;
-    bool one_path_;
+    bool single_path_;
 
-    // Of accumulation: what has been summed up so far, and for which camera.
-    std::vector<float> history_; // empty where frames stand alone
+    // Accumulation: sample sums so far, and the camera they belong to.
+    std::vector<float> history_; // empty unless accumulating
     std::uint32_t history_samples_ = 0;
-    std::optional<arhost_camera> still_camera_;
+    std::optional<arhost_camera> history_camera_;
 };
 
-// The kernel of that name, or with "auto" the widest that this processor can run.
+// The named kernel, or for "auto" the widest that this processor supports. Throws Failure if unsupported.
 Kernel choose_kernel(const std::string &instruction_set);
 
 } // namespace rt_embree

@@ -26,7 +26,7 @@ ThreadPool::ThreadPool(unsigned threads) {
     if (threads == 0)
         threads = std::max(1u, std::thread::hardware_concurrency());
     for (unsigned i = 1; i < threads; ++i)
-        helpers_.emplace_back([this, i](const std::stop_token &stop) { help(stop, i); });
+        helpers_.emplace_back([this, i](const std::stop_token &stop) { run_helper(stop, i); });
 }
 
 void ThreadPool::for_each(std::size_t count, const Work &work) {
@@ -34,34 +34,34 @@ void ThreadPool::for_each(std::size_t count, const Work &work) {
         std::lock_guard lock(mutex_);
         work_ = &work;
         count_ = count;
-        // Relaxed: the mutex publishes it to the helpers with the rest.
+        // Relaxed: the mutex publishes it to the helpers.
         next_.store(0, std::memory_order_relaxed);
         busy_ = helpers_.size();
         ++round_;
     }
-    called_.notify_all();
-    take_turns(0);
-    // Each helper's results are published by its unlocking of the mutex in help().
+    started_.notify_all();
+    run_items(0);
+    // Pairs with each helper's unlock in run_helper(), which publishes its results.
     std::unique_lock lock(mutex_);
     done_.wait(lock, [this] { return busy_ == 0; });
 }
 
-void ThreadPool::help(const std::stop_token &stop, std::size_t thread) {
+void ThreadPool::run_helper(const std::stop_token &stop, std::size_t thread) {
     std::size_t seen = 0;
     std::unique_lock lock(mutex_);
-    while (called_.wait(lock, stop, [&] { return round_ != seen; })) {
+    while (started_.wait(lock, stop, [&] { return round_ != seen; })) {
         seen = round_;
         lock.unlock();
-        take_turns(thread);
+        run_items(thread);
         lock.lock();
         if (--busy_ == 0)
             done_.notify_one();
     }
 }
 
-void ThreadPool::take_turns(std::size_t thread) {
+void ThreadPool::run_items(std::size_t thread) {
     const FlushDenormals flush;
-    // Relaxed: only the number itself matters, and each is given out once.
+    // Relaxed: fetch_add alone makes each index unique; no other data depends on its order.
     for (std::size_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
         (*work_)(i, thread);
 }

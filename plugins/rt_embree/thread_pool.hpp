@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A few threads that share out the tiles of one image at a time.
+// Threads that process the tiles of one image in parallel.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@
 
 namespace rt_embree {
 
-// While it lives, this thread's denormal floats count as 0: they would cost a hundred cycles each.
+// RAII: the thread treats denormal floats as 0, as they cost a hundred cycles each.
 class FlushDenormals {
 public:
     FlushDenormals();
@@ -28,27 +28,26 @@ private:
 
 class ThreadPool {
 public:
-    // So many threads work, the caller's own included; 0: one a processor.
+    // `threads`: including the calling thread; 0: one per processor.
     explicit ThreadPool(unsigned threads);
     unsigned thread_count() const { return static_cast<unsigned>(helpers_.size()) + 1; }
 
-    // Calls work(i, thread) for i from 0 to count − 1, each once, on whichever thread is free (0 to
-    // thread_count() − 1), and returns when all are done. `work` throws nothing. Not to be called by two
-    // threads at once.
+    // Calls work(i, thread) once for each i in [0, count), distributed over threads 0 to thread_count() − 1, and
+    // waits for all. `work` must not throw. Not thread-safe.
     using Work = std::function<void(std::size_t i, std::size_t thread)>;
     void for_each(std::size_t count, const Work &work);
 
 private:
-    void help(const std::stop_token &stop, std::size_t thread);
-    void take_turns(std::size_t thread);
+    void run_helper(const std::stop_token &stop, std::size_t thread);
+    void run_items(std::size_t thread);
 
-    std::mutex mutex_; // guards what follows, but for next_
-    std::condition_variable_any called_;
+    std::mutex mutex_; // guards the members below except next_
+    std::condition_variable_any started_;
     std::condition_variable done_;
     const Work *work_ = nullptr;
     std::size_t count_ = 0, round_ = 0, busy_ = 0;
     std::atomic<std::size_t> next_{0};
-    std::vector<std::jthread> helpers_; // last: joined before the rest goes
+    std::vector<std::jthread> helpers_; // last: joined before the other members are destroyed
 };
 
 } // namespace rt_embree

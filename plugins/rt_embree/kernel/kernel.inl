@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The integrator: from a tile's primary rays, block by block of 4×4 pixels, to their colours and alphas.
-// Included by <isa>.cpp, which defines ARHOST_ISA.
+// The integrator: traces a tile in blocks of 4×4 pixels. Included by <isa>.cpp, which defines ARHOST_ISA.
 #include "kernel.hpp"
 #include "packet.hpp"
 
 namespace rt_embree::ARHOST_ISA {
 namespace {
 
-// The parts lie in this namespace, so that each instruction set has its own.
+// Included here so that each instruction set has its own copy.
 #include "scatter.inl"
 
 constexpr int block = 4; // px a side
 
-// What a virtual object behind a catcher looks like does not depend on the catcher; an occluder in front
-// of anything hides it. Returns the alphas, and tells whether there is any colour to them.
+// Returns the alphas; `coloured`: any of the pixels has radiance. Catchers do not hide virtual objects behind them,
+// occluders hide everything.
 ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool active, bool &coloured) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
@@ -32,18 +31,18 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
 
     coloured = any(is_virtual) || (scene.has_catchers && scene.coloured_shadows);
     if (coloured)
-        for (float *light : work.scratch.light)
-            store(light + first_pixel, Float(0.0f));
+        for (float *plane : work.scratch.radiance)
+            store(plane + first_pixel, Float(0.0f));
     Float alpha = select(is_virtual, Float(1.0f), Float(0.0f));
     if (scene.has_catchers && any(rest)) {
-        RTCRayHit16 onwards;
-        set_ray(onwards.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
-        const Bool caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), onwards, rest);
+        RTCRayHit16 to_catcher;
+        set_ray(to_catcher.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
+        const Bool caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), to_catcher, rest);
         if (any(caught)) {
-            const CaughtShadow shadow = caught_shadow(work.frame, onwards, caught, random_of(work, paths));
+            const CatcherShadow shadow = catcher_shadow(work.frame, to_catcher, caught, random_of(work, paths));
             alpha = select(caught, shadow.alpha, alpha);
             if (scene.coloured_shadows)
-                add_light(work, paths, shadow.colour, caught);
+                add_radiance(work, paths, shadow.colour, caught);
         }
     }
     if (any(is_virtual))
@@ -51,7 +50,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     return alpha;
 }
 
-// A block's directions, or one of their slopes.
+// Loads a block's directions or their derivatives.
 ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float z) {
     return {load(arrays), load(arrays + lanes), dimensions == 3 ? load(arrays + 2 * lanes) : Float(z)};
 }
@@ -59,7 +58,7 @@ ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float
 ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, std::uint32_t sample) {
     const std::int32_t dimensions = frame.rays.dimensions, step = lanes * dimensions;
     Vec3 direction = load_rays(rays, dimensions, 1);
-    if (frame.rays.has_slopes)
+    if (frame.rays.has_derivatives)
         direction = direction + load_rays(rays + step, dimensions, 0) * Float(frame.samples[sample].x) +
                     load_rays(rays + 2 * step, dimensions, 0) * Float(frame.samples[sample].y);
     return transform(frame.camera.world_from_camera, direction);
@@ -77,28 +76,28 @@ ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
     return r | (g << Int(8)) | (b << Int(16)) | (a << Int(24));
 }
 
-ARHOST_INLINE Vec3 light_of(const Scratch &scratch, int first_pixel) {
-    return {load(scratch.light[0] + first_pixel), load(scratch.light[1] + first_pixel),
-            load(scratch.light[2] + first_pixel)};
+ARHOST_INLINE Vec3 radiance_of(const Scratch &scratch, int first_pixel) {
+    return {load(scratch.radiance[0] + first_pixel), load(scratch.radiance[1] + first_pixel),
+            load(scratch.radiance[2] + first_pixel)};
 }
 
-// One sample's pixels.
+// Pixels of a single sample.
 ARHOST_INLINE Int encode(const Frame &frame, const Scratch &scratch, int first_pixel, bool coloured) {
     const Int alpha = to_int(code_8bit(load(scratch.alpha + first_pixel)));
     if (!coloured)
         return alpha << Int(24);
-    const Vec3 light = light_of(scratch, first_pixel);
+    const Vec3 radiance = radiance_of(scratch, first_pixel);
     const auto &table = *frame.scene.srgb8;
-    return rgba8(srgb8(table, light.x), srgb8(table, light.y), srgb8(table, light.z), alpha);
+    return rgba8(srgb8(table, radiance.x), srgb8(table, radiance.y), srgb8(table, radiance.z), alpha);
 }
 
-// Several samples: premultiplied sums of what the composite will mix, encoded light.
+// Sums samples as the compositor mixes them: sRGB-encoded, premultiplied.
 ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, bool first) {
     const Float alpha = load(scratch.alpha + first_pixel);
     Vec3 colour = black();
     if (coloured) {
-        const Vec3 light = light_of(scratch, first_pixel);
-        colour = Vec3{srgb_encode(light.x), srgb_encode(light.y), srgb_encode(light.z)} * alpha;
+        const Vec3 radiance = radiance_of(scratch, first_pixel);
+        colour = Vec3{srgb_encode(radiance.x), srgb_encode(radiance.y), srgb_encode(radiance.z)} * alpha;
     }
     const Float values[4] = {colour.x, colour.y, colour.z, alpha};
     for (int i = 0; i < 4; ++i) {
@@ -107,8 +106,8 @@ ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, 
     }
 }
 
-// Adds the sums of the frames before to those of this one, and keeps them. A frame may add no sample.
-ARHOST_INLINE void remember(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
+// Adds the sums of previous frames to this one's and stores the result. A frame may have no samples.
+ARHOST_INLINE void add_history(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
     for (int i = 0; i < 4; ++i) {
         float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
         if (frame.sample_count == 0)
@@ -121,10 +120,10 @@ ARHOST_INLINE void remember(const Frame &frame, Scratch &scratch, std::size_t fi
 
 ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::uint32_t count) {
     const Float alpha = load(scratch.sum[3] + first_pixel);
-    // Premultiplied means, then straight: the sums' common divisor cancels out.
-    const Float share = Float(1.0f) / max(alpha, Float(1e-6f));
+    // Straight alpha; the sample count cancels out.
+    const Float scale = Float(1.0f) / max(alpha, Float(1e-6f));
     const auto code = [&](int i) __attribute__((always_inline)) {
-        return to_int(code_8bit(load(scratch.sum[i] + first_pixel) * share));
+        return to_int(code_8bit(load(scratch.sum[i] + first_pixel) * scale));
     };
     return rgba8(code(0), code(1), code(2), to_int(code_8bit(alpha * Float(1.0f / static_cast<float>(count)))));
 }
@@ -140,12 +139,12 @@ ARHOST_INLINE void write_block(const Frame &frame, int x, int y, int width, int 
     }
 }
 
-// The tile's blocks, row by row: use(number, x, y, width, height).
+// Calls use(index, x, y, width, height) for each block, row by row.
 template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use use) {
-    int number = 0;
+    int index = 0;
     for (int y = all.y0; y < all.y1; y += block)
-        for (int x = all.x0; x < all.x1; x += block, ++number)
-            use(number, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
+        for (int x = all.x0; x < all.x1; x += block, ++index)
+            use(index, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
 }
 
 } // namespace
@@ -157,7 +156,7 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
     Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
     bool coloured[tile_pixels / lanes];
-    const bool averages = frame.sample_count != 1 || frame.history[0];
+    const bool has_sums = frame.sample_count != 1 || frame.history[0];
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
         work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
@@ -165,11 +164,11 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
             const int first_pixel = number * lanes;
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
             const Bool inside =
-                (column < Int(width)) & (row < Int(height)) & (direction.x == direction.x); // NaN: the lens is blind
+                (column < Int(width)) & (row < Int(height)) & (direction.x == direction.x); // NaN: no ray
             store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
         });
-        follow_all(work);
-        if (averages)
+        trace_queued_rays(work);
+        if (has_sums)
             for_each_block(all, [&](int number, int, int, int, int) {
                 accumulate(scratch, number * lanes, coloured[number], i == 0);
             });
@@ -177,12 +176,12 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
         const int first_pixel = number * lanes;
         if (frame.history[0])
-            remember(frame, scratch, tile.first_block * lanes, first_pixel);
+            add_history(frame, scratch, tile.first_block * lanes, first_pixel);
         const Int pixels =
-            averages ? mean(scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count))
+            has_sums ? mean(scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count))
                      : encode(frame, scratch, first_pixel, coloured[number]);
         write_block(frame, x, y, width, height, pixels);
-        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside have alpha 0
+        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside the tile have alpha 0
             drawn.x0 = x < drawn.x0 ? x : drawn.x0;
             drawn.y0 = y < drawn.y0 ? y : drawn.y0;
             drawn.x1 = x + width > drawn.x1 ? x + width : drawn.x1;

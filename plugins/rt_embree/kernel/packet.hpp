@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sixteen numbers at once: the Float, Bool and Int that the kernel shades a packet of rays with.
+// SIMD packets of 16 lanes, Embree's widest: Float, Bool and Int, built from compiler vector types of the machine's
+// register width.
 //
-// They are made of the compiler's vector types, as wide as the machine's registers are; a packet always
-// has 16 lanes, as Embree's widest ones do. The kernel is compiled once for each instruction set, in a
-// namespace of its own (ARHOST_ISA), so that no function of one can be linked into another. It calls no
-// inline function of the standard library for the same reason.
+// The kernel is compiled once per instruction set, each in its own namespace (ARHOST_ISA), so that code for one
+// instruction set is never linked into another. For the same reason it calls no inline functions of the standard
+// library.
 //
-// Not Highway: its vectors are as wide as the machine's, so that every formula would have to loop. Not
-// target_clones: GCC lowers vector types to the base instruction set before it clones.
+// Highway is not used because its vectors are as wide as the machine's, so that every formula would have to loop;
+// target_clones is not because GCC lowers vector types to the base instruction set before it clones.
 #pragma once
 
 #include <arhost/shading/vec3.hpp>
@@ -33,8 +33,8 @@ inline constexpr int width = 4;
 typedef float FloatPart __attribute__((vector_size(4 * width)));
 typedef int IntPart __attribute__((vector_size(4 * width)));
 
-// As many registers as hold `count` lanes. Halves of halves rather than an array: GCC keeps members in
-// registers, but arrays in memory.
+// The registers that hold `count` lanes. Nested halves rather than an array: GCC keeps members in registers, but
+// arrays in memory.
 template <class Part, int count> struct Wide { Wide<Part, count / 2> low, high; };
 template <class Part> struct Wide<Part, width> { Part part; };
 
@@ -48,7 +48,7 @@ template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To 
     }
 }
 
-// A function of the packets a (and b), given as an expression of their registers a (and b).
+// Body of a function of the packets a (and b): `expression` in their registers a_ (and b_).
 #define ARHOST_UNARY(Type, expression)                                                                               \
     Type to;                                                                                                         \
     apply(                                                                                                           \
@@ -116,7 +116,7 @@ ARHOST_INLINE Bool bool_of(bool b) {
         [b]() __attribute__((always_inline)) { return IntPart{} - static_cast<int>(b); }, a.lane);
     return a;
 }
-// NaN in `a` gives b.
+// If `a` is NaN, the result is b.
 ARHOST_INLINE Float min(Float a, Float b) {
     ARHOST_BINARY(Float, a_ < b_ ? a_ : b_);
 }
@@ -163,7 +163,6 @@ ARHOST_INLINE Float abs(Float a) {
 ARHOST_INLINE Vec3 vec3(Float x, Float y, Float z) {
     return {x, y, z};
 }
-// Zeros come in from the left.
 ARHOST_INLINE Int shift_right_unsigned(Int a, int bits) {
     return (a >> Int(bits)) & Int(static_cast<int>(~0u >> bits));
 }
@@ -191,7 +190,7 @@ ARHOST_INLINE Vec3 normalize(Vec3 a) {
     return a * (Float(1.0f) / length(a));
 }
 
-// A bit a lane.
+// One bit per lane.
 ARHOST_INLINE unsigned mask_of(Wide<IntPart, width> b) {
 #if defined(__AVX512DQ__)
     return _mm512_movepi32_mask(reinterpret_cast<__m512i>(b.part));
@@ -213,7 +212,6 @@ ARHOST_INLINE bool any(Bool b) {
     return mask_of(b.lane) != 0;
 }
 
-// table[index], lane by lane.
 ARHOST_INLINE IntPart gather(const int *table, IntPart index) {
 #if defined(__AVX512F__)
     return reinterpret_cast<IntPart>(
@@ -236,8 +234,8 @@ ARHOST_INLINE Float gather(const float *table, Int index) {
     return float_of(gather(reinterpret_cast<const int *>(table), index));
 }
 
-// Embree's arrays of 16. Register by register: whole packets GCC copies in halves of registers, which the
-// processor can't forward to the load that follows.
+// Arrays of 16, as in Embree's packets. Copied register by register: GCC copies whole packets in halves of
+// registers, which the processor can't forward to the following load.
 template <class To> ARHOST_INLINE void load_registers(To &to, const void *from) {
     if constexpr (requires { to.part; }) {
         __builtin_memcpy(&to.part, from, sizeof to.part);
@@ -280,8 +278,8 @@ ARHOST_INLINE void store(int *to, Bool a) {
     store_registers(to, a.lane);
 }
 
-// log2 of a positive, normal number, to 2e-7: the mantissa brought to [√½, √2), then the odd series
-// 2 atanh(s) / ln 2 in s = (m − 1)/(m + 1).
+// log2 of a positive, normal number, error 2e-7: mantissa m in [√½, √2), odd series 2 atanh(s) / ln 2 in
+// s = (m − 1)/(m + 1).
 ARHOST_INLINE Float log2(Float a) {
     const Int bits = bits_of(a) - Int(0x3f3504f3); // √½
     const Int exponent = bits >> Int(23);
@@ -293,7 +291,7 @@ ARHOST_INLINE Float log2(Float a) {
     return to_float(exponent) + s * series;
 }
 
-// 2^a, to 2e-7 relative: the whole part into the exponent, the Taylor series of e^(x ln 2) on [−½, ½].
+// 2^a, relative error 2e-7: integer part into the exponent, Taylor series of e^(x ln 2) on [−½, ½].
 ARHOST_INLINE Float exp2(Float a) {
     const Float x = min(max(a, Float(-126.0f)), Float(127.0f));
     const Float whole = floor(x + Float(0.5f)), f = x - whole;
@@ -310,7 +308,7 @@ ARHOST_INLINE Float pow(Float a, Float b) { // a > 0
     return exp2(b * log2(a));
 }
 
-// The Taylor series of the sine on a quarter turn to both sides, to 6e-8.
+// sin(2πt), error 6e-8: Taylor series on [−¼, ¼] turns.
 ARHOST_INLINE Float sine_of_turn(Float t) {
     const Float x = t - floor(t + Float(0.5f)); // −½ to ½
     const Float folded = select(abs(x) > Float(0.25f), select(x < Float(0.0f), Float(-0.5f), Float(0.5f)) - x, x);
@@ -323,8 +321,8 @@ ARHOST_INLINE Float sine_of_turn(Float t) {
 ARHOST_INLINE Float cosine_of_turn(Float t) {
     return sine_of_turn(t + Float(0.25f));
 }
-// The angle of (x, y) from the y axis to the x axis in turns, −½ to ½, to 2e-6
-// (Abramowitz and Stegun, 4.4.49).
+// The angle of (x, y) from the y axis towards the x axis in turns, −½ to ½, error 2e-6 (Abramowitz and Stegun,
+// 4.4.49).
 ARHOST_INLINE Float turn_of(Float x, Float y) {
     const Float ax = abs(x), ay = abs(y);
     const Float q = min(ax, ay) / max(max(ax, ay), Float(1e-30f)), q2 = q * q;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Numbers that look random, the same in each run: every pixel walks the same even sequence, each from a point
-// of its own.
+// Deterministic quasi-random numbers: all pixels use the same sequence, each with a hashed start.
 #pragma once
 #include "trace.inl"
 
-// A hash of 32 bits (C. Wellons' "lowbias32").
+// 32-bit hash (C. Wellons' "lowbias32").
 ARHOST_INLINE Int hash(Int x) {
     x = (x ^ shift_right_unsigned(x, 16)) * Int(0x7feb352d);
     x = (x ^ shift_right_unsigned(x, 15)) * Int(static_cast<int>(0x846ca68bu));
@@ -13,19 +12,19 @@ ARHOST_INLINE Int hash(Int x) {
 }
 
 struct Random {
-    Int pixel, seed;      // which sequence
-    std::uint32_t sample; // which of the pixel's
+    Int pixel, seed;      // choose the start of the sequence
+    std::uint32_t sample; // index within the pixel
 };
 
 struct Pair {
-    Float u, v; // 0 to below 1
+    Float u, v; // [0, 1)
 };
 
-// The `count` pairs of one purpose are spread evenly over the square, those of a pixel's samples together, too
-// (M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018: R2).
+// The `count` pairs of a purpose are evenly spread over the unit square, and so are those of all samples of a pixel
+// together (R2: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 ARHOST_INLINE Pair pair(const Random &random, int purpose, int index, int count) {
-    const Int own = hash(random.pixel ^ random.seed);
-    const Int start = hash(own + Int(purpose * 2)), start_2 = hash(own + Int(purpose * 2 + 1));
+    const Int base = hash(random.pixel ^ random.seed);
+    const Int start = hash(base + Int(purpose * 2)), start_2 = hash(base + Int(purpose * 2 + 1));
     const std::uint32_t i = random.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
     const auto unit = [](Int bits) __attribute__((always_inline)) {
         return to_float(shift_right_unsigned(bits, 8)) * Float(0x1p-24f);

@@ -1,54 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where rays have hit, all that shading needs.
+// Shading inputs at the hits of a packet.
 #pragma once
 #include "texture.inl"
 
 struct Surface {
     Vec3 position;
-    Vec3 geometric_normal, normal; // of the facet, and interpolated over it: length 1, to the ray's origin
-    Bool from_behind;              // the ray came from where the facet's own normal does not point
-    Float offset;                  // mm; how far above the facet secondary rays start
-    Float way;                     // mm, of the ray
+    Vec3 geometric_normal, normal; // of the facet, and interpolated: unit length, facing the ray origin
+    Bool back_face;                // the ray hit the side that the facet's own normal points away from
+    Float offset;                  // mm: secondary rays start this far above the facet
+    Float distance;                // mm, from the ray origin
     Vec3 ambient, diffuse, specular, emission;
     Float exponent; // Phong's
-    Float alpha;    // GGX's, where `is_rough`
-    Bool is_lit;    // lamps make it bright: not a mirror, not glass
-    Bool is_rough;  // metallic-roughness: `specular` is the reflectance at a right angle
+    Float alpha;    // GGX's, if `is_rough`
+    Bool is_lit;    // shaded by direct light: neither mirror nor glass
+    Bool is_rough;  // metallic-roughness: `specular` is the reflectance at normal incidence
     Bool is_real;   // a catcher or occluder
-    bool any_specular, any_rough, any_scattering; // of the packet; scattering: a ray goes on from there
+    bool any_specular, any_rough, any_scattering; // any lane; scattering: the surface spawns secondary rays
 };
 
-// An attribute of the vertices, interpolated at the hits. Lanes elsewhere read triangle 0. Strides are
-// multiples of 4 bytes (arhost/scene.h).
+// A vertex attribute interpolated at the hits. Lanes outside `here` read triangle 0. Strides are multiples of 4 bytes
+// (arhost/scene.h).
 template <int components> struct Attribute { Float of[components]; };
 template <int components>
 ARHOST_INLINE Attribute<components> interpolated(const Object &object, const float *values, std::uint32_t stride,
                                                  const RTCHit16 &hit, Bool here) {
     const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
     const Float u = load(hit.u), v = load(hit.v);
-    const Float share[3] = {Float(1.0f) - u - v, u, v};
+    const Float weight[3] = {Float(1.0f) - u - v, u, v};
     Attribute<components> sum{};
     for (int number = 0; number < 3; ++number) {
         const Int at = gather(object.indices + number, corner) * Int(static_cast<int>(stride / 4));
         for (int i = 0; i < components; ++i)
-            sum.of[i] = sum.of[i] + gather(values + i, at) * share[number];
+            sum.of[i] = sum.of[i] + gather(values + i, at) * weight[number];
     }
     return sum;
 }
 
-// The object's texture at the hits; `texture` is not ARHOST_NONE.
-ARHOST_INLINE Texel textured(const Scene &scene, const Object &object, std::uint32_t texture, const RTCHit16 &hit,
-                             Bool here) {
+// White if the object has no texture coordinates. `texture` is not ARHOST_NONE.
+ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &object, std::uint32_t texture,
+                                          const RTCHit16 &hit, Bool here) {
     if (!object.texcoords)
         return {white(), Float(1.0f)};
     const Attribute<2> at = interpolated<2>(object, object.texcoords, object.texcoord_stride, hit, here);
     return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
 }
 
-// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own.
-ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal, const RTCHit16 &hit,
-                        Bool here) {
+// `normal` perturbed by the object's normal map. The tangent is per facet.
+ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal,
+                                 const RTCHit16 &hit, Bool here) {
     const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
     Vec3 position[3];
     Float u[3], v[3];
@@ -69,8 +69,8 @@ ARHOST_INLINE Vec3 bent(const Scene &scene, const Object &object, Vec3 facet, Ve
         along_u = transform(object.transform, along_u);
         along_v = transform(object.transform, along_v);
     }
-    const Vec3 texel = textured(scene, object, object.material->normal_texture, hit, here).colour;
-    return bent_normal(normal, facet, along_u, along_v, texel);
+    const Vec3 texel = sample_object_texture(scene, object, object.material->normal_texture, hit, here).colour;
+    return perturbed_normal(normal, facet, along_u, along_v, texel);
 }
 
 ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
@@ -79,13 +79,13 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     const Vec3 facet{load(hit.Ng_x), load(hit.Ng_y), load(hit.Ng_z)};
     const Vec3 step = direction * load(rays.ray.tfar);
 
-    Surface s; // `= {}` would be a slow string instruction
+    Surface s; // not `= {}`, which compiles to a slow string instruction
     s.ambient = s.diffuse = s.specular = s.emission = black();
     s.exponent = s.alpha = Float(0.0f);
     s.is_lit = s.is_rough = s.is_real = bool_of(false);
     s.any_specular = s.any_rough = s.any_scattering = false;
     s.position = origin_of(rays.ray) + step;
-    s.way = length(step);
+    s.distance = length(step);
     s.geometric_normal = facet;
     s.normal = facet;
     Vec3 reach = black();
@@ -101,7 +101,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         }
         if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
             object.material->normal_texture != ARHOST_NONE && object.texcoords)
-            normal = bent(scene, object, geometric, normal, hit, here);
+            normal = mapped_normal(scene, object, geometric, normal, hit, here);
         reach = select(here, splat(object.reach), reach);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
@@ -115,7 +115,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         s.is_lit = s.is_lit | here;
         Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);
         if (material.colour_texture != ARHOST_NONE) {
-            const Vec3 colour = textured(scene, object, material.colour_texture, hit, here).colour;
+            const Vec3 colour = sample_object_texture(scene, object, material.colour_texture, hit, here).colour;
             ambient = ambient * colour;
             diffuse = diffuse * colour;
         }
@@ -127,7 +127,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS) {
             Float metallic = material.metallic, roughness = material.roughness;
             if (material.metallic_roughness_texture != ARHOST_NONE) {
-                const Vec3 factors = textured(scene, object, material.metallic_roughness_texture, hit, here).colour;
+                const Vec3 factors =
+                    sample_object_texture(scene, object, material.metallic_roughness_texture, hit, here).colour;
                 metallic = metallic * factors.z;
                 roughness = roughness * factors.y;
             }
@@ -143,14 +144,15 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (material.emission[0] + material.emission[1] + material.emission[2] > 0) {
             Vec3 emission = splat(material.emission);
             if (material.emission_texture != ARHOST_NONE)
-                emission = emission * textured(scene, object, material.emission_texture, hit, here).colour;
+                emission =
+                    emission * sample_object_texture(scene, object, material.emission_texture, hit, here).colour;
             s.emission = select(here, emission, s.emission);
         }
     });
 
-    s.geometric_normal = unit_or(s.geometric_normal, -normalize(direction));
+    s.geometric_normal = normalize_or(s.geometric_normal, -normalize(direction));
     s.offset = offset_from_surface(s.position, step, s.geometric_normal, reach);
-    s.from_behind = dot(s.geometric_normal, direction) > Float(0.0f);
+    s.back_face = dot(s.geometric_normal, direction) > Float(0.0f);
     s.geometric_normal = facing(s.geometric_normal, -direction);
     s.normal = shading_normal(s.normal, s.geometric_normal);
     return s;

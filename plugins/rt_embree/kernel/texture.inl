@@ -12,7 +12,7 @@ ARHOST_INLINE Int wrapped(Int i, std::int32_t size, arhost_wrap wrap) {
     const Int last(size - 1), zero(0);
     if (wrap == ARHOST_WRAP_CLAMP)
         return select(i < zero, zero, select(i >= Int(size), last, i));
-    // i mod n by way of floats: exact, since textures are at most 2^14 wide and coordinates are brought near 0.
+    // i mod n in float arithmetic: exact, as textures are at most 2^14 wide and coordinates are reduced first.
     const int period = wrap == ARHOST_WRAP_MIRROR ? 2 * size : size;
     const Int times = to_int(floor((to_float(i) + Float(0.5f)) * Float(1.0f / static_cast<float>(period))));
     const Int within = i - times * Int(period);
@@ -40,25 +40,25 @@ ARHOST_INLINE Texel texel_at(const Scene &scene, const Texture &texture, Int x, 
     return {Vec3{to_float(byte(0)), to_float(byte(1)), to_float(byte(2))} * Float(1.0f / 255), alpha};
 }
 
-// Between the four texels round (u, v).
+// Bilinear.
 ARHOST_INLINE Texel sample_texture(const Scene &scene, const Texture &texture, Float u, Float v) {
-    // Far outside only the fraction counts, and whole numbers must fit.
-    const auto near = [](Float t, arhost_wrap wrap) __attribute__((always_inline)) {
+    // Range reduction: the texel index must fit an int and keep its fraction.
+    const auto reduced = [](Float t, arhost_wrap wrap) __attribute__((always_inline)) {
         if (wrap == ARHOST_WRAP_CLAMP)
             return min(max(t, Float(-1.0f)), Float(2.0f));
         const Float bounded = min(max(t, Float(-1e6f)), Float(1e6f));
         return bounded - Float(2.0f) * floor(bounded * Float(0.5f));
     };
-    const Float x = near(u, texture.wrap_u) * Float(static_cast<float>(texture.width)) - Float(0.5f);
-    const Float y = near(v, texture.wrap_v) * Float(static_cast<float>(texture.height)) - Float(0.5f);
-    const Float left = floor(x), top = floor(y), right_share = x - left, low_share = y - top;
+    const Float x = reduced(u, texture.wrap_u) * Float(static_cast<float>(texture.width)) - Float(0.5f);
+    const Float y = reduced(v, texture.wrap_v) * Float(static_cast<float>(texture.height)) - Float(0.5f);
+    const Float left = floor(x), top = floor(y), tx = x - left, ty = y - top;
     const Int x0 = wrapped(to_int(left), texture.width, texture.wrap_u);
     const Int x1 = wrapped(to_int(left) + Int(1), texture.width, texture.wrap_u);
     const Int y0 = wrapped(to_int(top), texture.height, texture.wrap_v);
     const Int y1 = wrapped(to_int(top) + Int(1), texture.height, texture.wrap_v);
-    const auto mix = [](Texel a, Texel b, Float share) __attribute__((always_inline)) {
-        return Texel{a.colour + (b.colour - a.colour) * share, a.alpha + (b.alpha - a.alpha) * share};
+    const auto mix = [](Texel a, Texel b, Float t) __attribute__((always_inline)) {
+        return Texel{a.colour + (b.colour - a.colour) * t, a.alpha + (b.alpha - a.alpha) * t};
     };
-    return mix(mix(texel_at(scene, texture, x0, y0), texel_at(scene, texture, x1, y0), right_share),
-               mix(texel_at(scene, texture, x0, y1), texel_at(scene, texture, x1, y1), right_share), low_share);
+    return mix(mix(texel_at(scene, texture, x0, y0), texel_at(scene, texture, x1, y0), tx),
+               mix(texel_at(scene, texture, x0, y1), texel_at(scene, texture, x1, y1), tx), ty);
 }

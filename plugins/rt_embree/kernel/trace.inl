@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Packets of rays, and what they hit.
+// Ray packets and their hits.
 #pragma once
 
 constexpr float far_away = __builtin_inff();
@@ -16,13 +16,12 @@ ARHOST_INLINE Vec3 white() {
     return {Float(1.0f), Float(1.0f), Float(1.0f)};
 }
 
-// 0 to 15.
 ARHOST_INLINE Int lane_numbers() {
     alignas(64) constexpr int numbers[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     return load(numbers);
 }
 
-// A vector that has been taken through a column-major 3×3 matrix.
+// `m`: column-major 3×3.
 ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
     return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;
 }
@@ -48,33 +47,32 @@ ARHOST_INLINE Vec3 direction_of(const RTCRay16 &ray) {
     return {load(ray.dir_x), load(ray.dir_y), load(ray.dir_z)};
 }
 
-// Not so where numbers have left the range of floats, among facets of 1e-15 mm say: Embree ends the process for rays
-// that are none.
-ARHOST_INLINE Bool is_ray(Vec3 origin, Vec3 direction) {
+// False for NaN, infinite or huge components, as computed e.g. from facets of 1e-15 mm: Embree aborts on such rays.
+ARHOST_INLINE Bool is_valid_ray(Vec3 origin, Vec3 direction) {
     return (largest(origin) < Float(1e18f)) & (largest(direction) < Float(1e18f)) &
            (dot(direction, direction) >= Float(0.0f));
 }
 
-// The closest hits of the active lanes. Returns which of them hit.
-ARHOST_INLINE Bool trace(const Scene &scene, RTCScene tree, Query query, RTCRayHit16 &rays, Bool active) {
+// Finds the closest hits of the active lanes; returns the lanes with a hit. `bvh`: `scene.root` or `scene.catchers`.
+ARHOST_INLINE Bool trace(const Scene &scene, RTCScene bvh, Query query, RTCRayHit16 &rays, Bool active) {
     alignas(64) int valid[lanes];
-    active = active & is_ray(origin_of(rays.ray), direction_of(rays.ray));
+    active = active & is_valid_ray(origin_of(rays.ray), direction_of(rays.ray));
     store(valid, active);
     store(rays.hit.geomID, Int(no_hit));
     store(rays.hit.instID[0], Int(no_hit));
-    intersect16(valid, tree, scene.packet_width, query, rays);
+    intersect16(valid, bvh, scene.packet_width, query, rays);
     return active & (load(rays.hit.geomID) != Int(no_hit));
 }
 
-// Whether anything lies on the active lanes' rays.
+// The active lanes whose rays are occluded.
 ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     alignas(64) int valid[lanes];
-    active = active & is_ray(origin_of(rays), direction_of(rays));
+    active = active & is_valid_ray(origin_of(rays), direction_of(rays));
     store(valid, active);
     // Embree 3.13.5 hangs in coherent occlusion queries through instances with AVX-512.
     Query query = make_query(scene.has_instances ? Coherence::incoherent : Coherence::coherent);
     occluded16(valid, scene.root, scene.packet_width, query, rays);
-    return active & (load(rays.tfar) < Float(0.0f)); // −∞ where something was hit
+    return active & (load(rays.tfar) < Float(0.0f)); // Embree sets −∞ on a hit
 }
 
 ARHOST_INLINE Int object_number(const Scene &scene, const RTCHit16 &hit) {
@@ -83,16 +81,16 @@ ARHOST_INLINE Int object_number(const Scene &scene, const RTCHit16 &hit) {
     return select(by_geometry, load(hit.geomID), instance);
 }
 
-// Calls use(object, lanes) for each object that lanes of `active` have hit: mostly one or two a packet.
+// Calls use(object, lanes) for each object hit by `active` lanes: mostly one or two per packet.
 template <class Use>
 ARHOST_INLINE void for_each_object(const Scene &scene, const RTCHit16 &hit, Bool active, Use use) {
     const Int numbers = object_number(scene, hit);
     alignas(64) int number_of[lanes];
     store(number_of, numbers);
-    for (unsigned left = mask_of(active.lane); left;) {
-        const int number = number_of[__builtin_ctz(left)];
+    for (unsigned remaining = mask_of(active.lane); remaining;) {
+        const int number = number_of[__builtin_ctz(remaining)];
         const Bool here = active & (numbers == Int(number));
-        left &= ~mask_of(here.lane);
+        remaining &= ~mask_of(here.lane);
         use(scene.objects[number], here);
     }
 }

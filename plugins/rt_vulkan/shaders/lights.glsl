@@ -31,13 +31,13 @@ Incidence incidence(uint lamp, Surface s, vec2 where) {
         return incidence_along(s, -axis, INFINITY, 1.0, intensity);
     vec3 way = lights[lamp].position - s.position;
     if (type == RECTANGLE_LIGHT)
-        way = way_to_rectangle(way, lights[lamp].axis_u, lights[lamp].axis_v, where.x, where.y);
+        way = vector_to_rectangle(way, lights[lamp].axis_u, lights[lamp].axis_v, where.x, where.y);
     else if (type == SPHERE_LIGHT)
-        way = way_to_disc(way, lights[lamp].radius, where.x, where.y);
+        way = vector_to_disc(way, lights[lamp].radius, where.x, where.y);
     bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
     Incidence arriving = incidence_along(s, way, 1.0, point_light_falloff(falls_off, dot(way, way)), intensity);
     if (type == SPOT_LIGHT)
-        arriving.irradiance *= spot_share(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
+        arriving.irradiance *= spot_attenuation(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
                                           lights[lamp].cosine_outer);
     if (type == RECTANGLE_LIGHT)
         arriving.irradiance *= lambert(axis, -arriving.direction);
@@ -120,8 +120,8 @@ Incidence sample_environment(Surface s, vec2 where) {
     uint first = frame.environment_columns + uint(row * width);
     int column = search(first, width, where.x);
     vec2 column_step = step_of_sums(first, column);
-    float u = (float(column) + place_in_step(where.x, column_step.x, column_step.y)) * (1.0 / float(width));
-    float v = (float(row) + place_in_step(where.y, row_step.x, row_step.y)) * (1.0 / float(height));
+    float u = (float(column) + fraction_of_step(where.x, column_step.x, column_step.y)) * (1.0 / float(width));
+    float v = (float(row) + fraction_of_step(where.y, row_step.x, row_step.y)) * (1.0 / float(height));
     // The rotation's transpose is its inverse.
     vec3 way = equirectangular_direction(u, v) * frame.environment_from_world;
     float density = equirectangular_density(row_step.y * column_step.y * (float(width) * float(height)), v);
@@ -200,13 +200,13 @@ Gathered gathered(Surface s, vec3 to_eye, bool catches, Random random) {
 // What lies over the video where a catcher is: its colour, linear, and its alpha.
 vec4 caught_shadow(Gathered sum) {
     if (frame.coloured_shadows == 0u)
-        return vec4(vec3(0.0), shadow_alpha(share_of_light(sum.hidden_part, sum.irradiance),
-                                            share_of_light(sum.tinted_part, sum.irradiance),
+        return vec4(vec3(0.0), shadow_alpha(fraction_of_light(sum.hidden_part, sum.irradiance),
+                                            fraction_of_light(sum.tinted_part, sum.irradiance),
                                             frame.shadow_alpha_opaque, frame.shadow_alpha_translucent));
     // Each channel's own alpha; the colour makes up for what the common one takes too much.
-    vec3 own = vec3(share_of_light(sum.weighted_colour.x, sum.irradiance),
-                    share_of_light(sum.weighted_colour.y, sum.irradiance),
-                    share_of_light(sum.weighted_colour.z, sum.irradiance));
+    vec3 own = vec3(fraction_of_light(sum.weighted_colour.x, sum.irradiance),
+                    fraction_of_light(sum.weighted_colour.y, sum.irradiance),
+                    fraction_of_light(sum.weighted_colour.z, sum.irradiance));
     float alpha = largest(own);
     return vec4(srgb_decode(shadow_colour_encoded(own.x, alpha)), srgb_decode(shadow_colour_encoded(own.y, alpha)),
                 srgb_decode(shadow_colour_encoded(own.z, alpha)), alpha);

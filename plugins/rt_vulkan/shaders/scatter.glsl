@@ -49,7 +49,7 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
         refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
     }
     float reflectance =
-        glass_reflected_share(s.from_behind, cosine, squared, materials[material].fresnel_exponent,
+        glass_reflected_fraction(s.from_behind, cosine, squared, materials[material].fresnel_exponent,
                               materials[material].fresnel_minimum, materials[material].fresnel_maximum);
 
     vec3 refracted_share = throughput * materials[material].refraction * (1.0 - reflectance);
@@ -83,12 +83,12 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
 // A ray off a microfacet.
 void scatter_off_roughness(Path path, Surface s, vec3 to_eye, Random random) {
     vec2 where = pair(random, ROUGH_PURPOSE, 0u, 1u);
-    vec3 half_way = ggx_half_way(s.normal, to_eye, s.alpha, where.x, where.y);
+    vec3 half_way = ggx_half_vector(s.normal, to_eye, s.alpha, where.x, where.y);
     vec3 direction = mirror_direction(-to_eye, half_way);
     float cosine = dot(direction, s.normal);
     // The masking of the way in is in the choice of the facet.
     vec3 throughput =
-        path.throughput * schlick(s.specular, dot(to_eye, half_way)) * ggx_unmasked(cosine, s.alpha);
+        path.throughput * schlick(s.specular, dot(to_eye, half_way)) * ggx_masking(cosine, s.alpha);
     if (cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0 && largest(throughput) > least_throughput)
         send_on(path, above(s), direction, throughput);
 }

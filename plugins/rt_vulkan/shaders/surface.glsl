@@ -48,7 +48,7 @@ vec3 bent(Hit hit, vec3 facet, vec3 normal) {
         along_u = objects[hit.object].transform * along_u;
         along_v = objects[hit.object].transform * along_v;
     }
-    return bent_normal(normal, facet, along_u, along_v,
+    return perturbed_normal(normal, facet, along_u, along_v,
                        textured(hit, materials[objects[hit.object].material].normal_texture));
 }
 
@@ -71,7 +71,7 @@ Surface surface_at(Ray ray, Hit hit, bool bends) {
     s.position = ray.origin + ahead;
     s.way = length(ahead);
     s.is_real = objects[object].role != VIRTUAL;
-    s.geometric_normal = unit_or(geometric, -normalize(ray.direction));
+    s.geometric_normal = normalize_or(geometric, -normalize(ray.direction));
     s.offset = offset_from_surface(s.position, ahead, s.geometric_normal, objects[object].reach);
     s.from_behind = dot(s.geometric_normal, ray.direction) > 0.0;
     s.geometric_normal = facing(s.geometric_normal, -ray.direction);

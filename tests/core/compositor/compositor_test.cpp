@@ -68,7 +68,7 @@ struct Scene {
     }
     ImageView overlay() const { return {overlay_bytes.data() + out_shift, overlay_stride}; }
 
-    // What `function` makes of it, with the bytes between and around the rows.
+    // Output of `function`, including the bytes between and around the rows.
     template <class Function>
     Bytes output(const Function &function, const ImageView &image, const Region &region) const {
         Bytes bytes(out_stride * format.height + out_shift + 100, 0xa5);
@@ -84,7 +84,7 @@ struct Scene {
 
 } // namespace
 
-TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
+TEST(Composite, MatchesTheReferenceForEveryFormatWidthStrideAndRegion) {
     test::on_each_instruction_set([] {
         std::mt19937 random(4);
         for (const arhost_pixel_format pixel_format : all_formats)
@@ -103,7 +103,7 @@ TEST(Composite, GivesTheReferencesBytesForEveryFormatWidthStrideAndRegion) {
     });
 }
 
-TEST(Composite, IsEquation36) {
+TEST(Composite, ImplementsEquation36) {
     const arhost_frame_format format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4, 1);
     Bytes frame(format.byte_size);
     const std::uint8_t bgr[] = {10, 20, 30, 10, 20, 30, 10, 20, 30, 200, 100, 50};
@@ -113,12 +113,12 @@ TEST(Composite, IsEquation36) {
     Bytes out(12);
     composite(format, planes, {rgba, 16}, {0, 0, 4, 1}, {out.data(), 12});
     EXPECT_EQ(out, (Bytes{10, 20, 30, // alpha 0: the video
-                          3, 2, 1,    // alpha 255: the overlay, R and B in their places
+                          3, 2, 1,    // alpha 255: the overlay, RGB to BGR
                           4, 8, 12,   // a shadow of 0.6 leaves 0.4
                           160, 95, 55}));
 }
 
-TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
+TEST(Composite, CopiesTheFrameWithoutOverlayOrRegion) {
     std::mt19937 random(5);
     const Scene scene(layout(ARHOST_PIXEL_FORMAT_BGR8, 67, 5), 1, random);
     const Bytes none = scene.output(composite, ImageView{}, Region{0, 0, 67, 5});
@@ -132,17 +132,17 @@ TEST(Composite, CopiesTheFrameWhereThereIsNoOverlayOrNoRegion) {
     EXPECT_EQ(scene.output(composite, scene.overlay(), Region{0, 5, 1, 1}), none);
 }
 
-TEST(Composite, ClipsARegionThatReachesOutOfTheImage) {
+TEST(Composite, ClipsTheRegionToTheImage) {
     std::mt19937 random(6);
     const Scene scene(layout(ARHOST_PIXEL_FORMAT_NV12, 66, 6), 3, random);
-    const std::uint32_t most = 0xffffffffu;
-    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{7, 1, most, most}),
+    const std::uint32_t max = 0xffffffffu;
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{7, 1, max, max}),
               scene.output(composite, scene.overlay(), Region{7, 1, 59, 5}));
-    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{most, most, most, most}),
+    EXPECT_EQ(scene.output(composite, scene.overlay(), Region{max, max, max, max}),
               scene.output(composite, ImageView{}, Region{}));
 }
 
-// A row of the overlay is a page; the pages outside the region can't be read.
+// Each overlay row is a page; pages outside the region are inaccessible.
 TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
     const std::uint32_t page = static_cast<std::uint32_t>(getpagesize()), width = page / 4, height = 8;
     const Region region{0, 3, width, 2};
@@ -164,22 +164,22 @@ TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
     munmap(rgba, page * height);
 }
 
-TEST(Composite, ConvertsBt601AsOpenCvDoes) {
+TEST(Composite, ConvertsBt601LikeOpenCv) {
     std::mt19937 random(7);
     const int codes[] = {cv::COLOR_YUV2BGR_YUY2, cv::COLOR_YUV2BGR_NV12, cv::COLOR_YUV2BGR_I420};
     const arhost_pixel_format formats[] = {ARHOST_PIXEL_FORMAT_YUYV, ARHOST_PIXEL_FORMAT_NV12,
                                            ARHOST_PIXEL_FORMAT_I420};
     for (int i = 0; i < 3; ++i) {
-        constexpr int width = 128, height = 64; // strides without padding, as OpenCV's planar images
+        constexpr int width = 128, height = 64; // no row padding, as in OpenCV's planar images
         const arhost_frame_format format = layout(formats[i], width, height);
         Bytes frame(format.byte_size);
-        // OpenCV does not take values below 16 for what they are.
+        // OpenCV clamps values below 16.
         std::generate(frame.begin(), frame.end(), [&] { return static_cast<std::uint8_t>(16 + random() % 224); });
         const std::uint8_t *planes[ARHOST_MAX_PLANES] = {
             frame.data() + format.offset[0], frame.data() + format.offset[1], frame.data() + format.offset[2]};
         cv::Mat ours(height, width, CV_8UC3), opencv, difference;
         composite(format, planes, {}, {}, {ours.data, ours.step});
-        if (formats[i] == ARHOST_PIXEL_FORMAT_I420) { // its chroma rows are padded to 64 bytes already: width/2 is 64
+        if (formats[i] == ARHOST_PIXEL_FORMAT_I420) { // chroma rows are aligned to 64 bytes, which width / 2 is
             ASSERT_EQ(format.stride[1], width / 2);
         }
         const cv::Mat yuv = formats[i] == ARHOST_PIXEL_FORMAT_YUYV
@@ -193,18 +193,18 @@ TEST(Composite, ConvertsBt601AsOpenCvDoes) {
     }
 }
 
-TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerTellsOne) {
+TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerReportsOne) {
     arhost_render_info info{};
     info.struct_size = sizeof info;
     const Region whole = region_of(info, 640, 480);
     EXPECT_EQ(whole.width, 640u);
     EXPECT_EQ(whole.height, 480u);
     info = {sizeof info, 1, 5, 6, 7, 8, 0};
-    const Region told = region_of(info, 640, 480);
-    EXPECT_EQ(told.x, 5u);
-    EXPECT_EQ(told.y, 6u);
-    EXPECT_EQ(told.width, 7u);
-    EXPECT_EQ(told.height, 8u);
+    const Region reported = region_of(info, 640, 480);
+    EXPECT_EQ(reported.x, 5u);
+    EXPECT_EQ(reported.y, 6u);
+    EXPECT_EQ(reported.width, 7u);
+    EXPECT_EQ(reported.height, 8u);
 }
 
 } // namespace arhost

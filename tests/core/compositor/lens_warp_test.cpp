@@ -19,7 +19,7 @@ arhost_intrinsics lens(arhost_distortion distortion, std::vector<double> k) {
     return in;
 }
 
-// A disc about a pixel of the pinhole's image, its rim smooth.
+// An antialiased disc in the pinhole image.
 std::vector<std::uint8_t> disc(double x0, double y0, double radius) {
     std::vector<std::uint8_t> image(std::size_t{320} * 240 * 4);
     for (int y = 0; y < 240; ++y)
@@ -34,19 +34,19 @@ std::vector<std::uint8_t> disc(double x0, double y0, double radius) {
 
 } // namespace
 
-TEST(LensWarp, PutsWhatThePinholeSawWhereTheLensPutsIt) {
+TEST(LensWarp, MapsPinholePixelsToTheirLensPosition) {
     for (const arhost_intrinsics &in : {lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
                                         lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})}) {
         LensWarp warp(in);
-        const shading::Lens bending(in);
+        const shading::Lens distortion(in);
         for (const auto &[px, py] : {std::pair{0.0, 0.0}, {0.4, 0.2}, {-0.5, -0.3}}) {
             const arhost_intrinsics &pinhole = warp.pinhole();
             const auto image = disc(px * pinhole.fx + pinhole.cx, py * pinhole.fy + pinhole.cy, 6);
-            const ImageView bent = warp.bend({image.data(), 320 * 4}, {0, 0, 320, 240});
+            const ImageView warped = warp.warp({image.data(), 320 * 4}, {0, 0, 320, 240});
             double area = 0, x_sum = 0, y_sum = 0;
             for (int y = 0; y < 240; ++y)
                 for (int x = 0; x < 320; ++x) {
-                    const std::uint8_t *pixel = bent.rgba + y * bent.stride + 4 * x;
+                    const std::uint8_t *pixel = warped.rgba + y * warped.stride + 4 * x;
                     area += pixel[3];
                     x_sum += pixel[3] * x;
                     y_sum += pixel[3] * y;
@@ -55,32 +55,32 @@ TEST(LensWarp, PutsWhatThePinholeSawWhereTheLensPutsIt) {
                         ASSERT_EQ(pixel[2], 50);
                     }
                 }
-            const auto expected = bending.project({px, py, 1});
+            const auto expected = distortion.project({px, py, 1});
             ASSERT_TRUE(expected);
-            // The disc's middle is not quite the image's of its middle: 0.2 px at this size.
+            // The warped disc's centroid differs slightly from its warped centre: 0.2 px at this size.
             EXPECT_NEAR(x_sum / area, expected->x, 0.2);
             EXPECT_NEAR(y_sum / area, expected->y, 0.2);
         }
     }
 }
 
-TEST(LensWarp, CoversTheWholeImageOfTheLens) {
+TEST(LensWarp, CoversTheWholeLensImage) {
     for (const arhost_intrinsics &in :
          {lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}), lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0}),
           lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})}) {
         LensWarp warp(in);
         const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
-        const ImageView bent = warp.bend({opaque.data(), 320 * 4}, {0, 0, 320, 240});
+        const ImageView warped = warp.warp({opaque.data(), 320 * 4}, {0, 0, 320, 240});
         for (int i = 0; i < 320 * 240; ++i)
-            ASSERT_EQ(bent.rgba[4 * i + 3], 255) << i % 320 << " " << i / 320;
+            ASSERT_EQ(warped.rgba[4 * i + 3], 255) << i % 320 << " " << i / 320;
     }
 }
 
-TEST(LensWarp, ReadsTheRegionOnlyWhateverAWorkerSaysOfIt) {
+TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
     LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}));
     const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
-    const ImageView none = warp.bend({opaque.data(), 320 * 4}, {10, 10, 0, 0});
+    const ImageView none = warp.warp({opaque.data(), 320 * 4}, {10, 10, 0, 0});
     EXPECT_TRUE(std::all_of(none.rgba, none.rgba + 320 * 240 * 4, [](std::uint8_t byte) { return byte == 0; }));
-    warp.bend({opaque.data(), 320 * 4},
-              {300, 200, 4'000'000'000u, 4'000'000'000u}); // under asan: reads nothing beyond
+    warp.warp({opaque.data(), 320 * 4},
+              {300, 200, 4'000'000'000u, 4'000'000'000u}); // ASan detects reads beyond the image
 }

@@ -10,7 +10,7 @@
 namespace arhost {
 namespace {
 
-// The matrices of ITU-R BT.601-7 and BT.709-6 in floating point, written out from their primaries.
+// The matrices of ITU-R BT.601-7 and BT.709-6 in floating point, derived from their primaries.
 struct Exact {
     double kr, kb;
     bool limited;
@@ -29,7 +29,7 @@ class EveryYuv : public testing::TestWithParam<std::tuple<double, double, bool>>
 
 } // namespace
 
-TEST(Blended, IsEquation36RoundedToNearestForEveryTriple) {
+TEST(Blended, MatchesEquation36RoundedToNearestForAllInputs) {
     std::size_t wrong = 0;
     for (int a = 0; a < 256; ++a)
         for (int b = 0; b < 256; ++b)

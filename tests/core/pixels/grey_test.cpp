@@ -27,7 +27,7 @@ arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width
     return format;
 }
 
-// A frame of random bytes, its grey plane included; `fill` is fill_grey or its reference.
+// A frame of random bytes including its grey plane; `fill` is fill_grey or its reference.
 template <class Fill> std::vector<std::uint8_t> filled(const arhost_frame_format &format, const Fill &fill) {
     std::mt19937 random(3);
     std::vector<std::uint8_t> bytes(format.byte_size);
@@ -40,7 +40,7 @@ template <class Fill> std::vector<std::uint8_t> filled(const arhost_frame_format
 
 } // namespace
 
-TEST(Grey, IsTheReferencesForEveryFormatAndWidthAndLeavesThePaddingAlone) {
+TEST(Grey, MatchesTheReferenceForEveryFormatAndWidthAndLeavesPaddingUntouched) {
     test::on_each_instruction_set([] {
         for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_RGB8, ARHOST_PIXEL_FORMAT_BGR8, ARHOST_PIXEL_FORMAT_YUYV})
             for (const auto range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL})
@@ -52,15 +52,15 @@ TEST(Grey, IsTheReferencesForEveryFormatAndWidthAndLeavesThePaddingAlone) {
     });
 }
 
-TEST(Grey, OfFormatsWithALumaPlaneIsThatPlaneUntouched) {
+TEST(Grey, WritesNothingForFormatsWithALumaPlane) {
     for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_GREY8, ARHOST_PIXEL_FORMAT_NV12, ARHOST_PIXEL_FORMAT_I420}) {
         const auto format = layout(pixel_format, 66, 4);
         EXPECT_EQ(filled(format, fill_grey), filled(format, [](auto &&...) {}));
     }
 }
 
-// Every colour there is: 65536 rows of 256.
-TEST(Grey, IsWithinOneOfOpenCvsForEveryColour) {
+// All 2^24 colours.
+TEST(Grey, IsWithinOneOfOpenCvForEveryColour) {
     const auto format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4096, 4096);
     std::vector<std::uint8_t> bytes(format.byte_size);
     for (std::uint32_t colour = 0; colour < 1u << 24; ++colour) {
@@ -82,7 +82,7 @@ TEST(Grey, IsWithinOneOfOpenCvsForEveryColour) {
     EXPECT_LT(cv::countNonZero(difference), (1 << 24) / 100);
 }
 
-TEST(Grey, OfLimitedYuyvIsStretchedAndOfFullYuyvIsNot) {
+TEST(Grey, ExpandsLimitedRangeYuyvButNotFullRange) {
     for (const auto range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL}) {
         const auto format = layout(ARHOST_PIXEL_FORMAT_YUYV, 4, 1, range);
         std::vector<std::uint8_t> bytes(format.byte_size);

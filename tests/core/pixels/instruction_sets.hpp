@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs a test once on each instruction set that this machine and this build have.
+// Runs a test once for each instruction set supported by this machine and build.
 #pragma once
 
 #include <gtest/gtest.h>

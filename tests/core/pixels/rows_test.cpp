@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using test::FencedBytes;
 
-// A kernel with its streams: bytes that two pixels take in each input, bytes a pixel of the output.
+// A kernel with the bytes per two pixels of each input and the bytes per pixel of the output.
 struct Kernel {
     std::string name;
     std::vector<std::size_t> bytes_per_2px;
@@ -129,8 +129,8 @@ std::vector<Kernel> kernels() {
 
 } // namespace
 
-// Inputs and output lie exactly between pages that end the process when touched.
-TEST(Rows, OfEveryLengthGiveTheFormulasBytesAndTouchNoOthers) {
+// Inputs and output are enclosed by guard pages.
+TEST(Rows, MatchTheFormulasForEveryLengthAndAccessNoOtherBytes) {
     test::on_each_instruction_set([] {
         std::mt19937 random(1);
         for (const Kernel &kernel : kernels())
@@ -153,7 +153,7 @@ TEST(Rows, OfEveryLengthGiveTheFormulasBytesAndTouchNoOthers) {
     });
 }
 
-TEST(Rows, BlendEveryTripleOfColoursAndAlpha) {
+TEST(Rows, BlendEveryCombinationOfColoursAndAlpha) {
     test::on_each_instruction_set([] {
         Bytes a(3 * 256), b(4 * 256), out(3 * 256), expected(3 * 256);
         for (std::size_t i = 0; i < 256; ++i)
@@ -176,14 +176,14 @@ TEST(Rows, BlendEmptyAndOpaqueRunsAndTheirEdges) {
         std::mt19937 random(2);
         constexpr std::size_t count = 300;
         Bytes a(3 * count), b(4 * count), out(3 * count), expected(3 * count);
-        for (const std::uint8_t ground : {0, 255})
+        for (const std::uint8_t background : {0, 255})
             for (std::size_t length = 0; length <= 140; length += 7)
                 for (std::size_t at = 0; at + length <= count; at += 13) {
                     std::generate(a.begin(), a.end(), std::ref(random));
                     std::generate(b.begin(), b.end(), std::ref(random));
                     for (std::size_t i = 0; i < count; ++i) {
                         if (i < at || i >= at + length)
-                            b[4 * i + 3] = ground;
+                            b[4 * i + 3] = background;
                         for (std::size_t c = 0; c < 3; ++c)
                             expected[3 * i + c] = blended(a[3 * i + c], b[4 * i + 2 - c], b[4 * i + 3]);
                     }
@@ -197,7 +197,7 @@ TEST(Rows, BlendEmptyAndOpaqueRunsAndTheirEdges) {
 
 class EveryYuvRow : public testing::TestWithParam<std::tuple<double, double, bool>> {}; // kr, kb, limited
 
-TEST_P(EveryYuvRow, GivesTheFormulasBytes) {
+TEST_P(EveryYuvRow, MatchesTheFormula) {
     const YuvMatrix m = std::apply([](auto... of) { return yuv_matrix(of...); }, GetParam());
     Bytes y(256), u(128), v(128), out(3 * 256), expected(3 * 256);
     std::iota(y.begin(), y.end(), std::uint8_t(0));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The leaf files are GLSL, too: a shader that calls all of their functions compiles to SPIR-V. The shader is made
-// from the declarations, so that none can be forgotten.
+// The leaf files are also valid GLSL: a shader that calls all their functions compiles to SPIR-V. The shader is
+// generated from the declarations, so that none is missed.
 #include "plugin_under_test.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ std::string without_comments(const std::string &text) {
     return std::regex_replace(text, std::regex("//[^\n]*"), "");
 }
 
-// The leaf files' code, by their names.
+// Code of the leaf files, by file name.
 std::map<std::string, std::string> leaf_files() {
     std::map<std::string, std::string> files;
     for (const auto &entry : std::filesystem::directory_iterator(shading / "leaf"))
@@ -64,7 +64,7 @@ std::size_t count_of(const std::string &text, const std::string &word) {
         std::distance(std::sregex_iterator(text.begin(), text.end(), whole), std::sregex_iterator()));
 }
 
-// Arguments come from a buffer, results go there, so that no call is without an effect.
+// Arguments are read from a buffer and results written to it, so that no call is optimised away.
 std::string shader_that_calls(const std::vector<Function> &functions) {
     std::string blocks, calls;
     std::map<std::string, std::string> values{
@@ -73,7 +73,7 @@ std::string shader_that_calls(const std::vector<Function> &functions) {
         std::string arguments;
         for (const std::string &type : function.parameters) {
             if (!values.contains(type)) { // a struct of the leaf files
-                values[type] = "given_" + type;
+                values[type] = "uniform_" + type;
                 blocks += "layout(binding = " + std::to_string(values.size()) + ") uniform " + type + "Block { " +
                           type + " " + values[type] + "; };\n";
             }
@@ -96,8 +96,8 @@ protected:
         if (std::string(ARHOST_GLSLANG).empty())
             GTEST_SKIP() << "glslangValidator is not installed (Debian: glslang-tools)";
     }
-    // What the compiler has to say against a compute shader; empty if it takes it.
-    std::string complaint(const std::string &shader) const {
+    // Compiler errors for a compute shader; empty if it compiles.
+    std::string compile_errors(const std::string &shader) const {
         const std::string folder = folder_.path(), source = folder + "/shader.comp", log = folder + "/log";
         std::ofstream(source) << shader;
         const std::string command = ARHOST_GLSLANG " -V --target-env vulkan1.2 -I" + include_folder.string() +
@@ -111,11 +111,11 @@ private:
 
 } // namespace
 
-TEST(LeafFiles, AllOfTheirFunctionsAreFound) {
+TEST(LeafFiles, AllFunctionsAreParsed) {
     for (const auto &[name, code] : leaf_files()) {
         EXPECT_FALSE(functions_of(code).empty()) << name;
         EXPECT_EQ(functions_of(code).size(), count_of(code, "ARHOST_LEAF")) << name;
-        EXPECT_EQ(functions_of(code).size(), count_of(code, "return")) << name << ": one way out of each function";
+        EXPECT_EQ(functions_of(code).size(), count_of(code, "return")) << name << ": one return per function";
     }
 }
 
@@ -128,21 +128,21 @@ TEST(LeafFiles, HaveNoBranches) {
     }
 }
 
-TEST(LeafFiles, AreAllIncludedByEveryContract) {
+TEST(LeafFiles, AreAllIncludedByEveryImplementation) {
     for (const auto &path : {shading / "scalar.hpp", shading / "glsl.h",
                              std::filesystem::path(ARHOST_SOURCE_DIRECTORY "/plugins/rt_embree/kernel/packet.hpp")})
         for (const auto &[name, code] : leaf_files())
             EXPECT_NE(contents(path).find("leaf/" + name), std::string::npos) << path << " lacks " << name;
 }
 
-TEST_F(Compiler, TakesAShaderThatCallsEveryLeafFunction) {
+TEST_F(Compiler, AcceptsAShaderThatCallsEveryLeafFunction) {
     std::vector<Function> functions;
     for (const auto &[name, code] : leaf_files())
         std::ranges::copy(functions_of(code), std::back_inserter(functions));
-    EXPECT_EQ(complaint(shader_that_calls(functions)), "");
+    EXPECT_EQ(compile_errors(shader_that_calls(functions)), "");
 }
 
-TEST_F(Compiler, RefusesAFunctionThatIsNotThere) {
-    EXPECT_NE(complaint(shader_that_calls({{"Float", "no_such_function", {"Float"}}})).find("no_such_function"),
+TEST_F(Compiler, RejectsAMissingFunction) {
+    EXPECT_NE(compile_errors(shader_that_calls({{"Float", "no_such_function", {"Float"}}})).find("no_such_function"),
               std::string::npos);
 }

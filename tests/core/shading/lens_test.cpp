@@ -38,7 +38,7 @@ cv::Point2d opencv_pixel(const arhost_intrinsics &in, Vec3T<double> d) {
 
 class EveryLens : public testing::TestWithParam<Model> {};
 
-TEST_P(EveryLens, RayArrivesAtItsPixelByOpenCvsFormulas) {
+TEST_P(EveryLens, RayProjectsToItsPixelByOpenCv) {
     const arhost_intrinsics in = intrinsics_of(GetParam());
     const Lens lens(in);
     for (int y = -1; y <= 480; y += 37)
@@ -51,7 +51,7 @@ TEST_P(EveryLens, RayArrivesAtItsPixelByOpenCvsFormulas) {
         }
 }
 
-TEST_P(EveryLens, ProjectionUndoesTheRay) {
+TEST_P(EveryLens, ProjectionInvertsTheRay) {
     const Lens lens(intrinsics_of(GetParam()));
     for (const Point2 pixel : {Point2{0, 0}, {639, 0}, {320, 240}, {301.5, 262.25}, {17.3, 479}}) {
         const auto ray = lens.ray(pixel);
@@ -63,7 +63,7 @@ TEST_P(EveryLens, ProjectionUndoesTheRay) {
     }
 }
 
-TEST_P(EveryLens, TheLeafFunctionsAreOpenCvsFormulas) {
+TEST_P(EveryLens, LeafFunctionsMatchOpenCv) {
     const arhost_intrinsics in = intrinsics_of(GetParam());
     for (double y = -0.6; y <= 0.6; y += 0.15)
         for (double x = -0.6; x <= 0.6; x += 0.15) {
@@ -89,20 +89,20 @@ INSTANTIATE_TEST_SUITE_P(
                     Model{"fisheye", ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001}}),
     [](const auto &info) { return info.param.name; });
 
-TEST(Lens, ABrownLensMovesPointsAwayFromTheCentreByItsRadialPart) {
+TEST(Lens, BrownRadialScaleIsTheRationalPolynomial) {
     const BrownConrady k{0.1, 0.02, 0, 0, 0.003, 0.4, 0.05, 0.006, 0, 0, 0, 0};
     EXPECT_NEAR(brown_conrady_radial(k, 2), (1 + 0.2 + 0.08 + 0.024) / (1 + 0.8 + 0.2 + 0.048), 1e-15);
     EXPECT_NEAR(brown_conrady(k, {-1, 1, 1}).y, brown_conrady_radial(k, 2), 1e-15);
 }
 
-TEST(Lens, AFisheyesSlopeIsThatOfItsCurve) {
+TEST(Lens, FisheyeSlopeIsTheDerivativeOfTheRadius) {
     const KannalaBrandt k{0.05, -0.01, 0.004, -0.001};
     for (double angle = 0; angle < 1.8; angle += 0.1)
         EXPECT_NEAR(kannala_brandt_slope(k, angle),
                     (kannala_brandt_radius(k, angle + 1e-5) - kannala_brandt_radius(k, angle - 1e-5)) / 2e-5, 1e-8);
 }
 
-TEST(Lens, WhatIsPastTheCountOfCoefficientsDoesNotCount) {
+TEST(Lens, IgnoresCoefficientsBeyondTheirCount) {
     arhost_intrinsics in = intrinsics_of({"", ARHOST_DISTORTION_BROWN, {0.1, 0.2, 0.3, 0.4, 0.5}});
     in.coefficient_count = 4;
     EXPECT_EQ(brown_conrady_of(in).p2, 0.4);
@@ -118,15 +118,15 @@ TEST(Lens, FisheyeSeesBehindItself) {
     EXPECT_NEAR(ray->z, std::cos(2.0), 1e-9);
 }
 
-TEST(Lens, SeesNothingBeyondTheFoldOfABarrel) {
+TEST(Lens, HasNoRayBeyondTheMonotonicLimit) {
     // r (1 − 0.5 r²) rises up to r = 0.816, where it is 0.544.
     const Lens lens(intrinsics_of({"", ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0}}));
     EXPECT_TRUE(lens.ray({301.5 + 560 * 0.54, 262.25}));
     EXPECT_FALSE(lens.ray({301.5 + 560 * 0.55, 262.25}));
-    EXPECT_FALSE(lens.project({1, 0, 1})) << "it would come back inwards";
+    EXPECT_FALSE(lens.project({1, 0, 1})) << "it would fold back inwards";
 }
 
-TEST(Lens, ProjectsNothingFromBehind) {
+TEST(Lens, DoesNotProjectPointsBehindTheCamera) {
     EXPECT_FALSE(Lens(intrinsics_of({"", ARHOST_DISTORTION_NONE, {}})).project({0, 0, -1}));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fresnel terms, glass and microfacets: against their sources' values, and against integrals.
+// Fresnel terms, glass and microfacets, compared with published values and numerical integrals.
 #include <arhost/shading/scalar.hpp>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ Vec3 direction(double theta, double phi) {
     return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-// ∫ f over the directions with z > 0, by the midpoint rule, finest round the pole.
+// ∫ f over the directions with z > 0, by the midpoint rule, finest near the pole.
 template <class F> double integral_over_hemisphere(F f, int rows = 600, int columns = 300) {
     double sum = 0;
     for (int row = 0; row < rows; ++row) {
@@ -50,7 +50,7 @@ void expect_near(Vec3 a, Vec3 b, double tolerance) {
 
 } // namespace
 
-TEST(Schlick, RisesFromTheReflectanceAtARightAngleToOneAtTheRim) {
+TEST(Schlick, RisesFromNormalReflectanceToOneAtGrazingIncidence) {
     const Vec3 metal{0.04, 0.5, 1};
     expect_near(schlick(metal, 1), metal, 0);
     expect_near(schlick(metal, 0), {1, 1, 1}, 0);
@@ -59,7 +59,7 @@ TEST(Schlick, RisesFromTheReflectanceAtARightAngleToOneAtTheRim) {
     expect_near(schlick(metal, -0.5), {1, 1, 1}, 0);
 }
 
-TEST(Glass, ReflectsByItsExponentBetweenItsLimits) {
+TEST(Glass, ReflectanceFollowsTheExponentWithinTheLimits) {
     EXPECT_NEAR(glass_reflectance(0.5, 5, 0.04, 1), 0.04 + 0.96 / 32, 1e-15);
     EXPECT_NEAR(glass_reflectance(0.5, 3, 0.1, 1), 0.1 + 0.9 / 8, 1e-15);
     EXPECT_NEAR(glass_reflectance(0.75, 0.5, 0, 1), 0.5, 1e-15);
@@ -84,20 +84,20 @@ TEST(Glass, ReflectsTotallyBeyondTheCriticalAngle) {
     const double critical = std::asin(1 / 1.5);
     EXPECT_GT(refracted_cosine_squared(std::cos(critical - 1e-6), 1.5), 0);
     EXPECT_LT(refracted_cosine_squared(std::cos(critical + 1e-6), 1.5), 0);
-    const auto share = [](double angle) {
-        return glass_reflected_share(true, std::cos(angle), refracted_cosine_squared(std::cos(angle), 1.5), 5, 0.04,
-                                     0.7);
+    const auto reflectance = [](double angle) {
+        return glass_reflected_fraction(true, std::cos(angle), refracted_cosine_squared(std::cos(angle), 1.5), 5,
+                                        0.04, 0.7);
     };
-    EXPECT_LE(share(critical - 1e-6), 0.7);
-    EXPECT_EQ(share(critical + 1e-6), 1) << "whatever the maximum";
+    EXPECT_LE(reflectance(critical - 1e-6), 0.7);
+    EXPECT_EQ(reflectance(critical + 1e-6), 1) << "whatever the maximum";
 }
 
-TEST(Glass, ReflectsAsMuchOnTheWayOutAsOnTheWayIn) {
+TEST(Glass, ReflectanceIsTheSameFromInsideAndOutside) {
     for (const double angle : {0.0, 0.4, 1.0, 1.5}) {
         const double outside = std::cos(angle), squared = refracted_cosine_squared(outside, 1 / 1.5);
         const double inside = std::sqrt(squared);
-        EXPECT_NEAR(glass_reflected_share(false, outside, squared, 4, 0.05, 1),
-                    glass_reflected_share(true, inside, refracted_cosine_squared(inside, 1.5), 4, 0.05, 1), 1e-12);
+        EXPECT_NEAR(glass_reflected_fraction(false, outside, squared, 4, 0.05, 1),
+                    glass_reflected_fraction(true, inside, refracted_cosine_squared(inside, 1.5), 4, 0.05, 1), 1e-12);
     }
 }
 
@@ -106,14 +106,14 @@ TEST(Glass, AbsorbsByBouguersLaw) {
     expect_near(bouguer({1, 2, 3}, 0), {1, 1, 1}, 0);
 }
 
-TEST(Glass, ItsShadowIsTheAttenuationAtARightAngleAndBlackAtTheRim) {
+TEST(Glass, ShadowIsTheAttenuationAtNormalIncidenceAndBlackAtGrazing) {
     const Vec3 attenuation{0.4, 0.8, 1};
     expect_near(glass_shadow(attenuation, 1), attenuation, 1e-15);
     expect_near(glass_shadow(attenuation, 0), {0, 0, 0}, 1e-15);
     expect_near(glass_shadow(attenuation, 0.5), {0.4 * 31 / 32, 0.8 * 31 / 32, 31.0 / 32}, 1e-15);
 }
 
-TEST(InterpolatedNormals, LetNoLightThroughFromBehindTheFacet) {
+TEST(InterpolatedNormals, ReceiveNoLightFromBehindTheFacet) {
     const Vec3 to_light{0.6, 0, 0.8};
     EXPECT_EQ(lambert_on_facet(up, up, to_light), 0.8);
     EXPECT_EQ(lambert_on_facet(up, Vec3{-0.8, 0, 0.6000001}, to_light), 0.8);
@@ -121,7 +121,7 @@ TEST(InterpolatedNormals, LetNoLightThroughFromBehindTheFacet) {
     EXPECT_EQ(lambert_on_facet(-up, up, to_light), 0);
 }
 
-TEST(InterpolatedNormals, SendNoMirroredRayIntoTheFacet) {
+TEST(InterpolatedNormals, ReflectNoRayIntoTheFacet) {
     const Vec3 incident{0.6, 0, -0.8}, tilted{0.6, 0, 0.8};
     expect_near(mirror_direction_off_facet(incident, up, up), {0.6, 0, 0.8}, 1e-15);
     expect_near(mirror_direction_off_facet(incident, tilted, {1, 0, 0}), mirror_direction(incident, tilted), 0);
@@ -139,25 +139,25 @@ TEST(MetallicRoughness, MetalsReflectTheirColourAndDielectricsFourPercent) {
     EXPECT_EQ(ggx_alpha(0), 0.001);
 }
 
-TEST(Ggx, TheMicrofacetsAreasAddUpToTheSurfaces) {
+TEST(Ggx, ProjectedMicrofacetAreaIntegratesToOne) {
     for (const double alpha : {0.05, 0.3, 1.0})
         EXPECT_NEAR(integral_over_hemisphere([&](Vec3 n) { return ggx_distribution(n.z, alpha) * n.z; }), 1, 1e-3)
             << alpha;
 }
 
-TEST(Ggx, TheVisibleAreasAddUpToThatOfTheSurfaceAsItIsSeen) {
+TEST(Ggx, VisibleMicrofacetAreaIsTheProjectedSurfaceArea) {
     for (const double alpha : {0.1, 0.3, 1.0})
         for (const double theta : {0.0, 0.8, 1.4}) {
             const Vec3 eye = direction(theta, 0.5);
             const double seen = integral_over_hemisphere(
                 [&](Vec3 n) { return ggx_distribution(n.z, alpha) * std::max(dot(eye, n), 0.0); });
-            EXPECT_NEAR(ggx_unmasked(eye.z, alpha) * seen, eye.z, 2e-3) << alpha << " " << theta;
+            EXPECT_NEAR(ggx_masking(eye.z, alpha) * seen, eye.z, 2e-3) << alpha << " " << theta;
         }
 }
 
-// 8 × 8 cells of the hemisphere, of even steps of θ and φ.
-TEST(Ggx, VisibleNormalsAreChosenByTheirDensity) {
-    constexpr int cells = 8, finer = 60;
+// Histogram over 8 × 8 cells of the hemisphere, equally spaced in θ and φ.
+TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
+    constexpr int cells = 8, steps = 60; // per side: cells, integration steps per cell
     for (const double alpha : {0.2, 0.5, 1.0})
         for (const double theta : {0.0, 0.6, 1.3}) {
             const Vec3 eye = direction(theta, 2.0);
@@ -174,12 +174,12 @@ TEST(Ggx, VisibleNormalsAreChosenByTheirDensity) {
             for (int row = 0; row < cells; ++row)
                 for (int column = 0; column < cells; ++column) {
                     double expected = 0;
-                    for (int i = 0; i < finer * finer; ++i) {
-                        const double t = (row + (i / finer + 0.5) / finer) / cells * pi / 2;
-                        const double p = ((column + (i % finer + 0.5) / finer) / cells - 0.5) * 2 * pi;
+                    for (int i = 0; i < steps * steps; ++i) {
+                        const double t = (row + (i / steps + 0.5) / steps) / cells * pi / 2;
+                        const double p = ((column + (i % steps + 0.5) / steps) / cells - 0.5) * 2 * pi;
                         const Vec3 n = direction(t, p);
-                        expected += ggx_unmasked(eye.z, alpha) * std::max(dot(eye, n), 0.0) / eye.z *
-                                    ggx_distribution(n.z, alpha) * std::sin(t) * pi * pi / std::pow(cells * finer, 2);
+                        expected += ggx_masking(eye.z, alpha) * std::max(dot(eye, n), 0.0) / eye.z *
+                                    ggx_distribution(n.z, alpha) * std::sin(t) * pi * pi / std::pow(cells * steps, 2);
                     }
                     ASSERT_NEAR(chosen.at(static_cast<std::size_t>(row * cells + column)), expected, 2e-3)
                         << alpha << " " << theta << " " << row << " " << column;
@@ -187,23 +187,23 @@ TEST(Ggx, VisibleNormalsAreChosenByTheirDensity) {
         }
 }
 
-// A white surface in a white furnace: microfacets that reflect all but mask each other give back less, never more.
-TEST(Ggx, NoLightIsMadeByLampsOrByChosenRays) {
+// White furnace test: with perfectly reflecting microfacets, masking loses some light, but none is gained.
+TEST(Ggx, LampsAndSampledRaysConserveEnergy) {
     for (const double alpha : {0.1, 0.3, 0.7, 1.0})
         for (const double theta : {0.0, 0.7, 1.2, 1.4}) {
             const std::string where = std::to_string(alpha) + " " + std::to_string(theta);
             const Vec3 eye = direction(theta, 0);
-            const auto half_way = [&](Vec3 light) { return normalize(eye + light).z; };
+            const auto half_vector = [&](Vec3 light) { return normalize(eye + light).z; };
             const double by_lamps = integral_over_hemisphere(
-                [&](Vec3 light) { return ggx_lobe(light.z, eye.z, half_way(light), alpha) / pi; });
+                [&](Vec3 light) { return ggx_lobe(light.z, eye.z, half_vector(light), alpha) / pi; });
             const double by_rays = mean_over_square([&](double u, double v) {
-                const Vec3 light = mirror_direction(-eye, ggx_half_way(up, eye, alpha, u, v));
-                return light.z > 0 ? ggx_unmasked(light.z, alpha) : 0;
+                const Vec3 light = mirror_direction(-eye, ggx_half_vector(up, eye, alpha, u, v));
+                return light.z > 0 ? ggx_masking(light.z, alpha) : 0;
             });
-            // What rays stand for: masking and shadowing each on its own, which is a little darker.
+            // Sampled rays use uncorrelated masking and shadowing, which is slightly darker.
             const double expected = integral_over_hemisphere([&](Vec3 light) {
-                return ggx_distribution(half_way(light), alpha) * ggx_unmasked(light.z, alpha) *
-                       ggx_unmasked(eye.z, alpha) / (4 * eye.z);
+                return ggx_distribution(half_vector(light), alpha) * ggx_masking(light.z, alpha) *
+                       ggx_masking(eye.z, alpha) / (4 * eye.z);
             });
             EXPECT_LE(by_lamps, 1.001) << where;
             EXPECT_GE(by_lamps, by_rays - 1e-3) << where;
@@ -212,12 +212,12 @@ TEST(Ggx, NoLightIsMadeByLampsOrByChosenRays) {
         }
 }
 
-TEST(Ggx, HalfWayVectorsTurnWithTheSurface) {
-    const Vec3 normal = normalize({0.3, -0.5, -0.7}), x = first_axis_across(normal), y = second_axis_across(normal);
+TEST(Ggx, HalfVectorsRotateWithTheSurface) {
+    const Vec3 normal = normalize({0.3, -0.5, -0.7}), x = tangent_axis(normal), y = bitangent_axis(normal);
     const Vec3 eye = direction(0.6, 1);
     const Vec3 turned_eye = x * eye.x + y * eye.y + normal * eye.z;
     const Vec3 n = ggx_visible_normal(eye, 0.4, 0.3, 0.8);
-    expect_near(ggx_half_way(normal, turned_eye, 0.4, 0.3, 0.8), x * n.x + y * n.y + normal * n.z, 1e-14);
+    expect_near(ggx_half_vector(normal, turned_eye, 0.4, 0.3, 0.8), x * n.x + y * n.y + normal * n.z, 1e-14);
 }
 
 } // namespace arhost::shading

@@ -20,7 +20,7 @@ Vec3 at_degrees(double degrees) {
     return {std::sin(a), 0, std::cos(a)};
 }
 
-TEST(Bsdf, LambertIsTheCosineAndNothingFromBehind) {
+TEST(Bsdf, LambertIsTheCosineAndZeroFromBehind) {
     EXPECT_NEAR(lambert(up, at_degrees(60)), 0.5, 1e-12);
     EXPECT_EQ(lambert(up, at_degrees(120)), 0);
 }
@@ -31,11 +31,11 @@ TEST(Bsdf, PhongIsOneInTheMirrorDirectionAndFallsOffWithTheExponent) {
     EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-20), 64), std::pow(std::cos(pi / 18), 64), 1e-12);
 }
 
-TEST(Bsdf, PhongGivesNothingFromBehindTheSurface) {
+TEST(Bsdf, PhongIsZeroForLightFromBehind) {
     EXPECT_EQ(phong(up, at_degrees(100), at_degrees(-80), 1), 0);
 }
 
-TEST(Bsdf, AMirrorSendsTheRayBackUnderTheSameAngle) {
+TEST(Bsdf, MirrorReflectsAtTheAngleOfIncidence) {
     const Vec3 reflected = mirror_direction({0.6, 0, -0.8}, up);
     EXPECT_DOUBLE_EQ(reflected.x, 0.6);
     EXPECT_DOUBLE_EQ(reflected.z, 0.8);
@@ -51,17 +51,17 @@ TEST(Alpha, ClassesGiveTheirCodes) {
     EXPECT_EQ(code_8bit(shadow_alpha(0, 0, 0.6, 0.3)), 0);
     EXPECT_EQ(code_8bit(shadow_alpha(1, 0, 0.6f, 0.3f)), 153);
     EXPECT_EQ(code_8bit(shadow_alpha(0, 1, 0.6f, 0.3f)), 77);
-    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "to the last bit: 76.5 is rounded";
+    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "bit-exact: 76.5 is rounded";
 }
 
-TEST(Alpha, SeveralLightsAreWeighedByTheirIrradiance) {
-    EXPECT_DOUBLE_EQ(share_of_light(3, 3 + 1), 0.75);
-    EXPECT_EQ(share_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
-    EXPECT_EQ(share_of_light(0, 0), 0) << "no light, no shadow";
+TEST(Alpha, SeveralLightsAreWeightedByIrradiance) {
+    EXPECT_DOUBLE_EQ(fraction_of_light(3, 3 + 1), 0.75);
+    EXPECT_EQ(fraction_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
+    EXPECT_EQ(fraction_of_light(0, 0), 0) << "no light, no shadow";
     EXPECT_DOUBLE_EQ(shadow_alpha(0.5, 0.25, 0.6, 0.3), 0.375);
 }
 
-TEST(Alpha, TheShadowsColourMakesUpForTheCommonAlphaOverMiddleGrey) {
+TEST(Alpha, ShadowColourCompensatesTheCommonAlphaOverMidGrey) {
     for (const double own : {0.0, 0.2, 0.6}) {
         const double alpha = 0.6, colour = shadow_colour_encoded(own, alpha);
         EXPECT_NEAR(alpha * colour + (1 - alpha) * 0.5, (1 - own) * 0.5, 1e-15);
@@ -69,24 +69,24 @@ TEST(Alpha, TheShadowsColourMakesUpForTheCommonAlphaOverMiddleGrey) {
     EXPECT_EQ(shadow_colour_encoded(0, 0), 0) << "no shadow";
 }
 
-TEST(Light, ASpotIsFullInsideItsInnerConeAndDarkOutsideItsOuter) {
-    EXPECT_EQ(spot_share(1, 0.9, 0.7), 1);
-    EXPECT_EQ(spot_share(0.9, 0.9, 0.7), 1);
-    EXPECT_NEAR(spot_share(0.8, 0.9, 0.7), 0.5, 1e-12);
-    EXPECT_NEAR(spot_share(0.75, 0.9, 0.7), 5.0 / 32, 1e-12); // 3 t² − 2 t³ at a quarter
-    EXPECT_EQ(spot_share(0.7, 0.9, 0.7), 0);
-    EXPECT_EQ(spot_share(-1, 0.9, 0.7), 0);
-    EXPECT_EQ(spot_share(0.81, 0.8, 0.8), 1) << "cones of one width: a sharp edge";
-    EXPECT_EQ(spot_share(0.79, 0.8, 0.8), 0);
+TEST(Light, SpotIsFullInsideTheInnerConeAndDarkOutsideTheOuterCone) {
+    EXPECT_EQ(spot_attenuation(1, 0.9, 0.7), 1);
+    EXPECT_EQ(spot_attenuation(0.9, 0.9, 0.7), 1);
+    EXPECT_NEAR(spot_attenuation(0.8, 0.9, 0.7), 0.5, 1e-12);
+    EXPECT_NEAR(spot_attenuation(0.75, 0.9, 0.7), 5.0 / 32, 1e-12); // 3 t² − 2 t³ at a quarter
+    EXPECT_EQ(spot_attenuation(0.7, 0.9, 0.7), 0);
+    EXPECT_EQ(spot_attenuation(-1, 0.9, 0.7), 0);
+    EXPECT_EQ(spot_attenuation(0.81, 0.8, 0.8), 1) << "equal cones: a sharp edge";
+    EXPECT_EQ(spot_attenuation(0.79, 0.8, 0.8), 0);
 }
 
-TEST(Light, AWhiteSurfaceUnderAWhiteSkyOfEvenlyChosenDirectionsIsWhite) {
-    // The mean of a cosine that is cut at 0 is 1/4 over the sphere.
+TEST(Light, WhiteSurfaceUnderUniformlySampledWhiteSkyIsWhite) {
+    // The mean of max(cos, 0) over the sphere is 1/4.
     EXPECT_NEAR(irradiance_of_density(1 / (4 * pi)) / 4, 1, 1e-12);
     EXPECT_TRUE(std::isfinite(irradiance_of_density(0)));
 }
 
-TEST(Environment, UpIsTheFirstRowAndMinusZTheMiddle) {
+TEST(Environment, UpIsTheFirstRowAndMinusZTheCentre) {
     EXPECT_NEAR(equirectangular_v({0, 1, 0}), 0, 1e-12);
     EXPECT_NEAR(equirectangular_v({0, -1, 0}), 1, 1e-12);
     EXPECT_NEAR(equirectangular_v({1, 0, 0}), 0.5, 1e-12);
@@ -97,7 +97,7 @@ TEST(Environment, UpIsTheFirstRowAndMinusZTheMiddle) {
     EXPECT_NEAR(angle_from_up(-0.5), 2.0 / 3, 1e-12);
 }
 
-TEST(Environment, EachPlacesDirectionLeadsBackToIt) {
+TEST(Environment, DirectionsMapBackToTheirCoordinates) {
     for (double v = 0.01; v < 1; v += 0.07)
         for (double u = 0.01; u < 1; u += 0.07) {
             const Vec3 d = equirectangular_direction(u, v);
@@ -107,7 +107,7 @@ TEST(Environment, EachPlacesDirectionLeadsBackToIt) {
         }
 }
 
-TEST(Environment, TheDensityIsOneBySolidAngle) {
+TEST(Environment, DensityIsPerSolidAngle) {
     constexpr double h = 1e-5;
     for (double v = 0.01; v < 1; v += 0.07) {
         const Vec3 across = equirectangular_direction(0.3 + h, v) - equirectangular_direction(0.3 - h, v);
@@ -117,9 +117,9 @@ TEST(Environment, TheDensityIsOneBySolidAngle) {
     EXPECT_TRUE(std::isfinite(equirectangular_density(1, 0)));
 }
 
-TEST(Sampling, AxesAreAcrossTheNormalAndEachOther) {
+TEST(Sampling, AxesFormAnOrthonormalBasis) {
     const auto check = [](Vec3 n) {
-        const Vec3 x = first_axis_across(n), y = second_axis_across(n), z = cross(x, y);
+        const Vec3 x = tangent_axis(n), y = bitangent_axis(n), z = cross(x, y);
         EXPECT_NEAR(dot(x, x), 1, 1e-12);
         EXPECT_NEAR(dot(y, y), 1, 1e-12);
         EXPECT_NEAR(dot(x, y), 0, 1e-12);
@@ -136,8 +136,8 @@ TEST(Sampling, AxesAreAcrossTheNormalAndEachOther) {
 
 TEST(Sampling, RectanglesAreCoveredFromCornerToCorner) {
     const Vec3 centre{1, 2, 3}, u{4, 0, 0}, v{0, 0, 5};
-    const auto is = [&](double at_u, double at_v, Vec3 wanted) {
-        const Vec3 error = way_to_rectangle(centre, u, v, at_u, at_v) - wanted;
+    const auto is = [&](double at_u, double at_v, Vec3 expected) {
+        const Vec3 error = vector_to_rectangle(centre, u, v, at_u, at_v) - expected;
         EXPECT_EQ(dot(error, error), 0);
     };
     is(0, 0, {-3, 2, -2});
@@ -146,35 +146,35 @@ TEST(Sampling, RectanglesAreCoveredFromCornerToCorner) {
     is(0.5, 1, {1, 2, 8});
 }
 
-TEST(Sampling, ASpheresDiscFacesUsAndIsCoveredEvenly) {
+TEST(Sampling, SphereDiscFacesTheViewerAndIsSampledUniformly) {
     const Vec3 centre{30, -40, 20};
     Vec3 mean{0, 0, 0};
     double mean_square = 0;
     constexpr int n = 100;
     for (int i = 0; i < n * n; ++i) {
-        const Vec3 r = way_to_disc(centre, 6, (i / n + 0.5) / n, (i % n + 0.5) / n) - centre;
+        const Vec3 r = vector_to_disc(centre, 6, (i / n + 0.5) / n, (i % n + 0.5) / n) - centre;
         EXPECT_NEAR(dot(r, centre), 0, 1e-9);
         EXPECT_LE(dot(r, r), 36);
         mean = mean + r * (1.0 / n / n);
         mean_square += dot(r, r) / n / n;
     }
     EXPECT_NEAR(length(mean), 0, 1e-12);
-    EXPECT_NEAR(mean_square, 18, 1e-9); // half the radius' square, as of any even disc
+    EXPECT_NEAR(mean_square, 18, 1e-9); // radius² / 2 for a uniform disc
 }
 
-TEST(Sampling, APlaceInAStepIsItsShare) {
-    EXPECT_NEAR(place_in_step(0.35, 0.3, 0.2), 0.25, 1e-12);
-    EXPECT_EQ(place_in_step(0.3, 0.3, 0.2), 0);
-    EXPECT_EQ(place_in_step(0.9, 0.3, 0.2), 1);
-    EXPECT_EQ(place_in_step(0.3, 0.3, 0), 0);
+TEST(Sampling, FractionOfStepIsLinearAndClamped) {
+    EXPECT_NEAR(fraction_of_step(0.35, 0.3, 0.2), 0.25, 1e-12);
+    EXPECT_EQ(fraction_of_step(0.3, 0.3, 0.2), 0);
+    EXPECT_EQ(fraction_of_step(0.9, 0.3, 0.2), 1);
+    EXPECT_EQ(fraction_of_step(0.3, 0.3, 0), 0);
 }
 
-TEST(Surface, RaysStartSomeFloatsAboveIt) {
+TEST(Surface, SecondaryRaysStartAFewUlpsAboveIt) {
     EXPECT_EQ(largest({1, -7, 3}), 7);
     EXPECT_EQ(offset_from_surface({100, -412, 0}, {0, 5, -100}, {0.5, 0, -0.5}, {70, 1e6, 106}), 600.0 / (1 << 19));
 }
 
-TEST(Surface, NormalsAreTurnedToTheSideAskedFor) {
+TEST(Surface, NormalsAreFlippedToTheGivenSide) {
     EXPECT_EQ(facing(up, {1, 0, 0.1}).z, 1);
     EXPECT_EQ(facing(up, {1, 0, -0.1}).z, -1);
     EXPECT_NEAR(shading_normal({0, 3, 4}, up).z, 0.8, 1e-12);
@@ -183,14 +183,14 @@ TEST(Surface, NormalsAreTurnedToTheSideAskedFor) {
     EXPECT_EQ(shading_normal({0, 1e-7, 0}, up).z, 1) << "vertex normals that cancel out";
 }
 
-TEST(Surface, TangentsPointToWhereTheTexturesCoordinatesGrow) {
+TEST(Surface, TangentsPointAlongIncreasingTextureCoordinates) {
     const Vec3 per_u{3, 1, 0}, per_v{-1, 2, 1};
     const auto edge = [&](double u, double v) { return per_u * u + per_v * v; };
     const auto is_along = [](Vec3 a, Vec3 b) {
         const Vec3 error = normalize(a) - normalize(b);
         EXPECT_NEAR(length(error), 0, 1e-12);
     };
-    // Corners in either order, and a texture that lies mirrored.
+    // Corners in either order, and a mirrored texture.
     for (const auto &[u1, v1, u2, v2] :
          {std::array{1.0, 0.0, 0.2, 1.0}, {0.2, 1.0, 1.0, 0.0}, {-1.0, 0.3, 0.5, 2.0}}) {
         is_along(tangent_along_u(edge(u1, v1), edge(u2, v2), u1, u2, v1, v2), per_u);
@@ -198,20 +198,20 @@ TEST(Surface, TangentsPointToWhereTheTexturesCoordinatesGrow) {
     }
 }
 
-TEST(Surface, ANormalTexturesRedBendsAlongUAndItsGreenAgainstV) {
-    const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not across the normal
-    const auto is = [&](Vec3 texel, Vec3 wanted) {
-        const Vec3 bent = bent_normal(up, up, u, v, texel);
-        EXPECT_NEAR(length(normalize(bent) - wanted), 0, 1e-12);
+TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
+    const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not orthogonal to the normal
+    const auto is = [&](Vec3 texel, Vec3 expected) {
+        const Vec3 mapped = perturbed_normal(up, up, u, v, texel);
+        EXPECT_NEAR(length(normalize(mapped) - expected), 0, 1e-12);
     };
     is({0.5, 0.5, 1}, up);
     is({0.8, 0.5, 0.9}, {0.6, 0, 0.8});
     is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
     is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
-    const auto stays = [&](Vec3 bent) { EXPECT_EQ(length(bent - up), 0); };
-    stays(bent_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // it would point inwards
-    stays(bent_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // no direction along u
-    is({0.8, 0.5, 0.9}, bent_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the facet's side does not matter
+    const auto stays = [&](Vec3 normal) { EXPECT_EQ(length(normal - up), 0); };
+    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // it would point inwards
+    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // no direction along u
+    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the facet's side does not matter
 }
 
 TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {
@@ -220,7 +220,7 @@ TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {
     EXPECT_EQ(luminance({1, 0, 0}), 0.2126);
 }
 
-TEST(Srgb, EncodesTheStandardsLandmarks) {
+TEST(Srgb, EncodesReferenceValuesOfTheStandard) {
     EXPECT_EQ(srgb_encode(0), 0);
     EXPECT_NEAR(srgb_encode(1), 1, 1e-12);
     EXPECT_NEAR(srgb_encode(0.0031308), 0.0404499, 1e-6); // where the two pieces meet
@@ -228,12 +228,12 @@ TEST(Srgb, EncodesTheStandardsLandmarks) {
     EXPECT_EQ(srgb8_exact(0.2), 124);
 }
 
-TEST(Srgb, DecodeUndoesEncode) {
+TEST(Srgb, DecodeInvertsEncode) {
     for (int code = 0; code <= 255; ++code)
         EXPECT_EQ(srgb8_exact(srgb_decode(code / 255.0)), code);
 }
 
-TEST(Srgb8Table, EqualsTheFormulaAtEachCodesEdgeAndBetween) {
+TEST(Srgb8Table, MatchesTheFormulaAtAndBetweenCodeThresholds) {
     const Srgb8Table table = make_srgb8_table();
     int last = 0;
     // Every 97th float from below the first code's edge to 1, 1.2 million of them.
@@ -242,7 +242,7 @@ TEST(Srgb8Table, EqualsTheFormulaAtEachCodesEdgeAndBetween) {
         const float x = std::bit_cast<float>(bits);
         const int code = table(x);
         ASSERT_EQ(code, srgb8_exact(x)) << x;
-        if (code != last) { // all floats round the edge that has just been passed
+        if (code != last) { // check every float since the previous sample
             for (std::int32_t near = bits - 97; near < bits; ++near)
                 ASSERT_EQ(table(std::bit_cast<float>(near)), srgb8_exact(std::bit_cast<float>(near)));
             ASSERT_EQ(code, last + 1);
@@ -252,7 +252,7 @@ TEST(Srgb8Table, EqualsTheFormulaAtEachCodesEdgeAndBetween) {
     EXPECT_EQ(last, 255);
 }
 
-TEST(Srgb8Table, ClampsWhatIsNotBetweenBlackAndWhite) {
+TEST(Srgb8Table, ClampsValuesOutsideZeroToOne) {
     const Srgb8Table table = make_srgb8_table();
     EXPECT_EQ(table(-1.0f), 0);
     EXPECT_EQ(table(0.0f), 0);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Pictures as they were found right by eye. A pixel whose neighbours are of its own alpha class, and nearly of its
-// colour, is a probe of that class: alpha exact, colour to a code. What lies on an edge may step to the other
-// side, since Embree's own code differs from processor to processor.
+// Comparison with visually verified reference pictures. A pixel whose neighbours have the same alpha class and a
+// similar colour is a probe: its alpha must match exactly, its colour to 1 code. Pixels on edges may fall on either
+// side, since Embree's code differs between processors.
 //
-// After a change that is meant: ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
+// After an intended change: ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
 #include "scene/loader.hpp"
 #include "scene/motion.hpp"
 #include "tracer.hpp"
@@ -22,7 +22,7 @@ const std::filesystem::path folder = ARHOST_SOURCE_DIRECTORY "/tests/plugins/rt_
 struct View {
     const char *name, *scene;
     std::array<double, 3> eye, look_at, up;
-    std::vector<int> classes; // of alpha, each probed in a hundred pixels or more
+    std::vector<int> classes; // alpha classes that must have at least 100 probes each
     const char *samples = "1";
     double time_s = 0;
 };
@@ -39,18 +39,18 @@ cv::Mat render(const View &view) {
     const arhost_camera from = camera(view.eye, view.look_at, view.up);
     EXPECT_EQ(tracer.start(from.intrinsics), ARHOST_STATUS_OK);
     scene::MotionEvaluator motion(tracer.scene());
-    const arhost_motion then = motion.at(view.time_s);
+    const arhost_motion at_time = motion.at(view.time_s);
     Picture picture(from.intrinsics);
-    EXPECT_EQ(tracer.try_render(from, picture, &then), ARHOST_STATUS_OK);
+    EXPECT_EQ(tracer.try_render(from, picture, &at_time), ARHOST_STATUS_OK);
     cv::Mat image(static_cast<int>(picture.height), static_cast<int>(picture.width), CV_8UC4);
     for (int y = 0; y < image.rows; ++y)
         for (int x = 0; x < image.cols; ++x) {
             const Pixel p = picture.at(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-            const bool nothing = p[3] == 0; // whose colour is nobody's business
+            const bool transparent = p[3] == 0; // its colour is undefined
             for (int i = 0; i < 4; ++i)
                 image.at<cv::Vec4b>(y, x)[i] =
-                    nothing ? std::uint8_t{0}
-                            : static_cast<std::uint8_t>(p[static_cast<std::size_t>(i < 3 ? 2 - i : 3)]);
+                    transparent ? std::uint8_t{0}
+                                : static_cast<std::uint8_t>(p[static_cast<std::size_t>(i < 3 ? 2 - i : 3)]);
         }
     return image;
 }
@@ -75,7 +75,7 @@ bool is_probe(const cv::Mat &image, int x, int y) {
 
 } // namespace
 
-TEST_P(Golden, PictureIsAsItWas) {
+TEST_P(Golden, MatchesTheReferencePicture) {
     const std::filesystem::path file = folder / (std::string(GetParam().name) + ".png");
     const cv::Mat got = render(GetParam());
     if (std::getenv("ARHOST_UPDATE_GOLDEN"))
@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
         View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}},
         View{"room",
              "tests/plugins/rt_embree/golden/room.yaml",
-             {20, -190, 120}, // behind the front wall, which faces away
+             {20, -190, 120}, // outside the room, behind the front wall's back face
              {5, 0, 22},
              {0, 0, 1},
              {0, 255},

@@ -24,7 +24,7 @@ double available_gib() {
 
 } // namespace
 
-TEST(Huge, TenMillionTrianglesAreTraced) {
+TEST(Huge, TracesTenMillionTriangles) {
     if (available_gib() < 6)
         GTEST_SKIP() << "needs 6 GiB of memory";
     constexpr unsigned n = 2237; // squares a side
@@ -45,7 +45,7 @@ TEST(Huge, TenMillionTrianglesAreTraced) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
     builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(flat(0.5f, 0.5f, 0.5f)));
-    // With triangles of a twentieth of a pixel single precision lets a ray in a few hundred slip between two.
+    // Triangles are a twentieth of a pixel: without `robust`, one ray in a few hundred passes between two.
     const Picture picture = Tracer(std::move(builder), {{"robust", "true"}}).render(from_above());
     int inside = 0;
     for (int y = 30; y < 120; ++y)
@@ -56,7 +56,7 @@ TEST(Huge, TenMillionTrianglesAreTraced) {
     EXPECT_EQ(picture.alpha(5, 5), 0);
 }
 
-TEST(Huge, ATextureOf16384By16384IsSampledAtItsFarEnd) {
+TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     if (available_gib() < 4)
         GTEST_SKIP() << "needs 4 GiB of memory";
     constexpr std::uint32_t side = 16384;
@@ -66,7 +66,7 @@ TEST(Huge, ATextureOf16384By16384IsSampledAtItsFarEnd) {
     texture.format = ARHOST_TEXEL_RGBA8;
     texture.texels.size = std::size_t{4} * side * side;
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size); // black, alpha 0
-    // White in the last quarter of the last rows: past 2^29 texels' bytes.
+    // White in the last quarter of the last rows, at byte offsets beyond 2^29.
     for (std::size_t y = side - 2000; y < side; ++y)
         std::memset(texture.texels.bytes.get() + 4 * (y * side + 3 * side / 4), 0xff, side);
     ArenaBuilder builder;
@@ -77,7 +77,7 @@ TEST(Huge, ATextureOf16384By16384IsSampledAtItsFarEnd) {
     mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
     builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(material));
     const Picture picture = Tracer(std::move(builder)).render(from_above());
-    EXPECT_EQ(picture.at(140, 120)[0], 255) << "right at the bottom";
+    EXPECT_EQ(picture.at(140, 120)[0], 255) << "bottom right";
     EXPECT_EQ(picture.at(110, 120)[0], 0);
     EXPECT_EQ(picture.at(140, 60)[0], 0);
 }

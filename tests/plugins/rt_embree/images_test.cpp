@@ -14,7 +14,7 @@ namespace {
 
 using scene::ArenaBuilder;
 
-// Four texels, seen from above upright: red, green / blue, white.
+// A 2×2 texture viewed upright from above: red, green / blue, grey.
 Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format format = ARHOST_TEXEL_SRGB8) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
@@ -31,7 +31,7 @@ Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format form
     return Tracer(std::move(builder)).render(from_above());
 }
 
-// Nearly so: half a pixel beside a texel's centre its neighbours are mixed in.
+// Half a pixel off a texel's centre, its neighbours are mixed in.
 bool is_nearly(const Pixel &pixel, const Pixel &colour) {
     for (std::size_t c = 0; c < 4; ++c)
         if (std::abs(pixel[c] - colour[c]) > 48)
@@ -41,7 +41,7 @@ bool is_nearly(const Pixel &pixel, const Pixel &colour) {
 
 } // namespace
 
-TEST(Texture, LiesUprightAndIsLinearised) {
+TEST(Texture, IsUprightAndLinearised) {
     const Picture picture = of_four_texels(ARHOST_WRAP_REPEAT, 1);
     EXPECT_TRUE(is_nearly(picture.at(70, 44), Pixel{255, 0, 0, 255}));
     EXPECT_TRUE(is_nearly(picture.at(130, 44), Pixel{0, 255, 0, 255}));
@@ -51,21 +51,21 @@ TEST(Texture, LiesUprightAndIsLinearised) {
                 shading::srgb8_exact(188 / 255.0), 3);
 }
 
-TEST(Texture, IsMixedBetweenTexelsInLinearLight) {
-    // Half way from red to green.
+TEST(Texture, IsInterpolatedInLinearLight) {
+    // Halfway between red and green.
     const Pixel mixed = of_four_texels(ARHOST_WRAP_CLAMP, 1).at(99, 30);
     EXPECT_NEAR(mixed[0], shading::srgb8_exact(0.5), 2);
     EXPECT_NEAR(mixed[1], shading::srgb8_exact(0.5), 2);
 }
 
 TEST(Texture, RepeatsClampsAndMirrors) {
-    // Of three repeats the middle of the last one's left half.
+    // The left half of the last of three repetitions.
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_REPEAT, 3).at(130, 24), Pixel{255, 0, 0, 255}));
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_CLAMP, 3).at(130, 24), Pixel{0, 255, 0, 255}));
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_MIRROR, 3).at(89, 24), Pixel{0, 255, 0, 255}));
 }
 
-TEST(Texture, TimesTheEmissionGlowsInTheDark) {
+TEST(Texture, MultipliesTheEmission) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     arhost_material material = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
@@ -80,16 +80,16 @@ TEST(Texture, TimesTheEmissionGlowsInTheDark) {
     EXPECT_TRUE(is_nearly(picture.at(130, 74), Pixel{0, 255, 0, 255}));
 }
 
-// ---- Holes -----------------------------------------------------------------------------------------
+// ---- Alpha cutoff ----------------------------------------------------------------------------------
 
-TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
+TEST(AlphaCutoff, CutOutTexelsWithAlphaBelowTheCutoff) {
     for (const bool instanced : {false, true}) {
         ArenaBuilder builder;
         builder.settings.ambient = glm::vec3(1);
         const auto material = builder.add_material(half_a_hole(builder, 0.5f));
         const auto whole = builder.add_material(half_a_hole(builder, 0));
         const auto mesh = builder.add_triangles(textured_square(60, 0));
-        // The same mesh twice: one object has holes, the other has none.
+        // The same mesh twice, with and without cutoff.
         const glm::mat4x3 lower(1, 0, 0, 0, 1, 0, 0, 0, 1, instanced ? 30 : 0, 0, -50);
         builder.add_object("holed", mesh, material, ARHOST_ROLE_VIRTUAL,
                            instanced ? glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 0) : glm::mat4x3(1));
@@ -97,15 +97,15 @@ TEST(Holes, AreWhereTheColoursAlphaIsBelowTheCutOff) {
             builder.add_object("whole", mesh, whole, ARHOST_ROLE_VIRTUAL, lower);
         const Picture picture = Tracer(std::move(builder)).render(from_above());
         EXPECT_EQ(picture.alpha(70, 74), 255);
-        EXPECT_EQ(picture.alpha(130, 74), instanced ? 255 : 0) << "the whole one lies behind the hole";
+        EXPECT_EQ(picture.alpha(130, 74), instanced ? 255 : 0) << "the opaque object is visible through the hole";
         if (!instanced) {
-            EXPECT_EQ(picture.alpha(97, 74), 255) << "alpha is ½ half way between the texels";
+            EXPECT_EQ(picture.alpha(97, 74), 255) << "alpha is ½ halfway between the texels";
             EXPECT_EQ(picture.alpha(102, 74), 0);
         }
     }
 }
 
-TEST(Holes, LetLightThrough) {
+TEST(AlphaCutoff, LetLightThrough) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     builder.add_light(light(0, 0, 1000, 1));
@@ -118,7 +118,7 @@ TEST(Holes, LetLightThrough) {
     EXPECT_EQ(picture.alpha(140, 60), 0) << "light through the hole";
 }
 
-TEST(Holes, OfACatcherTakeNoShadow) {
+TEST(AlphaCutoff, OfACatcherReceiveNoShadow) {
     ArenaBuilder builder;
     builder.add_light(light(0, 0, 1000, 1));
     builder.add_object("roof", builder.add_triangles(square(20, 300)), builder.add_material(flat(1, 1, 1)));
@@ -129,19 +129,19 @@ TEST(Holes, OfACatcherTakeNoShadow) {
     EXPECT_EQ(picture.alpha(110, 74), 0);
 }
 
-// ---- Everything at once ----------------------------------------------------------------------------
+// ---- Combined features -----------------------------------------------------------------------------
 
-TEST(RichScene, IsTheSameOnAnyNumberOfThreadsAndAgain) {
-    for (const char *way : {"tree", "path"}) {
-        Tracer one(rich_scene(), {{"threads", "1"}, {"samples", "2"}, {"glass", way}}),
-            three(rich_scene(), {{"threads", "3"}, {"samples", "2"}, {"glass", way}});
+TEST(RichScene, IsIdenticalForAnyThreadCountAndRepeatedly) {
+    for (const char *mode : {"tree", "path"}) {
+        Tracer one(rich_scene(), {{"threads", "1"}, {"samples", "2"}, {"glass", mode}}),
+            three(rich_scene(), {{"threads", "3"}, {"samples", "2"}, {"glass", mode}});
         const auto expected = one.render(from_the_side()).pixels();
-        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << way;
-        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << way;
+        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << mode;
+        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << mode;
     }
 }
 
-TEST(RichScene, IsTheSameWithEveryInstructionSet) {
+TEST(RichScene, IsIdenticalForEveryInstructionSet) {
 #if defined(__x86_64__)
     const auto base = Tracer(rich_scene(), {{"instruction_set", "base"}}).render(from_the_side()).pixels();
     if (__builtin_cpu_supports("avx2")) {
@@ -158,9 +158,9 @@ TEST(RichScene, IsTheSameWithEveryInstructionSet) {
 // ---- Normal textures -------------------------------------------------------------------------------
 
 struct Tilt {
-    glm::vec3 tangent_space; // what the texture says
-    glm::vec3 world;         // what that is on the square
-    bool mirrored = false;   // u runs to the left
+    glm::vec3 tangent_space; // in the texture
+    glm::vec3 world;         // on the square
+    bool mirrored = false;   // u increases to the left
 };
 
 Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
@@ -190,14 +190,14 @@ Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
         mesh.normals.assign(4, glm::normalize(tilt.world));
     }
     glm::mat4x3 place(1);
-    if (turned) // a quarter about z, and flattened: tangents and normals go different ways
+    if (turned) // 90° about z, and non-uniformly scaled: tangents and normals transform differently
         place = glm::mat4x3(0, 2, 0, -2, 0, 0, 0, 0, 0.5f, 0, 0, 0);
     builder.add_object("square", builder.add_triangles(std::move(mesh)), builder.add_material(material),
                        ARHOST_ROLE_VIRTUAL, place);
     return Tracer(std::move(builder)).render(from_above());
 }
 
-TEST(NormalTexture, BendsNormalsAsIfTheVerticesHadThem) {
+TEST(NormalTexture, MatchesEquivalentVertexNormals) {
     for (const Tilt &tilt :
          {Tilt{{0, 0, 1}, {0, 0, 1}}, Tilt{{0.6f, 0, 0.8f}, {0.6f, 0, 0.8f}}, Tilt{{0, 0.5f, 0.8f}, {0, 0.5f, 0.8f}},
           Tilt{{-0.3f, -0.5f, 0.8f}, {-0.3f, -0.5f, 0.8f}}, Tilt{{0.6f, 0.3f, 0.8f}, {-0.6f, 0.3f, 0.8f}, true}}) {
@@ -208,9 +208,9 @@ TEST(NormalTexture, BendsNormalsAsIfTheVerticesHadThem) {
     }
 }
 
-TEST(NormalTexture, TurnsWithItsObject) {
-    // Turned a quarter, the texture's right is the world's +y, its up −x; bent in the world, the tilt is not
-    // flattened with the object as a vertex normal would be.
+TEST(NormalTexture, RotatesWithItsObject) {
+    // After the rotation, the texture's right is world +y and its up −x. The tilt is applied in world space, so it is
+    // not scaled with the object, unlike a vertex normal.
     const Tilt tilt{{0, -0.6f, 0.8f}, {}};
     const auto turned = lit_square(tilt, true, true).pixels();
     const auto expected = lit_square({{0.6f, 0, 0.8f}, {}}, true, false).pixels();
@@ -230,7 +230,7 @@ TEST(Environment, LightsADiffusePlaneByItsMean) {
     EXPECT_NEAR(sum / (200 * 150), 0.5 * 0.6, 0.003);
 }
 
-TEST(Environment, LightsByAFewBrightTexelsAsMuchAsTheyGive) {
+TEST(Environment, LightsByItsIrradianceWithFewBrightTexels) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
@@ -243,7 +243,7 @@ TEST(Environment, LightsByAFewBrightTexelsAsMuchAsTheyGive) {
     EXPECT_NEAR(sum / static_cast<double>(picture.pixels().size()), 0.25, 0.004);
 }
 
-TEST(Environment, IsSeenInMirrorsWhereItStands) {
+TEST(Environment, IsReflectedInTheRightDirection) {
     ArenaBuilder builder;
     // Blue towards +x, red towards −x.
     add_environment(builder, [](std::uint32_t x) { return x < 4 ? glm::vec3(1, 0, 0) : glm::vec3(0, 0, 1); });

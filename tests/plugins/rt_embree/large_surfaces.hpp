@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Something large that goes through the origin, seen and lit from near.
+// Large surfaces through the origin, viewed and lit from nearby.
 #pragma once
 
 #include "scene/motion.hpp"
@@ -13,7 +13,7 @@
 
 namespace arhost::test {
 
-// How it comes to be that large, and there.
+// How it gets its size and position.
 enum class Grown { BUILT, MOVED, SCALED, SCALED_IN_MOTION, MORPHED };
 
 struct LargeSurface {
@@ -26,7 +26,7 @@ inline std::ostream &operator<<(std::ostream &stream, const LargeSurface &surfac
     return stream << surface.name;
 }
 
-// A square of 20 m is a wall of a scanned hall.
+// 20 m: a wall of a scanned hall.
 inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
                                               {"Sphere20m", true, 1e4},
                                               {"Sphere200m", true, 1e5},
@@ -42,7 +42,7 @@ inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
                                               {"SquareThatGrowsTo200m", false, 1e5, Grown::SCALED_IN_MOTION},
                                               {"SquareThatMorphsTo200m", false, 1e5, Grown::MORPHED}};
 
-// Its columns: two directions in the surface at the origin, and out of it.
+// Columns: two tangents of the surface at the origin, and its normal.
 inline glm::dmat3 surface_axes() {
     const glm::dvec3 out = glm::normalize(glm::dvec3(0.31, -0.42, 0.85)),
                      right = glm::normalize(glm::cross(out, glm::dvec3(0.2, 0.9, 0.1)));
@@ -99,7 +99,7 @@ inline arhost_camera camera_at_surface() {
     return camera({eye.x, eye.y, eye.z}, {0, 0, 0}, {axes[1].x, axes[1].y, axes[1].z});
 }
 
-// A plate of 20 x 20 x 1 mm on a level floor, the lamp low at its left: 5.8 mm of the floor are in its shadow.
+// A plate of 20 × 20 × 1 mm on a level floor with a low lamp on its left: the shadow is 5.8 mm long.
 inline scene::ArenaBuilder plate_on_floor(float side_mm) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
@@ -113,7 +113,7 @@ inline scene::ArenaBuilder plate_on_floor(float side_mm) {
     return builder;
 }
 
-// Its shadow 3 mm beside it, and the light at the other side.
+// Shadow 3 mm from the plate, light on the other side.
 inline bool has_its_shadow(const Picture &picture) {
     return picture.at(125, 74)[0] == 0 && picture.at(74, 74)[0] > 150;
 }
@@ -121,7 +121,7 @@ inline arhost_camera camera_over_plate() {
     return camera({0, 0, 100}, {0, 0, 0}, {0, 1, 0});
 }
 
-// The surface fills the picture, and all of it is in the light.
+// The surface fills the picture and should be fully lit.
 inline int pixels_out_of_light(const LargeSurface &surface, const std::string &plugin, const Options &options = {}) {
     Tracer tracer(scene_with(surface), options, plugin);
     const arhost_camera camera = camera_at_surface();

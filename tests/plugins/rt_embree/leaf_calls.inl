@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every leaf function of arhost/shading/, to be called with numbers from an array. Included in a namespace that has
-// included the leaf files, so that Float is one number or a packet of them.
+// Calls every leaf function of arhost/shading/ with arguments from an array. Included in a namespace that includes
+// the leaf files; Float is a scalar or a packet.
 
-// All that leaf functions take and return are Floats side by side, but for Bool.
+// Arguments and results of leaf functions consist of Floats, except Bool.
 template <class T> constexpr int numbers_of = sizeof(T) / sizeof(Float);
 template <> constexpr int numbers_of<Bool> = 1;
 
@@ -32,7 +32,7 @@ void call(Result (*f)(Parameters...), const Float *arguments, Float *results) {
     call(f, arguments, results, Types<Parameters...>{});
 }
 
-// A bit for each of the arguments' numbers, set where a Vec3 begins.
+// A bit per argument value, set where a Vec3 begins.
 template <class Result, class... Parameters> constexpr unsigned vectors_of(Result (*)(Parameters...)) {
     unsigned vectors = 0;
     int at = 0;
@@ -51,7 +51,7 @@ struct LeafFunction {
 #name, [](const Float *from, Float *to) { call(&name, from, to); }, vectors_of(&name)                        \
     }
 const LeafFunction leaf_functions[] = {
-    LEAF(share_of_light),
+    LEAF(fraction_of_light),
     LEAF(shadow_alpha),
     LEAF(shadow_colour_encoded),
     LEAF(code_8bit),
@@ -64,14 +64,14 @@ const LeafFunction leaf_functions[] = {
     LEAF(glass_reflectance),
     LEAF(refracted_cosine_squared),
     LEAF(refracted_direction),
-    LEAF(glass_reflected_share),
+    LEAF(glass_reflected_fraction),
     LEAF(bouguer),
     LEAF(metallic_reflectance),
     LEAF(metallic_diffuse),
     LEAF(ggx_alpha),
     LEAF(ggx_distribution),
     LEAF(ggx_visibility),
-    LEAF(ggx_unmasked),
+    LEAF(ggx_masking),
     LEAF(ggx_lobe),
     LEAF(srgb_encode),
     LEAF(srgb_decode),
@@ -88,23 +88,23 @@ const LeafFunction leaf_functions[] = {
     LEAF(kannala_brandt_slope),
     LEAF(kannala_brandt),
     LEAF(point_light_falloff),
-    LEAF(spot_share),
+    LEAF(spot_attenuation),
     LEAF(glass_shadow),
     LEAF(irradiance_of_density),
-    LEAF(first_axis_across),
-    LEAF(second_axis_across),
+    LEAF(tangent_axis),
+    LEAF(bitangent_axis),
     LEAF(ggx_visible_normal),
-    LEAF(ggx_half_way),
-    LEAF(way_to_rectangle),
-    LEAF(way_to_disc),
-    LEAF(place_in_step),
+    LEAF(ggx_half_vector),
+    LEAF(vector_to_rectangle),
+    LEAF(vector_to_disc),
+    LEAF(fraction_of_step),
     LEAF(largest),
-    LEAF(unit_or),
+    LEAF(normalize_or),
     LEAF(offset_from_surface),
     LEAF(facing),
     LEAF(shading_normal),
     LEAF(tangent_along_u),
     LEAF(tangent_along_v),
-    LEAF(bent_normal),
+    LEAF(perturbed_normal),
 };
 #undef LEAF

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once for each instruction set, ARHOST_ISA, with the kernel's options. It includes nothing of the standard
-// library, whose functions would be linked into code for other processors.
+// Compiled once per instruction set (ARHOST_ISA) with the kernel's options. Includes no standard library headers,
+// whose functions could be linked into code for other processors.
 #include "leaf_packets.hpp"
 
 #include "kernel/packet.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The leaf functions as the kernel has them, sixteen numbers at once, once for each instruction set.
+// The kernel's leaf functions on packets of 16 lanes, per instruction set.
 #pragma once
 
 namespace rt_embree {
@@ -10,7 +10,7 @@ struct alignas(64) Packet {
     float lane[packet_lanes];
 };
 
-// Calls the function of this place in leaf_calls.inl.
+// `number`: index into leaf_functions of leaf_calls.inl.
 using CallLeaf = void (*)(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 
 namespace base {

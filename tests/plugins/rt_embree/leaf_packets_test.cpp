@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shading sixteen points at once gives what shading them one by one does.
+// Packet and scalar versions of the leaf functions give the same results.
 #include "leaf_packets.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -25,7 +25,7 @@ using namespace rt_embree;
 
 struct InstructionSet {
     const char *name;
-    bool is_there;
+    bool is_supported;
     CallLeaf call;
 };
 
@@ -33,23 +33,23 @@ void PrintTo(const InstructionSet &set, std::ostream *stream) {
     *stream << set.name;
 }
 
-// Those that the kernel is compiled for.
+// The instruction sets that the kernel is compiled for.
 std::vector<InstructionSet> instruction_sets() {
     std::vector<InstructionSet> sets{{"base", true, base::call_leaf}};
 #ifdef ARHOST_LEAF_PACKETS_avx2
     sets.push_back({"avx2", __builtin_cpu_supports("avx2") != 0, avx2::call_leaf});
 #endif
 #ifdef ARHOST_LEAF_PACKETS_avx512
-    const bool is_there = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-                          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    sets.push_back({"avx512", is_there, avx512::call_leaf});
+    const bool is_supported = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                              __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+    sets.push_back({"avx512", is_supported, avx512::call_leaf});
 #endif
     return sets;
 }
 
 class LeafPackets : public testing::TestWithParam<InstructionSet> {};
 
-// Numbers between 0 and 1, vectors of length 1.
+// Random numbers between 0 and 1, unit vectors.
 void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &random) {
     std::uniform_real_distribution<float> number(0.05f, 0.95f);
     for (int lane = 0; lane < packet_lanes; ++lane)
@@ -67,10 +67,10 @@ void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &ra
 
 } // namespace
 
-TEST_P(LeafPackets, GiveTheScalarsResults) {
-    if (!GetParam().is_there)
-        GTEST_SKIP() << "this processor has no " << GetParam().name;
-    // turn_of is exact to 2e-6 turns, which a fisheye's ninth power multiplies; all else is closer.
+TEST_P(LeafPackets, MatchTheScalarFunctions) {
+    if (!GetParam().is_supported)
+        GTEST_SKIP() << "this processor does not support " << GetParam().name;
+    // The error of turn_of, 2e-6 turns, is amplified by the fisheye's ninth power; the others are more exact.
     constexpr double tolerance = 1e-4;
     std::mt19937 random(1);
     for (int number = 0; number < static_cast<int>(std::size(leaf_functions)); ++number)
@@ -84,16 +84,17 @@ TEST_P(LeafPackets, GiveTheScalarsResults) {
                     from[i] = arguments[i].lane[lane];
                 leaf_functions[number].call(from, to);
                 const double size = std::hypot(to[0], to[1], to[2]);
-                // Nothing is subtracted in it, and it is far below 1.
-                const double whole = leaf_functions[number].name == std::string_view("offset_from_surface") ? 0 : 1;
+                // Its results are far below 1 and computed without cancellation.
+                const double absolute =
+                    leaf_functions[number].name == std::string_view("offset_from_surface") ? 0 : 1;
                 for (int i = 0; i < max_results; ++i)
-                    ASSERT_NEAR(results[i].lane[lane], to[i], tolerance * (whole + size))
+                    ASSERT_NEAR(results[i].lane[lane], to[i], tolerance * (absolute + size))
                         << leaf_functions[number].name;
             }
         }
 }
 
-TEST(LeafCalls, LeaveNoLeafFunctionOut) {
+TEST(LeafCalls, ListEveryLeafFunction) {
     std::size_t declared = 0;
     for (const auto &entry :
          std::filesystem::directory_iterator(ARHOST_SOURCE_DIRECTORY "/core/shading/include/arhost/shading/leaf")) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Lamps of every kind over a white plane, against what the formulas say.
+// All light types over a white plane, compared with the formulas.
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>
@@ -36,7 +36,7 @@ arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity)
     return lamp;
 }
 
-// A ball over a catcher: how many pixels have which alpha.
+// A ball over a catcher: pixel counts by alpha.
 std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
@@ -48,19 +48,19 @@ std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
 
 } // namespace
 
-TEST(DirectionalLight, IsTheSameEverywhere) {
+TEST(DirectionalLight, IsUniform) {
     arhost_light sun = placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 0.8f);
     set3(sun.direction, 0.6f, 0, -0.8f);
     expect_irradiance(over_a_plane(sun), [](glm::dvec3) { return 0.8 * 0.8; });
 }
 
-TEST(DirectionalLight, CastsShadowsOfOneSize) {
+TEST(DirectionalLight, CastsHardShadows) {
     const auto near = shadow_of_a_ball(placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 1));
     EXPECT_EQ(near.size(), 3u);
     EXPECT_GT(near.at(153), 100);
 }
 
-TEST(SpotLight, ShinesInItsConeOnly) {
+TEST(SpotLight, LightsOnlyItsCone) {
     arhost_light spot = placed(ARHOST_LIGHT_SPOT, {30, -20, 90}, 5000);
     spot.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
     const glm::dvec3 axis = glm::normalize(glm::dvec3(-0.3, 0.2, -0.9));
@@ -70,15 +70,15 @@ TEST(SpotLight, ShinesInItsConeOnly) {
     expect_irradiance(
         over_a_plane(spot),
         [&](glm::dvec3 p) {
-            const glm::dvec3 way = p - glm::dvec3(30, -20, 90);
-            const double d = glm::length(way), cosine = glm::dot(way / d, axis);
+            const glm::dvec3 to_point = p - glm::dvec3(30, -20, 90);
+            const double d = glm::length(to_point), cosine = glm::dot(to_point / d, axis);
             const double t = std::clamp((cosine - double{0.8f}) / (double{0.9f} - double{0.8f}), 0.0, 1.0);
-            return 5000 * -way.z / (d * d * d) * t * t * (3 - 2 * t);
+            return 5000 * -to_point.z / (d * d * d) * t * t * (3 - 2 * t);
         },
         2e-3);
 }
 
-TEST(RectangleLight, IsTheMeanOverItsPoints) {
+TEST(RectangleLight, IsTheMeanOverItsArea) {
     arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
     panel.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
     set3(panel.axis_u, 40, 0, 0);
@@ -98,22 +98,22 @@ TEST(RectangleLight, IsTheMeanOverItsPoints) {
         0.02);
 }
 
-TEST(RectangleLight, ShinesToOneSide) {
+TEST(RectangleLight, EmitsToOneSideOnly) {
     arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
     set3(panel.direction, 0, 0, 1);
     expect_irradiance(over_a_plane(panel), [](glm::dvec3) { return 0; });
 }
 
-TEST(SphereLight, OfNoSizeIsAPointLight) {
+TEST(SphereLight, WithZeroRadiusIsAPointLight) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {30, -20, 90}, 0.7f);
     bulb.radius = 1e-3f;
     expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {
-        const glm::dvec3 way = glm::dvec3(30, -20, 90) - p;
-        return 0.7 * way.z / glm::length(way);
+        const glm::dvec3 to_point = glm::dvec3(30, -20, 90) - p;
+        return 0.7 * to_point.z / glm::length(to_point);
     });
 }
 
-TEST(SphereLight, CastsSoftShadowsWithAFullCoreAndNoOthersThanThat) {
+TEST(SphereLight, CastsSoftShadowsWithAFullyDarkCore) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 20;
     const auto alphas = shadow_of_a_ball(bulb);
@@ -126,7 +126,7 @@ TEST(SphereLight, CastsSoftShadowsWithAFullCoreAndNoOthersThanThat) {
     EXPECT_GT(between, 200);
 }
 
-TEST(ExtendedLights, AreTheSameOnEachRunAndThreadCount) {
+TEST(ExtendedLights, AreIdenticalOnEachRunAndThreadCount) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 30;
     const auto pixels = [&](const char *threads) { return over_a_plane(bulb, {{"threads", threads}}).pixels(); };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Metals, glass and rough surfaces, against what the formulas say.
+// Metals, glass and rough surfaces, compared with the formulas.
 #include "tracer.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -25,7 +25,6 @@ arhost_material clear_glass(float index = 1.5f) {
     glass.importance_cutoff = 0;
     return glass;
 }
-// It refracts only.
 arhost_material without_reflection(arhost_material glass) {
     glass.fresnel_minimum = glass.fresnel_maximum = 0;
     return glass;
@@ -50,7 +49,7 @@ void add_ball(ArenaBuilder &builder, const arhost_material &material) {
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(material));
 }
 
-// Of the angle under which a pixel's ray from above meets that ball: t² + 2 b t + c = 0.
+// Cosine of the angle of incidence of a pixel's ray on that ball: t² + 2 b t + c = 0.
 std::optional<double> cosine_on_ball(int x, int y) {
     const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, y) - eye);
     const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 60 * 60);
@@ -61,7 +60,7 @@ std::optional<double> cosine_on_ball(int x, int y) {
 
 } // namespace
 
-TEST(Metal, ReflectsBySchlicksTerm) {
+TEST(Metal, FollowsSchlick) {
     arhost_material metal = scene::make_material(ARHOST_MATERIAL_METAL);
     set3(metal.reflectivity, 0.5f, 0.3f, 0.1f);
     ArenaBuilder builder = in_a_room_of_light(0.6f);
@@ -75,28 +74,28 @@ TEST(Metal, ReflectsBySchlicksTerm) {
             }
 }
 
-TEST(Glass, LosesNoLight) {
-    for (const char *way : {"tree", "path"}) {
+TEST(Glass, ConservesEnergy) {
+    for (const char *mode : {"tree", "path"}) {
         arhost_material glass = clear_glass();
-        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // as bright as all else, for what is still inside in the end
+        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // the environment's radiance, for rays that end inside the glass
         ArenaBuilder builder = in_a_room_of_light(0.5f);
-        builder.settings.max_depth = std::string(way) == "tree" ? 12 : 60;
+        builder.settings.max_depth = std::string(mode) == "tree" ? 12 : 60;
         add_ball(builder, glass);
         builder.add_object("box", builder.add_triangles(box({50, -60, -20}, {90, 60, 30})),
                            builder.add_material(glass));
-        const Picture picture = Tracer(std::move(builder), {{"glass", way}}).render(from_the_side());
+        const Picture picture = Tracer(std::move(builder), {{"glass", mode}}).render(from_the_side());
         int covered = 0;
         for (const Pixel &pixel : picture.pixels())
             if (pixel[3] == 255) {
                 ++covered;
-                ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << way;
+                ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << mode;
             }
         EXPECT_GT(covered, 5000);
     }
 }
 
-TEST(Glass, BendsRaysAsSnellSays) {
-    // A slab over a floor that is black to the left of y = 7 and white to the right.
+TEST(Glass, RefractsBySnellsLaw) {
+    // A slab over a floor that is black for y < 7 and white for y > 7.
     constexpr double top = 40, bottom = 10, index = 1.5;
     ArenaBuilder builder = in_a_room_of_light(0);
     builder.settings.ambient = glm::vec3(1);
@@ -131,21 +130,21 @@ TEST(Glass, BendsRaysAsSnellSays) {
 }
 
 TEST(Glass, AbsorbsByBouguersLaw) {
-    arhost_material glass = without_reflection(clear_glass(1)); // index 1: straight on
+    arhost_material glass = without_reflection(clear_glass(1)); // index 1: no refraction
     set3(glass.extinction, 0.01f, 0.02f, 0);
     ArenaBuilder builder = in_a_room_of_light(1);
     builder.add_object("slab", builder.add_triangles(box({-300, -300, -30}, {300, 300, 0})),
                        builder.add_material(glass));
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     for (int x = 0; x < 200; x += 7) {
-        const double way = 30 * glm::length(on_the_floor(x, 60) - glm::dvec3(0, 0, 200)) / 200;
-        ASSERT_TRUE(is_code_of(picture.at(x, 60)[0], std::exp(-0.01 * way), 1e-4));
-        ASSERT_TRUE(is_code_of(picture.at(x, 60)[1], std::exp(-0.02 * way), 1e-4));
+        const double distance = 30 * glm::length(on_the_floor(x, 60) - glm::dvec3(0, 0, 200)) / 200;
+        ASSERT_TRUE(is_code_of(picture.at(x, 60)[0], std::exp(-0.01 * distance), 1e-4));
+        ASSERT_TRUE(is_code_of(picture.at(x, 60)[1], std::exp(-0.02 * distance), 1e-4));
         ASSERT_EQ(picture.at(x, 60)[2], 255);
     }
 }
 
-TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
+TEST(Glass, ShowsItsCutoffColourForCutOffRays) {
     const auto with = [](auto change) {
         arhost_material glass = clear_glass();
         set3(glass.cutoff_colour, 0.34f, 0.55f, 0.85f);
@@ -160,14 +159,14 @@ TEST(Glass, ShowsItsCutoffColourWhereNoRayIsFollowed) {
         cutoff);
     EXPECT_EQ(with([](arhost_material &, ArenaBuilder &builder) { builder.settings.max_depth = 0; }), cutoff);
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 1; }), cutoff);
-    // Straight on, 4 % are reflected on entering, and 4 % of the rest on leaving: only these stand in for rays.
+    // At normal incidence, 4 % is reflected on entering and 4 % of the rest on leaving: only these rays are cut off.
     const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
     EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
-    // These rays bring 4 % at most, the others 92 % at least.
+    // Those rays have at most 4 % throughput, the others at least 92 %.
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 0.05f; }), thin);
 }
 
-TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
+TEST(Glass, ReflectanceFollowsTheMaterialsExponentWithinItsLimits) {
     for (const double exponent : {0.7, 1.5, 3.0}) {
         arhost_material glass = clear_glass();
         set3(glass.refraction, 0, 0, 0);
@@ -188,11 +187,11 @@ TEST(Glass, ReflectsByItsOwnExponentBetweenItsLimits) {
     }
 }
 
-TEST(Glass, CountsReflectedAndRefractedRaysDepthsApart) {
-    // Straight through the ball: 4 % are reflected on entering, and again at each try to leave.
+TEST(Glass, LimitsReflectionAndRefractionDepthSeparately) {
+    // Straight through the ball: 4 % is reflected on entering and at each exit surface.
     constexpr double r = 0.04, t = 0.96, all = 60;
     for (const auto &[reflection_depth, refraction_depth, arriving] : {std::array{all, 0.0, r},
-                                                                       {all, 1, r}, // none leaves
+                                                                       {all, 1, r}, // no ray exits
                                                                        {all, 2, r + t * t},
                                                                        {all, 3, r + t * t + t * r * t},
                                                                        {0, all, t * t},
@@ -210,7 +209,7 @@ TEST(Glass, CountsReflectedAndRefractedRaysDepthsApart) {
     }
 }
 
-TEST(Glass, TheChosenPathsMeanIsTheTree) {
+TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
     const auto scene = [] {
         ArenaBuilder builder = in_a_room_of_light(0.9f);
         builder.settings.ambient = glm::vec3(0.5f);
@@ -223,10 +222,10 @@ TEST(Glass, TheChosenPathsMeanIsTheTree) {
         add_ball(builder, glass);
         return builder;
     };
-    // One sample a pixel, in linear light: several are averaged encoded, where noise darkens.
-    const auto mean = [&](const char *way) {
+    // One sample per pixel, in linear light: several would be averaged sRGB-encoded, which darkens noise.
+    const auto mean = [&](const char *mode) {
         double sum = 0;
-        for (const Pixel &pixel : Tracer(scene(), {{"glass", way}}).render(from_the_side()).pixels())
+        for (const Pixel &pixel : Tracer(scene(), {{"glass", mode}}).render(from_the_side()).pixels())
             for (int i = 0; i < 3; ++i)
                 sum += shading::srgb_decode(pixel[i] / 255.0);
         return sum / (3 * 200 * 150);
@@ -234,7 +233,7 @@ TEST(Glass, TheChosenPathsMeanIsTheTree) {
     EXPECT_NEAR(mean("path") / mean("tree"), 1, 0.03) << "3000 pixels of noise";
 }
 
-TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
+TEST(Glass, ShadowAlphaOnACatcherIs77AndOfOpaqueObjects153) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_CATCHER);
@@ -249,7 +248,7 @@ TEST(Glass, ItsShadowOnACatcherIs77AndAnOpaqueOnes153) {
     EXPECT_GT(counts.at(153), 100);
 }
 
-TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
+TEST(Glass, ShadowAlphaIs77ForAnySampleCount) {
     const auto under_glass = [] {
         ArenaBuilder builder;
         builder.add_object("floor", builder.add_triangles(square(400)),
@@ -270,7 +269,7 @@ TEST(Glass, ItsShadowIs77WithAnyNumberOfSamples) {
     }
 }
 
-TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
+TEST(Glass, ShadowAlphaIs77ForAnyNumberOfLamps) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_CATCHER);
@@ -282,7 +281,7 @@ TEST(Glass, ItsShadowIs77UnderAnyNumberOfLamps) {
     EXPECT_EQ(counts, (std::map<int, int>{{77, 200 * 150}}));
 }
 
-TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
+TEST(Glass, ShadowIsColouredIfTheSceneEnablesIt) {
     const auto shadow = [](bool coloured) {
         ArenaBuilder builder;
         builder.settings.coloured_shadows = coloured;
@@ -298,12 +297,12 @@ TEST(Glass, ItsShadowIsColouredWhereTheSceneAsksForThat) {
     EXPECT_EQ(shadow(false), (Pixel{0, 0, 0, 77}));
     const Pixel green = shadow(true);
     EXPECT_GT(green[1], green[0] + 50);
-    EXPECT_EQ(green[0], 0) << "its strongest channel decides the alpha";
-    // Two surfaces let 0.16 of the red through, so that 0.84 · 153 is left of the opaque alpha.
+    EXPECT_EQ(green[0], 0) << "the strongest channel determines the alpha";
+    // Two surfaces transmit 0.16 of red, so the alpha is 0.84 of the opaque 153.
     EXPECT_NEAR(green[3], 0.84 * 153, 2);
 }
 
-TEST(Glass, ItsShadowTintsTheLightOnObjects) {
+TEST(Glass, ShadowTintsTheLightOnObjects) {
     ArenaBuilder builder = in_a_room_of_light(0);
     arhost_material glass = clear_glass();
     set3(glass.shadow_attenuation, 0.5f, 0.8f, 0.2f);
@@ -316,7 +315,7 @@ TEST(Glass, ItsShadowTintsTheLightOnObjects) {
         EXPECT_TRUE(is_code_of(pixel[i], glass.shadow_attenuation[i] * glass.shadow_attenuation[i], 1e-4));
 }
 
-TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
+TEST(Rough, WhiteMetalLosesOnlyMaskedLight) {
     for (const float roughness : {0.0f, 0.3f, 0.6f, 1.0f}) {
         arhost_material metal = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
         set3(metal.diffuse, 1, 1, 1);
@@ -324,10 +323,10 @@ TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
         ArenaBuilder builder = in_a_room_of_light(0.5f);
         add_ball(builder, metal);
         const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
-        double mean = 0; // of pixels round the middle
+        double mean = 0; // of the central pixels
         for (std::uint32_t i = 0; i < 25; ++i)
             mean += picture.at(98 + i % 5, 72 + i / 5)[0] / 25.0;
-        // Seen straight on, a facet's normal has tan² θ = α² v/(1 − v) for even v, and the ray leaves at 2θ.
+        // At normal incidence, sampled facet normals have tan² θ = α² v/(1 − v) for uniform v; the ray leaves at 2θ.
         double sum = 0;
         constexpr int n = 10000;
         for (int i = 0; i < n; ++i) {
@@ -341,7 +340,7 @@ TEST(Rough, WhiteMetalLosesOnlyWhatMicrofacetsHoldBack) {
     }
 }
 
-TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
+TEST(Rough, PlasticPlaneMatchesTheGltfFormulas) {
     arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
     plastic.metallic = 0.25f;
@@ -361,7 +360,7 @@ TEST(Rough, APlasticPlaneIsAsBrightAsGltfsFormulasSay) {
             for (int i = 0; i < 3; ++i) {
                 const double base = plastic.diffuse[i], f0 = 0.04 * 0.75 + base * 0.25;
                 const double fresnel = f0 + (1 - f0) * std::pow(1 - glm::dot(v, h), 5);
-                // A lamp's intensity has Lambert's π in it.
+                // Lamp intensities include Lambert's factor π.
                 const double value = 0.9 * l.z * ((1 - fresnel) * base * 0.75 + fresnel * visibility * a2 / (d * d)) +
                                      plastic.emission[i];
                 ASSERT_TRUE(is_code_of(picture.at(x, y)[i], value, 1e-3)) << x << " " << y;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What moves looks like what was built in that place.
+// Moved and deformed objects look like static ones at the same place.
+#include "bvh_quality.hpp"
 #include "embree_scene.hpp"
 #include "scene/motion.hpp"
 #include "tracer.hpp"
-#include "tree_quality.hpp"
 
 #include <glm/trigonometric.hpp>
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ Picture at_time(ArenaBuilder builder, double time_s, const arhost_camera &view =
     EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(view.intrinsics);
-    for (const double t : {0.0, 0.9, time_s}) { // not straight from the start
+    for (const double t : {0.0, 0.9, time_s}) { // also via other times
         const arhost_motion motion = evaluator.at(t);
         picture = Picture(view.intrinsics);
         EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_STATUS_OK);
@@ -63,10 +63,10 @@ void expect_alike(const Picture &a, const Picture &b) {
     for (std::size_t i = 0; i < these.size(); ++i)
         for (std::size_t c = 0; c < 4; ++c)
             different += std::abs(these[i][c] - those[i][c]) > 1;
-    EXPECT_LE(different, 20) << "of 120000 numbers: edges, by the last bit of a float";
+    EXPECT_LE(different, 20) << "of 120000 values: rounding at edges";
 }
 
-// A square with normals of its own that faces the only light, which shines straight down, and the camera.
+// A square with vertex normals that faces the camera and the only light, which shines straight down.
 constexpr float albedo = 0.8f;
 arhost_material white() {
     return diffuse(albedo, albedo, albedo);
@@ -95,8 +95,8 @@ rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
 
 } // namespace
 
-// Catchers that stand still have a tree of their own, others lie in the common one: the picture is the same.
-TEST(Moving, CatchersCatchWhereverTheyLie) {
+// Static catchers have a separate BVH, others are in the common one: the picture is the same.
+TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
     const auto scene = [](const glm::mat4x3 &place, bool moves, float raised) {
         ArenaBuilder builder = with_floor_and_light();
         builder.settings.duration_s = 1;
@@ -107,7 +107,7 @@ TEST(Moving, CatchersCatchWhereverTheyLie) {
             p += glm::vec3(30, 10, raised);
         builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_ROLE_CATCHER,
                            place, moves ? Motion{.moves = true, .node = node} : Motion{});
-        // So many triangles that the catchers' tree is worth it.
+        // Enough triangles to enable the catchers' BVH.
         builder.add_object("sheet", builder.add_triangles(sheet(10)), builder.add_material(shiny(0.5f, 0.4f, 30)));
         return builder;
     };
@@ -121,7 +121,7 @@ TEST(Moving, CatchersCatchWhereverTheyLie) {
     EXPECT_NE(elsewhere.pixels(), plain.pixels());
 }
 
-TEST(Moving, AnObjectIsWhereItsNodeIs) {
+TEST(Moving, ObjectFollowsItsNode) {
     ArenaBuilder moving = with_floor_and_light();
     moving.settings.duration_s = 1;
     const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
@@ -136,7 +136,7 @@ TEST(Moving, AnObjectIsWhereItsNodeIs) {
     expect_alike(at_time(std::move(moving), 0.75), Tracer(std::move(still)).render(from_the_side()));
 }
 
-TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
+TEST(Moving, MeshFollowsItsMorphTargets) {
     ArenaBuilder deforming = with_floor_and_light();
     deforming.settings.duration_s = 1;
     const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
@@ -152,8 +152,8 @@ TEST(Moving, AMeshHasTheShapeOfItsMorphTargets) {
     expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
-// Lambert: cos 60° of what it was. Were the normals left behind, it would be as bright as before.
-TEST(Moving, ASkinTurnsItsNormals) {
+// Lambert: brightness drops to cos 60°, and would not change without rotated normals.
+TEST(Moving, SkinRotatesNormals) {
     const auto turning = [] {
         ArenaBuilder builder = under_the_sun();
         const std::uint32_t joint = builder.add_node({.animated = true, .morph_weights = {}});
@@ -174,11 +174,11 @@ TEST(Moving, ASkinTurnsItsNormals) {
     EXPECT_TRUE(is_code_of(before.at(100, 75)[1], albedo));
     EXPECT_TRUE(is_code_of(after.at(100, 75)[1], albedo * 0.5));
     EXPECT_EQ(before.alpha(100, 75 - 30), 255);
-    EXPECT_EQ(after.alpha(100, 75 - 30), 0) << "it reaches 40 mm · cos 60° that way now";
+    EXPECT_EQ(after.alpha(100, 75 - 30), 0) << "its half side is foreshortened to 40 mm · cos 60°";
 }
 
-// The square stays where it is. In the middle of the morph its normals lean by 60°: 0.5 · 2 tan 60° to the side.
-TEST(Moving, AMorphTargetLeansItsNormals) {
+// Positions do not change. Halfway through the morph, normals are tilted by 60°: offset 0.5 · 2 tan 60°.
+TEST(Moving, MorphTargetTiltsNormals) {
     const auto leaning = [] {
         ArenaBuilder builder = under_the_sun();
         const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
@@ -195,19 +195,19 @@ TEST(Moving, AMorphTargetLeansItsNormals) {
     EXPECT_TRUE(is_code_of(at_time(leaning(), 1, from_above()).at(100, 75)[1], albedo * 0.5));
 }
 
-TEST(TreeQuality, StaysWhileAMeshIsMovedScaledAndBent) {
+TEST(BvhQuality, IsUnaffectedByTranslationScalingAndSlightDeformation) {
     scene::TriangleMesh mesh = sheet(4);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(mesh));
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-9);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(mesh));
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 1e-9);
     for (glm::vec3 &p : mesh.positions)
         p = p * 3.0f + glm::vec3(100, 0, 0);
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 1e-3);
-    EXPECT_LT(quality.decay(view_of(sheet(5))), 1.3);
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 1e-3);
+    EXPECT_LT(quality.degradation(view_of(sheet(5))), 1.3);
 }
 
-// Without a skin, glTF's meshes move and deform at once.
-TEST(Moving, AMeshMayMoveAndDeform) {
+// glTF meshes without a skin can move and deform at once.
+TEST(Moving, MeshCanMoveAndDeform) {
     ArenaBuilder both = with_floor_and_light();
     both.settings.duration_s = 1;
     const std::uint32_t node = both.add_node({.animated = true, .morph_weights = {0}});
@@ -217,7 +217,7 @@ TEST(Moving, AMeshMayMoveAndDeform) {
     const scene::TriangleMesh waves = sheet(16);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
-        mesh.positions[i].x -= 500; // far out of view, were it not moved
+        mesh.positions[i].x -= 500; // out of view unless moved
         there.positions[i].x += 20;
     }
     const arhost_material blue = diffuse(0.2f, 0.4f, 0.8f);
@@ -228,8 +228,8 @@ TEST(Moving, AMeshMayMoveAndDeform) {
     expect_alike(at_time(std::move(both), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
-// Tiles of the image where no object is are not traced.
-TEST(Moving, AMeshIsSeenWhereItsShapeGoes) {
+// Tiles without objects are skipped, so bounds must follow the deformation.
+TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     constexpr float left = -60, right = 60;
     ArenaBuilder deforming = under_the_sun(), still = under_the_sun();
     const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
@@ -246,7 +246,7 @@ TEST(Moving, AMeshIsSeenWhereItsShapeGoes) {
     expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
 }
 
-// Strips of a sheet that are pushed along themselves, each further than the one before.
+// A sheet whose strips are shifted lengthwise, each further than the previous one.
 scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     scene::TriangleMesh mesh = sheet(4, n);
     for (glm::vec3 &p : mesh.positions)
@@ -254,18 +254,18 @@ scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     return mesh;
 }
 
-TEST(TreeQuality, DecaysWhereNeighboursPart) {
+TEST(BvhQuality, DegradesWhenNeighboursSeparate) {
     const scene::TriangleMesh whole = sheet(4), torn = sheared(40);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(whole));
-    EXPECT_LT(quality.decay(view_of(sheared(0.5f))), 1.3);
-    EXPECT_GT(quality.decay(view_of(torn)), 1.3);
-    quality.built(view_of(torn));
-    EXPECT_NEAR(quality.decay(view_of(torn)), 1, 1e-9);
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(whole));
+    EXPECT_LT(quality.degradation(view_of(sheared(0.5f))), 1.3);
+    EXPECT_GT(quality.degradation(view_of(torn)), 1.3);
+    quality.record_build(view_of(torn));
+    EXPECT_NEAR(quality.degradation(view_of(torn)), 1, 1e-9);
 }
 
-// A deforming sheet of 80,000 triangles, of which the measure takes a sample.
-TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
+// A deforming sheet of 80,000 triangles, of which BvhQuality uses a sample.
+TEST(BvhQuality, TriggersRebuilds) {
     scene::TriangleMesh mesh = sheet(4, 200);
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
     ArenaBuilder builder;
@@ -289,7 +289,7 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
     std::vector<std::uint64_t> rebuilds;
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         std::vector<glm::vec3> positions = sheared(amount, 200).positions;
-        positions.resize(vertices + 2); // spare bytes behind the last
+        positions.resize(vertices + 2); // Embree reads past the last vertex
         const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
         rebuilds.push_back(scene.rebuilds());
@@ -297,16 +297,16 @@ TEST(TreeQuality, DecidesWhetherAMeshIsBuiltAnew) {
     EXPECT_EQ(rebuilds, (std::vector<std::uint64_t>{0, 1, 1, 2}));
 }
 
-// No tree is good then, and a new one is no better.
-TEST(TreeQuality, StaysWhereTrianglesGrowAtRandom) {
+// A new BVH would be no better.
+TEST(BvhQuality, IsUnaffectedByRandomDisplacement) {
     scene::TriangleMesh mesh = sheet(4);
-    rt_embree::TreeQuality quality;
-    quality.built(view_of(mesh));
+    rt_embree::BvhQuality quality;
+    quality.record_build(view_of(mesh));
     std::minstd_rand random(1);
     std::uniform_real_distribution<float> unit(-1, 1);
     for (glm::vec3 &p : mesh.positions)
         p += 20.0f * glm::vec3(unit(random), unit(random), unit(random));
-    EXPECT_NEAR(quality.decay(view_of(mesh)), 1, 0.2);
+    EXPECT_NEAR(quality.degradation(view_of(mesh)), 1, 0.2);
 }
 
 } // namespace arhost::test

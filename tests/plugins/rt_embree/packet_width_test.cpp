@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Processors differ in how many rays Embree traces together; what comes back does not.
+// Results do not depend on Embree's packet width, which differs between processors.
 #include "embree.hpp"
 #include "embree_scene.hpp"
 
@@ -12,7 +12,7 @@ using namespace rt_embree;
 
 namespace {
 
-// Every third ray is not valid, and full of NaN, which Embree must not look at.
+// Every third ray is invalid and filled with NaN, which must be ignored.
 bool is_valid(int lane) {
     return lane % 3 != 1;
 }
@@ -57,9 +57,9 @@ protected:
 
 } // namespace
 
-TEST_P(PacketWidth, MakesNoDifferenceToHits) {
+TEST_P(PacketWidth, DoesNotChangeHits) {
     if (!is_native())
-        GTEST_SKIP() << "this processor has no packets of " << GetParam();
+        GTEST_SKIP() << "this processor does not support packets of " << GetParam();
     Query query = make_query(Coherence::coherent);
     intersect16(valid_, scene_.get(), GetParam(), query, rays_);
     for (int i = 0; i < 16; ++i) {
@@ -69,9 +69,9 @@ TEST_P(PacketWidth, MakesNoDifferenceToHits) {
     }
 }
 
-TEST_P(PacketWidth, MakesNoDifferenceToShadows) {
+TEST_P(PacketWidth, DoesNotChangeOcclusion) {
     if (!is_native())
-        GTEST_SKIP() << "this processor has no packets of " << GetParam();
+        GTEST_SKIP() << "this processor does not support packets of " << GetParam();
     Query query = make_query(Coherence::incoherent);
     occluded16(valid_, scene_.get(), GetParam(), query, rays_.ray);
     for (int i = 0; i < 16; ++i)

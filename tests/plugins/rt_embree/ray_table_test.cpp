@@ -34,7 +34,7 @@ const std::vector<arhost_intrinsics> lenses = {intrinsics(ARHOST_DISTORTION_NONE
                                                intrinsics(ARHOST_DISTORTION_BROWN, {-0.28, 0.09, 0.0011, -0.0007}),
                                                intrinsics(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})};
 
-TEST(RayTable, EveryPixelsRayArrivesThereByOpenCvsFormulas) {
+TEST(RayTable, RaysProjectToTheirPixelsByOpenCv) {
     ThreadPool threads(2);
     for (const arhost_intrinsics &in : lenses) {
         const RayTable table(in, false, threads);
@@ -48,13 +48,13 @@ TEST(RayTable, EveryPixelsRayArrivesThereByOpenCvsFormulas) {
     }
 }
 
-TEST(RayTable, SamplesOffThePixelsCentreArriveWhereTheyShould) {
+TEST(RayTable, OffCentreSamplesProjectToTheirPositions) {
     ThreadPool threads(2);
     for (const arhost_intrinsics &in : lenses) {
         const RayTable table(in, true, threads);
         const Rays rays = table.rays();
         const int step = 16 * rays.dimensions;
-        // Lane 0 of each block is the pixel at the block's left top; walk the first tile's blocks.
+        // The first tile's blocks; lane 0 of a block is its top left pixel.
         for (int number = 0; number < 64; ++number) {
             const float *block = rays.blocks + number * rays.block_size();
             const double x = number % 8 * 4, y = number / 8 * 4;
@@ -70,7 +70,7 @@ TEST(RayTable, SamplesOffThePixelsCentreArriveWhereTheyShould) {
     }
 }
 
-TEST(RayTable, TilesCoverTheImageOnceAndTheirWindowsHoldTheirRays) {
+TEST(RayTable, TilesPartitionTheImageAndWindowsContainTheirRays) {
     ThreadPool threads(1);
     for (const arhost_intrinsics &in : lenses) {
         const RayTable table(in, false, threads);
@@ -82,14 +82,14 @@ TEST(RayTable, TilesCoverTheImageOnceAndTheirWindowsHoldTheirRays) {
                     ++covered[y * 643 + x];
                     const auto d = table.direction(x, y);
                     const double u = d.x / d.z, v = d.y / d.z;
-                    ASSERT_TRUE(table.window(i).meets({u - 1e-6, v - 1e-6, u + 1e-6, v + 1e-6, false}));
+                    ASSERT_TRUE(table.window(i).intersects({u - 1e-6, v - 1e-6, u + 1e-6, v + 1e-6, false}));
                 }
         }
         EXPECT_TRUE(std::all_of(covered.begin(), covered.end(), [](int count) { return count == 1; }));
     }
 }
 
-TEST(RayTable, HasNoRayWhereTheLensSeesNothing) {
+TEST(RayTable, HasNoRayForPixelsOutsideTheLens) {
     ThreadPool threads(1);
     const RayTable table(intrinsics(ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0}), false, threads);
     EXPECT_TRUE(std::isnan(table.direction(0, 0).x));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Textures, environments, holes, and a scene with whatever there is.
+// Textures, environments, alpha cutoff, and a scene that combines all features.
 #pragma once
 
 #include "tracer.hpp"
@@ -24,7 +24,7 @@ inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, cons
     return texture;
 }
 
-// An environment of 8×4 texels; `colour` gives one by its column.
+// An environment of 8×4 texels; `colour(column)` gives their colour.
 template <class Colour> void add_environment(ArenaBuilder &builder, Colour colour) {
     constexpr std::uint32_t width = 8, height = 4;
     scene::Texture texture;
@@ -57,7 +57,7 @@ template <class Colour> void add_environment(ArenaBuilder &builder, Colour colou
     builder.environment = std::move(environment);
 }
 
-// A square of 60 mm half a side whose texture is solid on its left half and has a hole on its right one.
+// A material that is opaque on the left half of its texture and transparent on the right one.
 inline arhost_material half_a_hole(ArenaBuilder &builder, float cutoff) {
     scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
     texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
@@ -72,7 +72,7 @@ inline scene::TriangleMesh textured_square(float half_side, float z) {
     return mesh;
 }
 
-// Whatever has random numbers, queues, textures or transcendental functions in it.
+// Uses random numbers, ray queues, textures and transcendental functions.
 inline ArenaBuilder rich_scene() {
     ArenaBuilder builder;
     builder.settings.max_depth = 6;

@@ -29,7 +29,7 @@ ArenaBuilder one_sphere(glm::vec4 sphere, const arhost_material &material = flat
     return builder;
 }
 
-// At the origin, looking along world z, with world −y up: the world's axes are the camera's OpenCV axes.
+// At the origin, looking along +z with −y up: world axes equal the camera's OpenCV axes.
 arhost_camera opencv_axes(const arhost_intrinsics &in) {
     return camera({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, in);
 }
@@ -54,7 +54,7 @@ Silhouette measured(const Picture &picture) {
     return s;
 }
 
-// The cone that touches the sphere, projected by OpenCV, as a polygon (its area and centroid: Bourke 1988).
+// The sphere's tangent cone, projected by OpenCV, as a polygon (area and centroid: Bourke 1988).
 Silhouette expected(const arhost_intrinsics &in, glm::dvec3 centre, double radius) {
     const glm::dvec3 axis = glm::normalize(centre);
     const glm::dvec3 a = glm::normalize(glm::cross(axis, glm::dvec3(0, 1, 0))), b = glm::cross(axis, a);
@@ -90,7 +90,7 @@ arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> k)
     return in;
 }
 
-TEST(Silhouette, OfASphereIsWhereTheLensPutsIt) {
+TEST(Silhouette, OfASphereMatchesTheLensModel) {
     const arhost_intrinsics lenses[] = {with_lens(ARHOST_DISTORTION_NONE, {}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.01}),
@@ -107,7 +107,7 @@ TEST(Silhouette, OfASphereIsWhereTheLensPutsIt) {
         }
 }
 
-TEST(Silhouette, OfASphereOnTheAxisIsCentredOnThePrincipalPixel) {
+TEST(Silhouette, OfASphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
     arhost_intrinsics in = pinhole(101, 81);
     in.cx = 30; // pixel centres are integers, so the picture is symmetric about this column and row
     in.cy = 50;
@@ -120,7 +120,7 @@ TEST(Silhouette, OfASphereOnTheAxisIsCentredOnThePrincipalPixel) {
     EXPECT_EQ(picture.alpha(30, 50), 255);
 }
 
-TEST(Silhouette, ASphereBehindAFisheyeCameraIsSeen) {
+TEST(Silhouette, OfASphereBehindAFisheyeCameraIsVisible) {
     arhost_intrinsics in = pinhole(300, 300, 60);
     in.distortion = ARHOST_DISTORTION_FISHEYE;
     in.coefficient_count = 4;
@@ -142,7 +142,7 @@ ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_ROLE_CATCHER) {
     return builder;
 }
 
-TEST(Alpha, IsZeroInTheLight153InTheShadowAnd255OnObjects) {
+TEST(Alpha, IsZeroInLight153InShadowAnd255OnObjects) {
     const auto counts = Tracer(sphere_over_catcher()).render(from_the_side()).alphas();
     EXPECT_EQ(counts.size(), 3u);
     EXPECT_GT(counts.at(0), 10000);
@@ -150,10 +150,10 @@ TEST(Alpha, IsZeroInTheLight153InTheShadowAnd255OnObjects) {
     EXPECT_GT(counts.at(255), 300);
 }
 
-TEST(Alpha, TheShadowLiesWhereTheLightsRaysAreStopped) {
+TEST(Alpha, ShadowIsWhereTheLightIsBlocked) {
     const arhost_camera view = from_the_side();
     const Picture picture = Tracer(sphere_over_catcher()).render(view);
-    // The ball's centre, seen from the light, falls on the floor at t = 200 / 175 of the way.
+    // The ray from the light through the ball's centre hits the floor at t = 200 / 175.
     const glm::dvec3 from(60, -20, 200), hit = from + (glm::dvec3(0, 0, 25) - from) * (200.0 / 175);
     const glm::dvec3 w = glm::normalize(glm::dvec3(0, -150, 110)), u(1, 0, 0), v = glm::cross(w, u);
     const glm::dvec3 d = hit - glm::dvec3(0, -150, 110);
@@ -162,19 +162,19 @@ TEST(Alpha, TheShadowLiesWhereTheLightsRaysAreStopped) {
     EXPECT_EQ(shadow, (Pixel{0, 0, 0, 153})) << "black, at " << x << " " << y;
 }
 
-TEST(Alpha, ACatcherFacingAwayIsNotThere) {
+TEST(Alpha, CatcherFacingAwayIsInvisible) {
     ArenaBuilder builder = sphere_over_catcher();
     const Picture from_below = Tracer(std::move(builder)).render(camera({0, -150, -110}, {0, 0, 0}, {0, 0, 1}));
     const auto counts = from_below.alphas();
     EXPECT_EQ(counts.count(153), 0u);
-    EXPECT_GT(counts.at(255), 300) << "the ball is seen through the floor";
+    EXPECT_GT(counts.at(255), 300) << "the ball is visible through the floor";
 }
 
-// A room of catchers that face inwards, with a mirror ball in it.
-TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
+// A mirror ball in a room of inward-facing catchers.
+TEST(Alpha, InwardFacingCatchersAreInvisibleFromOutsideButReflected) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
-    builder.settings.background = glm::vec3(0, 0, 1); // seen nowhere: the room is closed
+    builder.settings.background = glm::vec3(0, 0, 1); // visible nowhere: the room is closed
     scene::TriangleMesh room = cube(100);
     for (auto &triangle : room.triangles)
         std::swap(triangle[1], triangle[2]);
@@ -185,7 +185,7 @@ TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
     for (const double distance : {350.0, 90.0}) { // outside, inside
         const Picture picture = tracer.render(camera({0, -distance, 0}, {0, 0, 0}, {0, 0, 1}));
         EXPECT_EQ(picture.alpha(2, 2), 0) << distance;
-        EXPECT_EQ(picture.alphas().size(), 2u) << "nothing, and the ball";
+        EXPECT_EQ(picture.alphas().size(), 2u) << "transparent, and the ball";
         EXPECT_EQ(picture.alpha(99, 74), 255);
         for (const int x : {90, 99, 108}) {
             EXPECT_TRUE(is_code_of(picture.at(static_cast<std::uint32_t>(x), 74)[0], 0.5)) << distance;
@@ -195,7 +195,7 @@ TEST(Alpha, ARoomOfCatchersIsSeenThroughFromOutsideAndByMirrorsFromInside) {
     }
 }
 
-TEST(Alpha, OfShadowsIsTheScenes) {
+TEST(Alpha, OfShadowsIsSetByTheScene) {
     ArenaBuilder builder;
     builder.settings.shadow_alpha_opaque = 0.8f;
     builder.settings.shadow_alpha_translucent = 0.1f;
@@ -212,18 +212,17 @@ TEST(Alpha, OfShadowsIsTheScenes) {
     EXPECT_GT(counts.at(204), 100);
 }
 
-TEST(Alpha, OnlyTheFirstCatcherAlongARayTakesTheShadow) {
-    // A table top between the ball and the floor: the shadow falls on the top, and through it on the floor,
-    // where the top hides it.
+TEST(Alpha, OnlyTheFirstCatcherAlongARayReceivesTheShadow) {
+    // The shadow falls on the upper floor, and through it on the lower one, which the upper one hides.
     ArenaBuilder builder = sphere_over_catcher();
-    const double with_top_only = Tracer(std::move(builder)).render(from_the_side()).alphas().at(153);
+    const double with_upper_only = Tracer(std::move(builder)).render(from_the_side()).alphas().at(153);
     builder = sphere_over_catcher();
     builder.add_object("lower floor", builder.add_triangles(square(300, -60)), builder.add_material(diffuse(1, 1, 1)),
                        ARHOST_ROLE_CATCHER);
-    EXPECT_EQ(Tracer(std::move(builder)).render(from_the_side()).alphas().at(153), with_top_only);
+    EXPECT_EQ(Tracer(std::move(builder)).render(from_the_side()).alphas().at(153), with_upper_only);
 }
 
-TEST(Alpha, AVirtualObjectBehindACatcherIsSeen) {
+TEST(Alpha, VirtualObjectBehindACatcherIsVisible) {
     ArenaBuilder builder = sphere_over_catcher();
     builder.add_object("sunken", builder.add_spheres({{40, 0, -20, 10}}), builder.add_material(flat(1, 0, 0)));
     const Picture with = Tracer(std::move(builder)).render(from_the_side());
@@ -231,12 +230,12 @@ TEST(Alpha, AVirtualObjectBehindACatcherIsSeen) {
     EXPECT_GT(with.alphas().at(255), without.alphas().at(255) + 100);
 }
 
-TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
+TEST(Alpha, SeveralLightsShareTheShadowByIrradiance) {
     ArenaBuilder builder = sphere_over_catcher();
     builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong, no falloff
     const Picture picture = Tracer(std::move(builder)).render(from_the_side());
     const auto counts = picture.alphas();
-    // Where only one is hidden, 2/3 or 1/3 of 153, a little more or less as the cosines differ.
+    // With only one light blocked, about 2/3 or 1/3 of 153, depending on the cosines.
     int strong = 0, weak = 0, both = 0;
     for (const auto &[alpha, count] : counts) {
         strong += alpha > 96 && alpha < 110 ? count : 0;
@@ -251,7 +250,7 @@ TEST(Alpha, SeveralLightsShareTheShadowByTheirIrradiance) {
     EXPECT_GT(both, 20);
 }
 
-TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
+TEST(Alpha, LightBehindACatcherCastsNoShadowOnIt) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
                        ARHOST_ROLE_CATCHER);
@@ -261,10 +260,10 @@ TEST(Alpha, ALightBehindACatcherCastsNoShadowOnIt) {
     EXPECT_EQ(counts.count(153), 0u);
 }
 
-TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
+TEST(Alpha, OccluderHidesObjectsAndShadowsBehindIt) {
     ArenaBuilder builder = sphere_over_catcher();
     const arhost_camera view = from_the_side();
-    // A screen right in front of the camera, over the picture's left half.
+    // A screen in front of the camera that covers the left half of the picture.
     builder.add_object(
         "screen",
         builder.add_triangles(
@@ -285,7 +284,7 @@ TEST(Alpha, AnOccluderHidesObjectsAndShadowsBehindIt) {
     EXPECT_GT(hidden, 300);
 }
 
-TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
+TEST(Alpha, OccluderBehindAnObjectHidesNothing) {
     ArenaBuilder builder = one_sphere({0, 0, 200, 40});
     builder.add_object("wall", builder.add_triangles(square(500, 300)), builder.add_material(flat(1, 1, 1)),
                        ARHOST_ROLE_OCCLUDER);
@@ -293,7 +292,7 @@ TEST(Alpha, AnOccluderBehindAnObjectHidesNothing) {
               Tracer(one_sphere({0, 0, 200, 40})).render(opencv_axes(pinhole())).pixels());
 }
 
-TEST(Alpha, AnEmptySceneIsTransparentEverywhere) {
+TEST(Alpha, EmptySceneIsTransparent) {
     const Picture picture = Tracer(ArenaBuilder()).render(from_the_side());
     EXPECT_EQ(picture.alphas(), (std::map<int, int>{{0, 200 * 150}}));
     EXPECT_EQ(picture.info.has_region, 1);
@@ -302,7 +301,7 @@ TEST(Alpha, AnEmptySceneIsTransparentEverywhere) {
 
 // ---- Light -----------------------------------------------------------------------------------------
 
-TEST(Light, APlaneIsAsBrightAsLambertSays) {
+TEST(Light, PlaneFollowsLambert) {
     for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
         ArenaBuilder builder;
         builder.settings.ambient = {0.1f, 0.2f, 0.3f};
@@ -326,7 +325,7 @@ TEST(Light, APlaneIsAsBrightAsLambertSays) {
     }
 }
 
-TEST(Light, ASpecularPlaneAddsPhongsLobe) {
+TEST(Light, SpecularPlaneAddsPhongLobe) {
     ArenaBuilder builder;
     const arhost_material material = shiny(0.2f, 0.5f, 20);
     builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(material));
@@ -341,7 +340,7 @@ TEST(Light, ASpecularPlaneAddsPhongsLobe) {
         }
 }
 
-TEST(Light, CatchersAndOccludersDarkenObjectsBehindThem) {
+TEST(Light, CatchersAndOccludersShadowObjects) {
     for (const arhost_role role : {ARHOST_ROLE_CATCHER, ARHOST_ROLE_OCCLUDER}) {
         ArenaBuilder builder = one_sphere({0, 0, 20, 20}, diffuse(0.5f, 0.5f, 0.5f));
         builder.settings.ambient = glm::vec3(0.2f);
@@ -358,7 +357,7 @@ TEST(Light, CatchersAndOccludersDarkenObjectsBehindThem) {
 }
 
 TEST(Light, SurfacesDoNotShadowThemselves) {
-    // Far from the origin, where floats are coarse, and light that grazes.
+    // Far from the origin, where floats are coarse, and at grazing light.
     ArenaBuilder builder;
     builder.add_object("plane", builder.add_triangles(square(2000)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_VIRTUAL,
@@ -383,7 +382,7 @@ ArenaBuilder mirror_and_ball(std::uint32_t max_depth = 5) {
     return builder;
 }
 
-TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
+TEST(Mirror, ShowsWhatTheReflectedRayHits) {
     const arhost_camera view = camera({0, -200, 200}, {0, 0, 0}, {0, 0, 1});
     const Picture picture = Tracer(mirror_and_ball()).render(view);
     const glm::dvec3 eye(0, -200, 200), w = glm::normalize(eye), u(1, 0, 0), v = glm::cross(w, u);
@@ -397,7 +396,7 @@ TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
                 return glm::dot(to, along) > 0 ? glm::length(to - along * glm::dot(to, along)) : 1e9;
             };
             if (distance_of_ball(eye, d) < 62 || std::abs(hit.x) > 395 || std::abs(hit.y) > 395)
-                continue; // the ball itself, or beside the mirror
+                continue; // the ball itself, or outside the mirror
             const double distance = distance_of_ball(hit, reflected);
             const Pixel pixel = picture.at(x, y);
             if (distance < 59.5) {
@@ -412,14 +411,14 @@ TEST(Mirror, ShowsWhatTheReflectedRayMeets) {
     EXPECT_GT(backgrounds, 2000);
 }
 
-TEST(Mirror, TakesTheBackgroundOfTheWindowOnlyByReflection) {
+TEST(Mirror, ReflectsTheBackgroundWhichIsOtherwiseTransparent) {
     // Primary rays that miss are transparent, whatever the background.
     const Picture picture = Tracer(one_sphere({0, 0, 300, 30}, mirror(1))).render(opencv_axes(pinhole()));
     EXPECT_EQ(picture.at(0, 0), nothing_alpha);
     EXPECT_EQ(picture.at(99, 74), (Pixel{255, 255, 255, 255})) << "the default background is white";
 }
 
-TEST(Mirror, LosesNoLight) {
+TEST(Mirror, ConservesEnergy) {
     ArenaBuilder builder;
     builder.settings.background = glm::vec3(0.6f);
     builder.settings.max_depth = 100;
@@ -431,8 +430,8 @@ TEST(Mirror, LosesNoLight) {
         }
 }
 
-TEST(Mirror, FollowsAtMostMaxDepthBounces) {
-    // Between two parallel mirrors, each bounce leaves 0.5; the ray leaves after the third.
+TEST(Mirror, TracesAtMostMaxDepthBounces) {
+    // Two parallel mirrors of reflectivity 0.5; the ray escapes after five bounces.
     const auto brightness = [](std::uint32_t max_depth) {
         ArenaBuilder builder;
         builder.settings.max_depth = max_depth;
@@ -494,7 +493,7 @@ double over(const Pixel &pixel, int channel, double background) {
     return background * (1 - alpha) + pixel[channel] * alpha;
 }
 
-TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
+TEST(Samples, DoNotDependOnPreviousFrames) {
     Tracer tracer(one_sphere({10, 5, 200, 40}), {{"samples", "4"}});
     const arhost_camera view = opencv_axes(pinhole());
     ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
@@ -508,7 +507,7 @@ TEST(Samples, OfOneFrameKnowNothingOfTheFramesBefore) {
         EXPECT_TRUE(render() == first) << frame;
 }
 
-TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
+TEST(Samples, AccumulateWhileTheCameraIsStatic) {
     const auto scene = [] {
         ArenaBuilder builder = sphere_over_catcher();
         arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
@@ -539,10 +538,10 @@ TEST(Samples, AccumulateOverFramesWhileTheCameraStandsStill) {
     EXPECT_LT(distance(last), 0.1);
     EXPECT_GT(distance(first), 5 * distance(last));
     EXPECT_NE(render(other), last);
-    EXPECT_EQ(render(still), first) << "it begins anew";
+    EXPECT_EQ(render(still), first) << "accumulation restarts";
 }
 
-TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
+TEST(Samples, StopChangingTheImageAtTheAccumulationLimit) {
     ArenaBuilder builder = sphere_over_catcher();
     arhost_light bulb = arhost::scene::make_light(ARHOST_LIGHT_SPHERE);
     set3(bulb.position, -60, -20, 200);
@@ -567,7 +566,7 @@ TEST(Samples, KeepAStillPictureOnceItHasEnoughOfThem) {
     EXPECT_EQ(after(20), enough);
 }
 
-TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
+TEST(Samples, CompositeToTheMeanOfPerSampleComposites) {
     constexpr int count = 8;
     const arhost_intrinsics in = pinhole();
     const Picture all = Tracer(sphere_over_catcher(), {{"samples", std::to_string(count)}}).render(from_the_side(in));
@@ -585,12 +584,12 @@ TEST(Samples, CompositeAsTheMeanOfEachSamplesOwnComposite) {
                     double mean = 0;
                     for (const Picture &single : singles)
                         mean += over(single.at(x, y), channel, background) / count;
-                    // Half a code for the alpha, half for the colour, half for the singles' own.
+                    // Rounding by half a code each of the alpha, the colour and the single images.
                     ASSERT_NEAR(over(all.at(x, y), channel, background), mean, 1.5) << x << " " << y;
                 }
 }
 
-// ---- Sameness --------------------------------------------------------------------------------------
+// ---- Equivalence -----------------------------------------------------------------------------------
 
 ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     ArenaBuilder builder;
@@ -616,7 +615,7 @@ ArenaBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     return builder;
 }
 
-TEST(Sameness, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST(Equivalence, IsIdenticalForAnyThreadCount) {
     for (const std::string samples : {"1", "4"}) {
         const auto trace = [&](const std::string &threads) {
             return Tracer(busy_scene(), {{"threads", threads}, {"samples", samples}})
@@ -629,7 +628,7 @@ TEST(Sameness, AnyNumberOfThreadsGivesTheSameBytes) {
     }
 }
 
-TEST(Sameness, AgainAndAgainTheSameBytes) {
+TEST(Equivalence, IsIdenticalForRepeatedFrames) {
     Tracer tracer(busy_scene(), {{"threads", "2"}});
     const auto first = tracer.render(from_the_side()).pixels();
     Picture again(pinhole());
@@ -639,7 +638,7 @@ TEST(Sameness, AgainAndAgainTheSameBytes) {
     }
 }
 
-TEST(Sameness, EveryInstructionSetGivesTheSameBytes) {
+TEST(Equivalence, IsIdenticalForEveryInstructionSet) {
     const auto base =
         Tracer(busy_scene(), {{"instruction_set", "base"}, {"samples", "3"}}).render(from_the_side()).pixels();
 #if defined(__x86_64__)
@@ -648,7 +647,7 @@ TEST(Sameness, EveryInstructionSetGivesTheSameBytes) {
             Tracer(busy_scene(), {{"instruction_set", "avx2"}, {"samples", "3"}}).render(from_the_side()).pixels(),
             base);
     }
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) // those builds have none
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) // those builds have no AVX-512
     if (__builtin_cpu_supports("avx512dq")) {
         EXPECT_EQ(
             Tracer(busy_scene(), {{"instruction_set", "avx512"}, {"samples", "3"}}).render(from_the_side()).pixels(),
@@ -659,8 +658,8 @@ TEST(Sameness, EveryInstructionSetGivesTheSameBytes) {
     EXPECT_EQ(base.size(), 200u * 150u);
 }
 
-// How many pixels differ by more than single precision explains; silhouettes may step by a pixel.
-double share_that_differs(const Picture &a, const Picture &b) {
+// Fraction of pixels that differ by more than rounding; silhouettes may shift by a pixel.
+double fraction_of_differing_pixels(const Picture &a, const Picture &b) {
     const auto p = a.pixels(), q = b.pixels();
     int differ = 0;
     for (std::size_t i = 0; i < p.size(); ++i)
@@ -672,7 +671,7 @@ double share_that_differs(const Picture &a, const Picture &b) {
     return static_cast<double>(differ) / static_cast<double>(p.size());
 }
 
-TEST(Sameness, MovingTheSceneWithItsCameraChangesNothing) {
+TEST(Equivalence, MovingSceneAndCameraTogetherChangesNothing) {
     glm::mat4 moved = glm::translate(glm::mat4(1), glm::vec3(300, -200, 150));
     moved = glm::rotate(moved, 1.1f, glm::normalize(glm::vec3(1, -2, 0.5f)));
     const auto apply = [&](glm::dvec4 p) {
@@ -682,10 +681,10 @@ TEST(Sameness, MovingTheSceneWithItsCameraChangesNothing) {
     const Picture here = Tracer(busy_scene()).render(from_the_side());
     const Picture there =
         Tracer(busy_scene(moved)).render(camera(apply({0, -150, 110, 1}), apply({0, 0, 0, 1}), apply({0, 0, 1, 0})));
-    EXPECT_LT(share_that_differs(here, there), 0.003);
+    EXPECT_LT(fraction_of_differing_pixels(here, there), 0.003);
 }
 
-TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
+TEST(Equivalence, InstancesLookLikeWorldSpaceVertices) {
     const glm::mat4 m = glm::scale(
         glm::rotate(glm::translate(glm::mat4(1), glm::vec3(5, -10, 15)), 0.7f, glm::normalize(glm::vec3(1, 2, 3))),
         glm::vec3(30, 20, 12));
@@ -705,7 +704,7 @@ TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
         builder.add_light(light(100, -100, 200, 0.8f));
         return Tracer(std::move(builder)).render(from_the_side());
     };
-    // Normals are interpolated before or after they get their length in the world: a step of a code.
+    // Normals are normalized before or after interpolation: differences of a code.
     const Picture baked = build(true), instanced = build(false);
     EXPECT_GT(baked.alphas().at(255), 500);
     EXPECT_LT(std::abs(baked.alphas().at(255) - instanced.alphas().at(255)), 5);
@@ -716,7 +715,7 @@ TEST(Sameness, AnInstanceLooksLikeVerticesPutIntoTheWorld) {
     EXPECT_LT(far, 10);
 }
 
-TEST(Sameness, SoupLooksLikeTheIndexedMesh) {
+TEST(Equivalence, TriangleSoupLooksLikeTheIndexedMesh) {
     const scene::TriangleMesh indexed = cube(25);
     scene::TriangleMesh soup;
     for (const auto &triangle : indexed.triangles) {
@@ -735,15 +734,15 @@ TEST(Sameness, SoupLooksLikeTheIndexedMesh) {
     EXPECT_TRUE(build(soup) == build(indexed));
 }
 
-TEST(Sameness, RobustTraversalGivesThePictureOfTheFastOne) {
-    EXPECT_LT(share_that_differs(Tracer(busy_scene(), {{"robust", "true"}}).render(from_the_side()),
-                                 Tracer(busy_scene()).render(from_the_side())),
+TEST(Equivalence, RobustTraversalMatchesTheFastOne) {
+    EXPECT_LT(fraction_of_differing_pixels(Tracer(busy_scene(), {{"robust", "true"}}).render(from_the_side()),
+                                           Tracer(busy_scene()).render(from_the_side())),
               0.001);
 }
 
 // ---- Regions and sizes -----------------------------------------------------------------------------
 
-TEST(Region, HoldsAllAlphaAndLittleElse) {
+TEST(Region, ContainsAllAlphaTightly) {
     for (const glm::vec4 &sphere :
          {glm::vec4(0, 0, 300, 20), glm::vec4(-150, 60, 300, 30), glm::vec4(60, 0, 200, 90)}) {
         const Picture picture = Tracer(one_sphere(sphere), {{"samples", "4"}}).render(opencv_axes(pinhole()));
@@ -767,8 +766,8 @@ TEST(Region, HoldsAllAlphaAndLittleElse) {
     }
 }
 
-TEST(Region, SkippingTilesLosesNothing) {
-    // Objects all over, some behind the camera and some astride its plane, against rays of one pixel each.
+TEST(Region, SkippedTilesAreEmpty) {
+    // Objects in many places, some behind the camera and some intersecting its plane, compared per pixel.
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
     const std::uint32_t material = builder.add_material(flat(1, 1, 1));
@@ -787,7 +786,7 @@ TEST(Region, SkippingTilesLosesNothing) {
                 continue;
             }
             const glm::dvec3 d = glm::normalize(glm::dvec3(ray->x, ray->y, ray->z));
-            double margin = 1e9; // how far inside (negative) or outside the nearest sphere's rim
+            double margin = 1e9; // signed distance to the nearest sphere's silhouette, negative inside
             for (const glm::vec4 &s : spheres) {
                 const glm::dvec3 c(s);
                 const double along = glm::dot(c, d);
@@ -800,7 +799,7 @@ TEST(Region, SkippingTilesLosesNothing) {
         }
 }
 
-TEST(Sizes, OddOnesAreWrittenWholeAndNotBeyond) {
+TEST(Sizes, OddImageSizesAreWrittenExactly) {
     for (const auto &[width, height] :
          {std::pair{1u, 1u}, {3u, 5u}, {5u, 2u}, {33u, 65u}, {31u, 1u}, {1u, 100u}, {67u, 35u}})
         for (const char *samples : {"1", "2"}) {
@@ -808,13 +807,13 @@ TEST(Sizes, OddOnesAreWrittenWholeAndNotBeyond) {
                                         .render(opencv_axes(pinhole(width, height, 20)));
             EXPECT_EQ(picture.alpha(width / 2, height / 2), 255) << width << "x" << height;
             for (const Pixel &pixel : picture.pixels())
-                ASSERT_NE(pixel[3], 0xa5) << "left as it was";
+                ASSERT_NE(pixel[3], 0xa5) << "not written";
         }
 }
 
-// ---- Odd scenes ------------------------------------------------------------------------------------
+// ---- Unusual scenes --------------------------------------------------------------------------------
 
-TEST(OddScenes, DegenerateTrianglesAreHarmless) {
+TEST(UnusualScenes, DegenerateTrianglesAreHarmless) {
     ArenaBuilder builder = one_sphere({0, 0, 200, 30});
     const std::uint32_t material = builder.add_material(diffuse(1, 1, 1));
     scene::TriangleMesh sliver{
@@ -828,8 +827,8 @@ TEST(OddScenes, DegenerateTrianglesAreHarmless) {
     EXPECT_LT(counts.at(255), 3500);
 }
 
-// Their normals have no length in floats, and Embree ends the process for rays that are none.
-TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
+// Their normals underflow in single precision, and Embree aborts on invalid rays.
+TEST(UnusualScenes, FacetsTooSmallForTheirNormalsAreRendered) {
     for (const float side : {1e-12f, 1e-16f, 1e-20f})
         for (const bool glass : {false, true}) {
             ArenaBuilder builder;
@@ -846,7 +845,7 @@ TEST(OddScenes, FacetsTooSmallForTheirNormalsHaveAColour) {
         }
 }
 
-TEST(OddScenes, ACameraBeyondAllRaysIsRefused) {
+TEST(UnusualScenes, CameraBeyondFloatRangeIsRejected) {
     Tracer tracer(one_sphere({0, 0, 200, 30}));
     const arhost_camera far = camera({0, -1e19, 0}, {0, 0, 0}, {0, 0, 1});
     ASSERT_EQ(tracer.start(far.intrinsics), ARHOST_STATUS_OK);
@@ -854,13 +853,13 @@ TEST(OddScenes, ACameraBeyondAllRaysIsRefused) {
     EXPECT_EQ(tracer.try_render(far, picture), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
+TEST(UnusualScenes, NormalsThatCancelOutFallBackToTheFacet) {
     scene::TriangleMesh mesh = square(200);
     mesh.normals = {{1, 0, 0}, {-1, 0, 0}, {1, 0, 0}, {-1, 0, 0}};
     ArenaBuilder builder;
     builder.add_object("plane", builder.add_triangles(mesh), builder.add_material(diffuse(1, 1, 1)));
     builder.add_light(light(0, 0, 150, 0.5f));
-    // No number that is none gets into the light: those come out black.
+    // NaN would come out black.
     const int ambient = arhost::shading::srgb8_exact(0.2);
     for (const Pixel &pixel : Tracer(std::move(builder)).render(from_above()).pixels()) {
         ASSERT_EQ(pixel[3], 255);
@@ -868,17 +867,16 @@ TEST(OddScenes, NormalsThatCancelOutFallBackToTheFacet) {
     }
 }
 
-TEST(OddScenes, ACameraInsideAnObjectSeesItsInside) {
+TEST(UnusualScenes, CameraInsideAnObjectSeesItsInside) {
     const Picture picture = Tracer(one_sphere({0, 0, 0, 50}, diffuse(1, 1, 1))).render(opencv_axes(pinhole()));
     EXPECT_EQ(picture.alphas(), (std::map<int, int>{{255, 200 * 150}}));
     EXPECT_EQ(picture.info.region_width, 200u);
     EXPECT_EQ(picture.info.region_height, 150u);
 }
 
-TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
-    // Inside a ball about the eye every ray leaves along its own direction, and light is lost at the one surface
-    // only.
-    for (const char *way : {"tree", "path"}) {
+TEST(UnusualScenes, CameraInsideGlassSeesThroughIt) {
+    // From the centre of a ball, rays leave undeflected.
+    for (const char *mode : {"tree", "path"}) {
         ArenaBuilder builder;
         builder.settings.background = glm::vec3(0.5f);
         builder.settings.max_depth = 40;
@@ -889,17 +887,17 @@ TEST(OddScenes, ACameraInsideGlassSeesThroughIt) {
         set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f);
         glass.reflection_depth = glass.refraction_depth = 40;
         builder.add_object("ball", builder.add_spheres({{0, 0, 0, 50}}), builder.add_material(glass));
-        const Picture picture = Tracer(std::move(builder), {{"glass", way}}).render(opencv_axes(pinhole()));
+        const Picture picture = Tracer(std::move(builder), {{"glass", mode}}).render(opencv_axes(pinhole()));
         for (const Pixel &pixel : picture.pixels()) {
-            ASSERT_EQ(pixel[3], 255) << way;
-            ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << way;
+            ASSERT_EQ(pixel[3], 255) << mode;
+            ASSERT_TRUE(is_code_of(pixel[0], 0.5, 2e-3)) << mode;
         }
     }
 }
 
-// ---- Refusals --------------------------------------------------------------------------------------
+// ---- Rejected input --------------------------------------------------------------------------------
 
-class Refusal : public testing::Test {
+class RejectedInput : public testing::Test {
 protected:
     arhost_status render(const arhost_camera &camera) {
         EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
@@ -909,17 +907,17 @@ protected:
     Tracer tracer{one_sphere({0, 0, 200, 30})};
 };
 
-TEST_F(Refusal, OfAnUpThatIsParallelToTheView) {
+TEST_F(RejectedInput, OfAnUpParallelToTheView) {
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("up is parallel"));
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfALookAtThatIsTheEye) {
+TEST_F(RejectedInput, OfALookAtEqualToTheEye) {
     EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfNumbersThatAreNotFinite) {
+TEST_F(RejectedInput, OfNonFiniteNumbers) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -927,19 +925,19 @@ TEST_F(Refusal, OfNumbersThatAreNotFinite) {
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("not finite"));
 }
 
-TEST_F(Refusal, OfOtherIntrinsicsThanThoseOfTheStart) {
+TEST_F(RejectedInput, OfIntrinsicsOtherThanAtStart) {
     arhost_camera other = opencv_axes(pinhole());
     other.intrinsics.cx += 1;
     EXPECT_EQ(render(other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfAnImageOfAnotherSize) {
+TEST_F(RejectedInput, OfAnImageOfADifferentSize) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     Picture small(pinhole(100, 150));
     EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
+TEST_F(RejectedInput, OfInvalidIntrinsics) {
     arhost_intrinsics in = pinhole();
     in.fx = 0;
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -954,26 +952,26 @@ TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, ToGoOnOnceCancelled) {
+TEST_F(RejectedInput, OfStartOnceCancelled) {
     tracer.plugin().cancel();
     EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST_F(Refusal, ToFinishAnImageOnceCancelled) {
+TEST_F(RejectedInput, OfRenderOnceCancelled) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     tracer.plugin().cancel();
     Picture picture(pinhole());
     EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), picture), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST(Plugin, DeclaresThatItTracesTheLens) {
+TEST(Plugin, DeclaresLensDistortionSupport) {
     const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
     EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
     EXPECT_STREQ(descriptor.id, "rt_embree");
     EXPECT_TRUE(descriptor.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
 }
 
-TEST(Plugin, CanBeStartedAgainAfterAStop) {
+TEST(Plugin, CanBeRestartedAfterStop) {
     Tracer tracer(busy_scene());
     const auto first = tracer.render(from_the_side()).pixels();
     tracer.render(opencv_axes(pinhole(64, 48)));
@@ -986,11 +984,11 @@ class LargeSurfaces : public testing::TestWithParam<LargeSurface> {};
 INSTANTIATE_TEST_SUITE_P(All, LargeSurfaces, testing::ValuesIn(large_surfaces),
                          [](const auto &info) { return info.param.name; });
 
-TEST_P(LargeSurfaces, CastNoShadowOnThemselves) {
+TEST_P(LargeSurfaces, DoNotShadowThemselves) {
     EXPECT_EQ(pixels_out_of_light(GetParam(), "rt_embree"), 0);
 }
 
-TEST(LargeFloor, KeepsTheShadowsOfWhatIsFlatOnIt) {
+TEST(LargeFloor, KeepsShadowsOfThinObjectsOnIt) {
     for (const float side_mm : {1e2f, 1e6f})
         EXPECT_TRUE(has_its_shadow(Tracer(plate_on_floor(side_mm)).render(camera_over_plate()))) << side_mm;
 }

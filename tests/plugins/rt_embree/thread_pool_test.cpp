@@ -10,7 +10,7 @@
 namespace rt_embree {
 namespace {
 
-TEST(ThreadPool, DoesEachPieceOfWorkOnceRoundAfterRound) {
+TEST(ThreadPool, ProcessesEachItemOncePerCall) {
     for (unsigned threads : {1u, 2u, 5u}) {
         ThreadPool pool(threads);
         EXPECT_EQ(pool.thread_count(), threads);
@@ -23,15 +23,15 @@ TEST(ThreadPool, DoesEachPieceOfWorkOnceRoundAfterRound) {
     }
 }
 
-TEST(ThreadPool, ZeroAsksForOneThreadAProcessor) {
+TEST(ThreadPool, ZeroMeansOneThreadPerProcessor) {
     EXPECT_EQ(ThreadPool(0).thread_count(), std::max(1u, std::thread::hardware_concurrency()));
 }
 
-TEST(ThreadPool, NoWorkIsDoneAtOnce) {
+TEST(ThreadPool, ReturnsImmediatelyWithoutItems) {
     ThreadPool(3).for_each(0, [](std::size_t, std::size_t) { FAIL(); });
 }
 
-TEST(ThreadPool, FlushesDenormalsAtWorkAndLeavesTheCallersArithmeticAsItWas) {
+TEST(ThreadPool, FlushesDenormalsOnlyWhileProcessing) {
     volatile float tiny = std::numeric_limits<float>::min();
     std::atomic<int> flushed{0};
     ThreadPool(2).for_each(50, [&](std::size_t, std::size_t) { flushed += tiny * 0.5f == 0; });

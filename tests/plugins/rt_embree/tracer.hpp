@@ -45,7 +45,7 @@ inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> loo
     return c;
 }
 
-// An image in memory whose every other byte must stay as it is.
+// An image with padding and guard bytes that must not be written.
 class Picture {
 public:
     explicit Picture(const arhost_intrinsics &in)
@@ -65,7 +65,7 @@ public:
                 all.push_back(at(x, y));
         return all;
     }
-    // How many pixels have each alpha.
+    // Pixel counts by alpha.
     std::map<int, int> alphas() const {
         std::map<int, int> counts;
         for (const Pixel &pixel : pixels())
@@ -88,7 +88,7 @@ private:
     GuardedBuffer buffer_;
 };
 
-// The arena lies in memory that cannot be written: whoever tries, crashes.
+// The arena is in read-only memory: writing to it crashes.
 class Tracer {
 public:
     explicit Tracer(scene::ArenaBuilder builder, const Options &options = {}, const std::string &plugin = "rt_embree")
@@ -150,7 +150,7 @@ inline void set3(float (&to)[3], float x, float y, float z) {
     to[1] = y;
     to[2] = z;
 }
-inline arhost_material flat(float r, float g, float b) { // its colour without any light; needs ambient 1
+inline arhost_material flat(float r, float g, float b) { // constant colour without lights; needs ambient 1
     arhost_material material = scene::make_material(ARHOST_MATERIAL_DIFFUSE);
     set3(material.ambient, r, g, b);
     return material;
@@ -179,7 +179,7 @@ inline arhost_light light(float x, float y, float z, float intensity, arhost_fal
     set3(light.intensity, intensity, intensity, intensity);
     return light;
 }
-// A square in the plane z = `z`, its front up.
+// A square in the plane z = `z`, front face up.
 inline scene::TriangleMesh square(float half_side, float z = 0) {
     const float s = half_side;
     return {{{-s, -s, z}, {s, -s, z}, {s, s, z}, {-s, s, z}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
@@ -198,7 +198,7 @@ inline scene::TriangleMesh cube(float half_side) {
 inline arhost_camera from_the_side(const arhost_intrinsics &in = pinhole()) {
     return camera({0, -150, 110}, {0, 0, 0}, {0, 0, 1}, in);
 }
-// Straight down on the plane z = 0 from 200 mm, and where a pixel's ray arrives there.
+// Straight down on the plane z = 0 from 200 mm, and the point where a pixel's ray hits it.
 inline arhost_camera from_above() {
     return camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0});
 }
@@ -206,7 +206,7 @@ inline glm::dvec3 on_the_floor(int x, int y) {
     return {x - 99.5, -(y - 74.5), 0};
 }
 
-// The code of a value that single precision has blurred.
+// Whether `code` is the sRGB code of a value with a relative error up to `tolerance`.
 inline ::testing::AssertionResult is_code_of(int code, double linear, double tolerance = 2e-5) {
     const int low = shading::srgb8_exact(linear * (1 - tolerance)),
               high = shading::srgb8_exact(linear * (1 + tolerance));

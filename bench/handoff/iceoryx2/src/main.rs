@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//! One-way latency of a message of 128 bytes from one process to another and of the answer back, over iceoryx2: its
-//! samples, with a sleeping (events) and a polling receiver. The same rounds and figures as bench_handoff.cpp's.
+//! One-way latency of a 128-byte message to another process and of the response, over iceoryx2 samples, with a sleeping
+//! (events) and a polling receiver. Same rounds and statistics as bench_handoff.cpp.
 use iceoryx2::port::{
     listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber,
 };
@@ -10,13 +10,13 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// As many bytes as arhost's own results have, about.
+/// About the size of arhost's results.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 struct Message {
     sent_ns: i64,
-    way_there_ns: i64,
-    more: [u64; 14],
+    forward_ns: i64,
+    padding: [u64; 14],
 }
 
 fn now_ns() -> i64 {
@@ -29,13 +29,13 @@ fn now_ns() -> i64 {
     time.tv_sec * 1_000_000_000 + time.tv_nsec
 }
 
-/// One direction's end that gives: messages, and the event that wakes who receives them.
+/// Sending end of one direction: messages, and the event that wakes the receiver.
 struct Sender {
     publisher: Publisher<ipc::Service, Message, ()>,
     notifier: Notifier<ipc::Service>,
 }
 
-/// Its end that takes.
+/// Receiving end of one direction.
 struct Receiver {
     subscriber: Subscriber<ipc::Service, Message, ()>,
     listener: Listener<ipc::Service>,
@@ -92,7 +92,7 @@ impl Receiver {
     fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
         let end = Instant::now() + Duration::from_secs(10); // the other side may have died
         while Instant::now() < end {
-            // First the event, which comes after its message: one that is left would wake the next wait.
+            // Consume the event first, which follows its message: a leftover event would end the next wait.
             if !polling {
                 self.listener.timed_wait_one(Duration::from_secs(1))?;
             }
@@ -103,65 +103,65 @@ impl Receiver {
                 std::hint::spin_loop();
             }
         }
-        Err("the other process does not answer".into())
+        Err("the other process does not respond".into())
     }
 }
 
-fn answer(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
+fn run_server(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
     let node = NodeBuilder::new().create::<ipc::Service>()?;
-    let (there, back) = (
-        Receiver::open(&node, "there", run)?,
-        Sender::open(&node, "back", run)?,
+    let (requests, responses) = (
+        Receiver::open(&node, "forward", run)?,
+        Sender::open(&node, "backward", run)?,
     );
-    println!("ready"); // what was sent before a receiver was there would be lost
+    println!("ready"); // messages sent before the receiver exists would be lost
     for _ in 0..=rounds {
-        let question = there.receive(polling)?;
-        let way_there_ns = now_ns() - question.sent_ns;
-        back.send(
+        let request = requests.receive(polling)?;
+        let forward_ns = now_ns() - request.sent_ns;
+        responses.send(
             Message {
                 sent_ns: now_ns(),
-                way_there_ns,
-                more: [0; 14],
+                forward_ns,
+                padding: [0; 14],
             },
             polling,
         )?;
     }
-    std::thread::sleep(Duration::from_millis(100)); // the last answer must outlive its being read
+    std::thread::sleep(Duration::from_millis(100)); // the last response must stay valid until it is read
     Ok(())
 }
 
-fn percentile_us(samples: &mut [i64], share: f64) -> f64 {
+fn percentile_us(samples: &mut [i64], fraction: f64) -> f64 {
     samples.sort_unstable();
-    samples[(share * (samples.len() - 1) as f64) as usize] as f64 * 1e-3
+    samples[(fraction * (samples.len() - 1) as f64) as usize] as f64 * 1e-3
 }
 
-fn ask(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
+fn run_client(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
     let run = format!("{}-{polling}", std::process::id());
     let node = NodeBuilder::new().create::<ipc::Service>()?;
-    let (way_there, way_back) = (
-        Sender::open(&node, "there", &run)?,
-        Receiver::open(&node, "back", &run)?,
+    let (forward, backward) = (
+        Sender::open(&node, "forward", &run)?,
+        Receiver::open(&node, "backward", &run)?,
     );
     let mut other = Command::new(std::env::current_exe()?)
         .args([rounds.to_string(), run, polling.to_string()])
         .stdout(Stdio::piped())
         .spawn()?;
     BufReader::new(other.stdout.take().ok_or("no pipe")?).read_line(&mut String::new())?;
-    let (mut there, mut back) = (Vec::new(), Vec::new());
+    let (mut forward_ns, mut backward_ns) = (Vec::new(), Vec::new());
     for round in 0..=rounds {
         std::thread::sleep(Duration::from_micros(200)); // let the other side fall asleep
-        way_there.send(
+        forward.send(
             Message {
                 sent_ns: now_ns(),
-                way_there_ns: 0,
-                more: [0; 14],
+                forward_ns: 0,
+                padding: [0; 14],
             },
             polling,
         )?;
-        let reply = way_back.receive(polling)?;
+        let reply = backward.receive(polling)?;
         if round > 0 {
-            back.push(now_ns() - reply.sent_ns);
-            there.push(reply.way_there_ns);
+            backward_ns.push(now_ns() - reply.sent_ns);
+            forward_ns.push(reply.forward_ns);
         }
     }
     other.wait()?;
@@ -171,7 +171,7 @@ fn ask(rounds: usize, polling: bool) -> Result<(), Box<dyn Error>> {
         "iceoryx2, sleeping"
     };
     print!("{name:<28}");
-    for samples in [&mut there, &mut back] {
+    for samples in [&mut forward_ns, &mut backward_ns] {
         print!(
             "  {:8.1} {:8.1} {:8.1}",
             percentile_us(samples, 0.5),
@@ -188,7 +188,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let rounds = arguments.get(1).map_or(Ok(5000), |text| text.parse())?;
     match &arguments[..] {
-        [_, _, run, polling] => answer(run, rounds, polling.parse()?),
-        _ => ask(rounds, false).and_then(|()| ask(rounds, true)),
+        [_, _, run, polling] => run_server(run, rounds, polling.parse()?),
+        _ => run_client(rounds, false).and_then(|()| run_client(rounds, true)),
     }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/glsl.h: the leaf functions of leaf/*.h in a shader (GLSL 4.50 or newer). It enables
-// GL_GOOGLE_include_directive, includes "arhost/shading/glsl.h", and is compiled with core/shading/include in the
-// include path (glslangValidator -I…, glslc -I …).
+// arhost/shading/glsl.h: the leaf functions of leaf/*.h for shaders (GLSL 4.50 or newer). The shader must enable
+// GL_GOOGLE_include_directive, and core/shading/include must be in the include path (glslangValidator -I…,
+// glslc -I …).
 #ifndef ARHOST_SHADING_GLSL_H
 #define ARHOST_SHADING_GLSL_H
 
@@ -24,7 +24,7 @@ Float sine_of_turn(Float t) {
     return sin(6.28318530717959 * t);
 }
 Float turn_of(Float x, Float y) {
-    return atan(x, x == 0.0 && y == 0.0 ? 1.0 : y) * 0.159154943091895; // GLSL leaves atan(0, 0) open
+    return atan(x, x == 0.0 && y == 0.0 ? 1.0 : y) * 0.159154943091895; // atan(0, 0) is undefined in GLSL
 }
 
 #include "leaf/alpha.h"

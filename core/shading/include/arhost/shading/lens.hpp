@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/lens.hpp: the lens of arhost/camera.h, from rays to pixels and back. Double precision:
-// made once into a table of rays, not evaluated per frame.
+// arhost/shading/lens.hpp: the lens of arhost/camera.h, from rays to pixels and back. In double precision; meant for
+// precomputing ray tables, not for per-frame evaluation.
 //
-// Axes: x right, y down, z forward (OpenCV). "Image plane": the plane z = 1.
+// Axes: x right, y down, z forward (OpenCV). The image plane is z = 1.
 #pragma once
 
 #include <arhost/camera.h>
@@ -23,7 +23,7 @@ struct Point2 {
     double x, y;
 };
 
-// A lens' coefficients as leaf/lens.h takes them. What is past their count does not count.
+// Distortion coefficients for leaf/lens.h; those beyond coefficient_count are 0.
 inline std::array<double, ARHOST_MAX_DISTORTION> coefficients_of(const arhost_intrinsics &intrinsics) {
     std::array<double, ARHOST_MAX_DISTORTION> k{};
     std::copy_n(intrinsics.coefficients, std::min<std::size_t>(intrinsics.coefficient_count, k.size()), k.begin());
@@ -42,10 +42,10 @@ class Lens {
 public:
     explicit Lens(const arhost_intrinsics &intrinsics)
         : intrinsics_(intrinsics), brown_(brown_conrady_of(intrinsics)), fisheye_(kannala_brandt_of(intrinsics)),
-          limit_(fold()) {}
+          limit_(monotonic_limit()) {}
 
-    // (x'', y'') of a direction. None behind the camera, or beyond the fold of the polynomial, where
-    // directions come back inwards.
+    // Image point (x'', y'') of a direction. None behind the camera (unless fisheye), or beyond the angle where the
+    // distortion polynomial stops increasing and image points would fold back inwards.
     std::optional<Point2> distort(Vec3T<double> d) const {
         if (intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE) {
             if (std::atan2(std::hypot(d.x, d.y), d.z) > limit_)
@@ -68,8 +68,8 @@ public:
         return Point2{intrinsics_.fx * p->x + intrinsics_.cx, intrinsics_.fy * p->y + intrinsics_.cy};
     }
 
-    // The direction seen at a pixel, to 1e-9: on the plane z = 1, or of length 1 for a fisheye lens.
-    // None where no direction arrives.
+    // The direction seen at a pixel, to 1e-9: on the image plane, or of unit length for a fisheye lens. None if no
+    // direction maps to the pixel.
     std::optional<Vec3T<double>> ray(Point2 pixel) const {
         const Point2 p{(pixel.x - intrinsics_.cx) / intrinsics_.fx, (pixel.y - intrinsics_.cy) / intrinsics_.fy};
         switch (intrinsics_.distortion) {
@@ -91,9 +91,9 @@ private:
         return {q.x, q.y};
     }
 
-    // The radius on the image plane (Brown) or the angle (fisheye) up to which the radial curve rises:
-    // beyond it, two directions would share a pixel. 0.001 is far finer than any lens' curve bends.
-    double fold() const {
+    // The radius on the image plane (Brown) or the angle (fisheye) up to which the radial curve increases: beyond it,
+    // two directions would share a pixel. A step of 0.001 is far finer than the features of any lens' curve.
+    double monotonic_limit() const {
         if (intrinsics_.distortion == ARHOST_DISTORTION_NONE)
             return 1e30;
         const bool is_fisheye = intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE;
@@ -109,16 +109,16 @@ private:
         return end;
     }
 
-    // Newton's method with the 2×2 Jacobian by central differences, halving steps that do not help.
-    std::optional<Vec3T<double>> undistort_brown(Point2 wanted) const {
+    // Newton's method with a central-difference 2×2 Jacobian, halving steps that do not reduce the error.
+    std::optional<Vec3T<double>> undistort_brown(Point2 target) const {
         const auto error_at = [&](Point2 p) {
             const Point2 q = brown(p);
-            return Point2{q.x - wanted.x, q.y - wanted.y};
+            return Point2{q.x - target.x, q.y - target.y};
         };
         const auto size = [](Point2 p) { return std::hypot(p.x, p.y); };
-        // Start inside the fold, in the wanted direction.
-        const double start = std::min(1.0, 0.9 * limit_ / std::max(size(wanted), 1e-30));
-        Point2 p{wanted.x * start, wanted.y * start};
+        // Start within the limit, in the direction of the target.
+        const double start = std::min(1.0, 0.9 * limit_ / std::max(size(target), 1e-30));
+        Point2 p{target.x * start, target.y * start};
         Point2 error = error_at(p);
         for (int step = 0; step < max_steps && !(size(error) < tolerance); ++step) {
             constexpr double h = 1e-6;
@@ -131,10 +131,10 @@ private:
                 return {};
             const Point2 move{(d * error.x - b * error.y) / determinant, (a * error.y - c * error.x) / determinant};
             bool better = false;
-            for (double share = 1; share > 1e-4 && !better; share /= 2) {
-                const Point2 next{p.x - share * move.x, p.y - share * move.y};
+            for (double scale = 1; scale > 1e-4 && !better; scale /= 2) {
+                const Point2 next{p.x - scale * move.x, p.y - scale * move.y};
                 const Point2 next_error = error_at(next);
-                // Beyond the fold lies another solution, which no light takes.
+                // Beyond the limit lies another solution, which is not physical.
                 if (size(next) <= limit_ && size(next_error) < size(error)) {
                     p = next;
                     error = next_error;
@@ -149,9 +149,9 @@ private:
         return Vec3T<double>{p.x, p.y, 1};
     }
 
-    // Newton's method in a bracket: the curve rises up to the fold, so it can't miss.
-    std::optional<Vec3T<double>> undistort_fisheye(Point2 wanted) const {
-        const double r = std::hypot(wanted.x, wanted.y);
+    // Bracketed Newton's method: always converges, as the curve increases up to the limit.
+    std::optional<Vec3T<double>> undistort_fisheye(Point2 target) const {
+        const double r = std::hypot(target.x, target.y);
         double low = 0, high = limit_;
         if (!(r <= kannala_brandt_radius(fisheye_, high)))
             return {};
@@ -166,7 +166,7 @@ private:
                 theta = (low + high) / 2;
         }
         const double scale = r > 0 ? std::sin(theta) / r : 0;
-        return Vec3T<double>{wanted.x * scale, wanted.y * scale, std::cos(theta)};
+        return Vec3T<double>{target.x * scale, target.y * scale, std::cos(theta)};
     }
 
     arhost_intrinsics intrinsics_;

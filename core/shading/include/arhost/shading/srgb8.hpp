@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/srgb8.hpp: linear light to the 8-bit sRGB code that the exact formula rounds to, by one
-// look-up and one comparison.
+// arhost/shading/srgb8.hpp: linear light to 8-bit sRGB, equal to the rounded exact formula, by one table look-up and
+// one comparison.
 #pragma once
 
 #include "scalar.hpp"
@@ -13,12 +13,13 @@
 
 namespace arhost::shading {
 
-// The cells split each power of two from 2^-13 (whose code is 0) to 1 into 128: finer than the codes
-// anywhere, so that a cell has at most two codes. Within a cell, floats differ in their low 16 bits only.
+// 128 cells per power of two from 2^-13 (code 0) to 1: fine enough that a cell spans at most two codes. Floats in a
+// cell differ only in their low 16 bits.
 struct Srgb8Table {
     static constexpr float smallest = 0x1p-13f;
     static constexpr std::int32_t first_bits = (127 - 13) << 23, shift = 16, cell_count = 13 * 128 + 1;
-    // A cell: the code at its start, above the low bits from which on the code is one higher (1 << 16: none).
+    // Cell layout: the code at the cell's start, above the low-bits threshold from which the code is one higher
+    // (1 << 16: none).
     static constexpr std::int32_t code_shift = 17, threshold_mask = (1 << code_shift) - 1, low_mask = 0xffff;
     std::int32_t cells[cell_count];
 
@@ -35,7 +36,7 @@ inline std::int32_t srgb8_exact(double linear) {
 }
 
 inline Srgb8Table make_srgb8_table() {
-    // The smallest float of each code: the formula's inverse, then step to the exact one.
+    // The smallest float of each code: the formula's inverse, then single steps to the exact value.
     std::int32_t first_of_code[257] = {};
     first_of_code[256] = std::numeric_limits<std::int32_t>::max();
     for (std::int32_t code = 1; code <= 255; ++code) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/vec3.hpp: three of whatever a Float is.
+// arhost/shading/vec3.hpp: a 3-vector of any Float type.
 #pragma once
 
 namespace arhost::shading {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lenses, from directions to the image: axes x right, y down, z forward (OpenCV). "Image point": (x'', y'', 1), which
-// the focal lengths and the principal point take to a pixel. A leaf file: see ../scalar.hpp.
+// Lens distortion, from directions to image points; axes x right, y down, z forward (OpenCV). An image point is
+// (x'', y'', 1), which focal lengths and principal point map to a pixel. A leaf file: see ../scalar.hpp.
 //
-// The way back has no closed form and takes steps until it is exact enough: see ../lens.hpp, which makes tables of
-// rays. A shader reads such a table.
+// The inverse has no closed form; ../lens.hpp solves it iteratively. Shaders read a precomputed ray table.
 
 // In OpenCV's order.
 struct BrownConrady {
@@ -13,14 +12,14 @@ struct KannalaBrandt {
     Float k1, k2, k3, k4;
 };
 
-// Brown–Conrady as in OpenCV's calib3d ("Detailed Description" of camera calibration): how much farther from the
-// centre a point appears whose squared distance from it is r2 …
+// Brown–Conrady as in OpenCV's calib3d ("Detailed Description" of camera calibration): radial scale at squared
+// radius r2.
 ARHOST_LEAF Float brown_conrady_radial(BrownConrady k, Float r2) {
     return (Float(1.0) + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))) /
            (Float(1.0) + r2 * (k.k4 + r2 * (k.k5 + r2 * k.k6)));
 }
 
-// … and the image point of p = (x, y, 1), with the tangential part and the thin prism's.
+// Image point of p = (x, y, 1), with tangential and thin-prism distortion.
 ARHOST_LEAF Vec3 brown_conrady(BrownConrady k, Vec3 p) {
     Float r2 = p.x * p.x + p.y * p.y;
     Float scale = brown_conrady_radial(k, r2);
@@ -30,21 +29,21 @@ ARHOST_LEAF Vec3 brown_conrady(BrownConrady k, Vec3 p) {
         Float(1.0));
 }
 
-// Kannala–Brandt as in OpenCV's fisheye (after Kannala and Brandt, IEEE PAMI 28(8), 2006): the distance from the
-// centre at which a direction appears that is `angle` radians off the axis, θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) …
+// Kannala–Brandt as in OpenCV's fisheye (after Kannala and Brandt, IEEE PAMI 28(8), 2006): radius of the image point
+// of a direction θ = `angle` radians off the axis, θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸).
 ARHOST_LEAF Float kannala_brandt_radius(KannalaBrandt k, Float angle) {
     Float a2 = angle * angle;
     return angle * (Float(1.0) + a2 * (k.k1 + a2 * (k.k2 + a2 * (k.k3 + a2 * k.k4))));
 }
 
-// … how fast that grows with the angle …
+// Derivative of the radius with respect to the angle.
 ARHOST_LEAF Float kannala_brandt_slope(KannalaBrandt k, Float angle) {
     Float a2 = angle * angle;
     return Float(1.0) +
            a2 * (Float(3.0) * k.k1 + a2 * (Float(5.0) * k.k2 + a2 * (Float(7.0) * k.k3 + a2 * (Float(9.0) * k.k4))));
 }
 
-// … and a direction's image point; it may be of any length, and point backwards.
+// Image point of a direction, which may have any length and point backwards.
 ARHOST_LEAF Vec3 kannala_brandt(KannalaBrandt k, Vec3 direction) {
     Float across = sqrt(direction.x * direction.x + direction.y * direction.y);
     Float angle = Float(6.28318530717959) * turn_of(across, direction.z);

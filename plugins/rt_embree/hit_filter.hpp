@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which hits do not count: where a colour texture's alpha is below its material's cut-off there is nothing, and
-// primary rays pass through catchers from behind. Embree asks at each hit.
+// Embree filter callback. Rejects hits where the colour texture's alpha is below the material's cutoff, and primary
+// rays' hits on the back faces of catchers.
 #pragma once
 
 #include "kernel.hpp"
 
 namespace rt_embree {
 
-// What Embree's callbacks are given of a geometry. The pointers live as long as the geometry.
+// User data of a geometry. The pointers must outlive the geometry.
 struct HitFilter {
     bool is_catcher = false;
-    float alpha_cutoff = 0; // 0: no holes, and what follows is NULL
+    float alpha_cutoff = 0; // 0: no alpha test; the pointers below are NULL
     const Texture *colour = nullptr;
     const int *indices = nullptr;
     const float *texcoords = nullptr;
@@ -23,7 +23,7 @@ struct HitFilter {
 
 HitFilter hit_filter_of(const Object &object, const Texture *textures);
 
-// `filter` outlives the geometry.
+// `filter` must outlive the geometry.
 void set_hit_filter(RTCGeometry geometry, const HitFilter &filter);
 
 } // namespace rt_embree

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tree_quality.hpp"
+#include "bvh_quality.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -8,7 +8,7 @@
 namespace rt_embree {
 namespace {
 
-constexpr std::size_t group = 16, sample = 1024; // triangles
+constexpr std::size_t group_size = 16, max_samples = 1024; // triangles
 
 struct Bounds {
     float low[3], high[3];
@@ -45,7 +45,7 @@ Bounds bounds_of(const MeshView &mesh, std::uint32_t triangle) {
     return bounds;
 }
 
-// Ten bits, each followed by two zeros.
+// Inserts two zeros after each of ten bits.
 std::uint32_t spread(std::uint32_t bits) {
     bits = (bits | bits << 16) & 0x030000ff;
     bits = (bits | bits << 8) & 0x0300f00f;
@@ -53,10 +53,10 @@ std::uint32_t spread(std::uint32_t bits) {
     return (bits | bits << 2) & 0x09249249;
 }
 
-// Of every so many a triangle, along a Morton curve.
-std::vector<std::uint32_t> neighbours(const MeshView &mesh) {
+// A sample of the triangles, ordered along a Morton curve.
+std::vector<std::uint32_t> morton_order(const MeshView &mesh) {
     const auto stride =
-        std::max<std::uint32_t>(1, static_cast<std::uint32_t>((mesh.triangle_count + sample - 1) / sample));
+        std::max<std::uint32_t>(1, static_cast<std::uint32_t>((mesh.triangle_count + max_samples - 1) / max_samples));
     std::vector<Bounds> boxes;
     Bounds all;
     for (std::uint32_t i = 0; i < mesh.triangle_count; i += stride) {
@@ -83,9 +83,9 @@ std::vector<std::uint32_t> neighbours(const MeshView &mesh) {
 
 double area_of_groups(const MeshView &mesh, const std::vector<std::uint32_t> &order) {
     double sum = 0;
-    for (std::size_t first = 0; first < order.size(); first += group) {
+    for (std::size_t first = 0; first < order.size(); first += group_size) {
         Bounds box;
-        for (std::size_t i = first; i < std::min(first + group, order.size()); ++i)
+        for (std::size_t i = first; i < std::min(first + group_size, order.size()); ++i)
             box.include(bounds_of(mesh, order[i]));
         sum += box.half_area();
     }
@@ -94,13 +94,13 @@ double area_of_groups(const MeshView &mesh, const std::vector<std::uint32_t> &or
 
 } // namespace
 
-void TreeQuality::built(const MeshView &mesh) {
-    order_ = neighbours(mesh);
+void BvhQuality::record_build(const MeshView &mesh) {
+    order_ = morton_order(mesh);
 }
 
-double TreeQuality::decay(const MeshView &mesh) const {
-    const double now = area_of_groups(mesh, order_), anew = area_of_groups(mesh, neighbours(mesh));
-    return anew > 0 ? now / anew : 1;
+double BvhQuality::degradation(const MeshView &mesh) const {
+    const double current = area_of_groups(mesh, order_), rebuilt = area_of_groups(mesh, morton_order(mesh));
+    return rebuilt > 0 ? current / rebuilt : 1;
 }
 
 } // namespace rt_embree

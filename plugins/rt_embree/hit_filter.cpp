@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "holes.hpp"
+#include "hit_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -22,13 +22,13 @@ float alpha_of_texel(const Texture &texture, std::int32_t x, std::int32_t y) {
                : static_cast<float>(static_cast<const std::uint8_t *>(texture.texels)[at]) / 255;
 }
 
-// A coordinate in texels, of which far outside only the fraction counts.
+// Texture coordinate in texels, range-reduced so that the texel index fits an int.
 float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
-    const float near = wrap == ARHOST_WRAP_CLAMP ? std::clamp(t, -1.0f, 2.0f) : t - 2 * std::floor(t / 2);
-    return near * static_cast<float>(size) - 0.5f;
+    const float reduced = wrap == ARHOST_WRAP_CLAMP ? std::clamp(t, -1.0f, 2.0f) : t - 2 * std::floor(t / 2);
+    return reduced * static_cast<float>(size) - 0.5f;
 }
 
-// Between the four texels round (u, v), as the kernel's sample_texture.
+// Bilinear, as the kernel's sample_texture.
 float sampled_alpha(const Texture &texture, float u, float v) {
     const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
     const float left = std::floor(x), top = std::floor(y);
@@ -40,27 +40,28 @@ float sampled_alpha(const Texture &texture, float u, float v) {
     return std::lerp(std::lerp(at(0, 0), at(1, 0), x - left), std::lerp(at(0, 1), at(1, 1), x - left), y - top);
 }
 
-bool is_hole(const HitFilter &filter, unsigned triangle, float u, float v) {
+bool is_cut_out(const HitFilter &filter, unsigned triangle, float u, float v) {
     const int *corners = filter.indices + std::size_t{triangle} * (filter.index_stride / 4);
-    const float share[3] = {1 - u - v, u, v};
+    const float weight[3] = {1 - u - v, u, v};
     float s = 0, t = 0;
     for (int i = 0; i < 3; ++i) {
         const float *at = filter.texcoords + std::size_t(corners[i]) * (filter.texcoord_stride / 4);
-        s += share[i] * at[0];
-        t += share[i] * at[1];
+        s += weight[i] * at[0];
+        t += weight[i] * at[1];
     }
     return sampled_alpha(*filter.colour, s, t) < filter.alpha_cutoff;
 }
 
-void reject_holes(const HitFilter &filter, const RTCFilterFunctionNArguments *arguments) {
+void reject_cut_out(const HitFilter &filter, const RTCFilterFunctionNArguments *arguments) {
     const unsigned count = arguments->N;
     for (unsigned i = 0; i < count; ++i)
-        if (arguments->valid[i] && is_hole(filter, RTCHitN_primID(arguments->hit, count, i),
-                                           RTCHitN_u(arguments->hit, count, i), RTCHitN_v(arguments->hit, count, i)))
+        if (arguments->valid[i] &&
+            is_cut_out(filter, RTCHitN_primID(arguments->hit, count, i), RTCHitN_u(arguments->hit, count, i),
+                       RTCHitN_v(arguments->hit, count, i)))
             arguments->valid[i] = 0;
 }
 
-void reject_facing_away(const RTCFilterFunctionNArguments *arguments) {
+void reject_back_faces(const RTCFilterFunctionNArguments *arguments) {
     const unsigned count = arguments->N;
     for (unsigned i = 0; i < count; ++i) {
         const float along = RTCHitN_Ng_x(arguments->hit, count, i) * RTCRayN_dir_x(arguments->ray, count, i) +
@@ -73,10 +74,10 @@ void reject_facing_away(const RTCFilterFunctionNArguments *arguments) {
 
 void on_hit(const RTCFilterFunctionNArguments *arguments) {
     const auto &filter = *static_cast<const HitFilter *>(arguments->geometryUserPtr);
-    if (filter.is_catcher && query_of(*arguments).cull_catchers_facing_away)
-        reject_facing_away(arguments);
+    if (filter.is_catcher && query_of(*arguments).cull_catcher_back_faces)
+        reject_back_faces(arguments);
     if (filter.alpha_cutoff > 0)
-        reject_holes(filter, arguments);
+        reject_cut_out(filter, arguments);
 }
 
 } // namespace
