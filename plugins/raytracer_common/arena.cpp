@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 bool is_identity(const float *world_from_object) {
     constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
@@ -30,4 +30,4 @@ void Cofactors::put_normal_transform(float *to) const {
         *to++ = static_cast<float>(value / (determinant < 0 ? -largest : largest));
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

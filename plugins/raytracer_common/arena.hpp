@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <span>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 inline const std::byte *bytes(const arhost_scene &arena) {
     return reinterpret_cast<const std::byte *>(&arena);
@@ -49,4 +49,4 @@ struct Cofactors {
     void put_normal_transform(float *to) const;
 };
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

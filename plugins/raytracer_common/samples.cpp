@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 double radical_inverse_2(std::uint32_t i) {
@@ -43,4 +43,4 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
     return samples;
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

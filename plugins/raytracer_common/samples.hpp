@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 // From the pixel's centre: −½ to ½.
 struct Sample {
@@ -21,4 +21,4 @@ std::vector<Sample> sample_positions(std::uint32_t count);
 // 0 lies at the centre (R2: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count);
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

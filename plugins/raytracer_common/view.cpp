@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 using Vec3d = shading::Vec3T<double>;
@@ -74,4 +74,4 @@ Pose::Pose(const arhost_camera &camera) {
     down = cross(forward, right);
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -7,7 +7,7 @@
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/shading/lens.hpp>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 // Refuses a setup whose images can't be made.
 void check_setup(const arhost_raytracer_setup &setup);
@@ -28,4 +28,4 @@ inline void put(const shading::Vec3T<double> &from, float *to) {
     to[2] = static_cast<float>(from.z);
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -96,7 +96,7 @@ struct Frame {
     Scene scene;
     Rays rays;
     Camera camera;
-    const arhost::view::Sample *samples;
+    const arhost::raytracer_common::Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // of all that are averaged: where in their random sequences these begin
     float *history[4];          // NULL, or the sums of the samples before, of all tiles' pixels (Scratch::sum)

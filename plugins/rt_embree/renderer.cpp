@@ -16,7 +16,7 @@ namespace rt_embree {
 namespace {
 
 using arhost::Failure;
-using arhost::view::Pose, arhost::view::same, arhost::view::same_view;
+using arhost::raytracer_common::Pose, arhost::raytracer_common::same, arhost::raytracer_common::same_view;
 using Vec3d = arhost::shading::Vec3T<double>;
 
 [[noreturn]] void refuse(const std::string &message) {
@@ -54,10 +54,10 @@ constexpr std::uint32_t enough_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
-    arhost::view::put(pose.eye, camera.eye);
-    arhost::view::put(pose.right, camera.world_from_camera);
-    arhost::view::put(pose.down, camera.world_from_camera + 3);
-    arhost::view::put(pose.forward, camera.world_from_camera + 6);
+    arhost::raytracer_common::put(pose.eye, camera.eye);
+    arhost::raytracer_common::put(pose.right, camera.world_from_camera);
+    arhost::raytracer_common::put(pose.down, camera.world_from_camera + 3);
+    arhost::raytracer_common::put(pose.forward, camera.world_from_camera + 6);
     return camera;
 }
 
@@ -110,10 +110,10 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : waiting_(max_depth + 1) 
 }
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
-    : host_(host), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
+    : host_(host), intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
       kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
-      samples_a_frame_(settings.samples), samples_(arhost::view::sample_positions(settings.samples)),
+      samples_a_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       one_path_(settings.one_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
@@ -141,8 +141,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         if (motion || !still_camera_ || !same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_ = camera;
-        samples_ = arhost::view::sample_positions(history_samples_,
-                                                  history_samples_ < enough_samples ? samples_a_frame_ : 0);
+        samples_ = arhost::raytracer_common::sample_positions(
+            history_samples_, history_samples_ < enough_samples ? samples_a_frame_ : 0);
         for (std::size_t i = 0; i < 4; ++i)
             history[i] = history_.data() + i * (history_.size() / 4);
     }

@@ -11,7 +11,7 @@ namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
-using arhost::view::elements;
+using arhost::raytracer_common::elements;
 
 // Refitted trees decay as meshes deform; who looked by how much would pay more than for this.
 constexpr std::uint32_t max_refits = 60;
@@ -113,7 +113,7 @@ Acceleration::Acceleration(const Device &device, const Submission &submission, c
         if (!tree.vertices_offset)
             continue;
         const arhost_buffer &positions = geometries[number].positions;
-        const auto *first = arhost::view::bytes(arena) + positions.offset;
+        const auto *first = arhost::raytracer_common::bytes(arena) + positions.offset;
         std::byte *to = moving_.mapped().data() + tree.vertices_offset;
         for (std::uint32_t i = 0; i < positions.count; ++i)
             std::memcpy(to + 3 * sizeof(float) * i, first + std::size_t{positions.stride} * i, 3 * sizeof(float));
@@ -193,7 +193,7 @@ void Acceleration::build_still(Tree &tree, const arhost_geometry &geometry) {
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the trees were built");
     const DeviceFunctions &vk = device_.functions();
     const arhost_buffer &positions = geometry.positions;
-    const auto *first = arhost::view::bytes(arena_) + positions.offset;
+    const auto *first = arhost::raytracer_common::bytes(arena_) + positions.offset;
     std::vector<Box> sphere_boxes;
     std::span<const std::byte> input(first, std::size_t{positions.stride} * (positions.count - 1) + 12);
     if (geometry.type == ARHOST_GEOMETRY_SPHERES) {

@@ -89,10 +89,11 @@ private:
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
                    const Instance &instance, const PhysicalDevice &physical, const Shaders &shaders)
-    : host_(host), settings_(settings), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
+    : host_(host), settings_(settings),
+      intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
       stage_(shaders.pipeline_stage()), device_(instance, checked(physical), shaders.path), submission_(device_),
       scene_(*setup.scene, shaders.path == Path::plain, host),
-      samples_(arhost::view::sample_positions(settings.samples)),
+      samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       bands_(intrinsics_.height, settings.longest_band.value_or(longest_band(physical))) {
     make_buffers(intrinsics_, shaders.path);
     if (shaders.path != Path::plain) {
@@ -369,7 +370,7 @@ void Renderer::write_moving_parts() {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
-    if (!arhost::view::same(camera.intrinsics, intrinsics_))
+    if (!arhost::raytracer_common::same(camera.intrinsics, intrinsics_))
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width || image.stride % 4)
@@ -390,11 +391,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         write_moving_parts();
 
     if (settings_.accumulate) {
-        if (motion || !still_camera_ || !arhost::view::same_view(*still_camera_, camera))
+        if (motion || !still_camera_ || !arhost::raytracer_common::same_view(*still_camera_, camera))
             history_samples_ = 0;
         still_camera_.reset(); // an image that is not finished has spoilt what was summed up
-        samples_ = arhost::view::sample_positions(history_samples_,
-                                                  history_samples_ < enough_samples ? settings_.samples : 0);
+        samples_ = arhost::raytracer_common::sample_positions(
+            history_samples_, history_samples_ < enough_samples ? settings_.samples : 0);
     }
     frame_.first_sample = history_samples_;
     frame_.sample_count = static_cast<std::uint32_t>(samples_.size());

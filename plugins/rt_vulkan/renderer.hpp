@@ -78,7 +78,7 @@ private:
     Submission submission_;
     SceneData scene_;
     std::uint32_t ray_dimensions_ = 2;
-    std::vector<arhost::view::Sample> samples_; // of an image
+    std::vector<arhost::raytracer_common::Sample> samples_; // of an image
     Frame frame_{};
     std::array<Buffer, binding_count> buffers_;
     Buffer moving_;                            // what the host writes of what moves, part by part

@@ -16,10 +16,10 @@ namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
-using arhost::view::bytes;
-using arhost::view::elements;
-using arhost::view::is_identity;
-using arhost::view::object_extent;
+using arhost::raytracer_common::bytes;
+using arhost::raytracer_common::elements;
+using arhost::raytracer_common::is_identity;
+using arhost::raytracer_common::object_extent;
 
 // From here on a refitted tree costs rays more than building a new one does.
 constexpr double tolerable_decay = 1.3;
@@ -317,7 +317,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
 
 void SceneData::place(Object &object, const Mesh &mesh, const float *m) {
     object_extent(mesh.local.low, mesh.local.high, m, object.reach);
-    const arhost::view::Cofactors cofactors(m);
+    const arhost::raytracer_common::Cofactors cofactors(m);
     float normal_transform[9];
     cofactors.put_normal_transform(normal_transform);
     for (int i = 0; i < 3; ++i) {

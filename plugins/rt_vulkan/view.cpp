@@ -14,11 +14,11 @@ using Vec3d = arhost::shading::Vec3T<double>;
 } // namespace
 
 void look(const arhost_camera &camera, Frame &frame) {
-    const arhost::view::Pose pose(camera);
-    arhost::view::put(pose.eye, frame.eye);
-    arhost::view::put(pose.right, frame.world_from_camera[0]);
-    arhost::view::put(pose.down, frame.world_from_camera[1]);
-    arhost::view::put(pose.forward, frame.world_from_camera[2]);
+    const arhost::raytracer_common::Pose pose(camera);
+    arhost::raytracer_common::put(pose.eye, frame.eye);
+    arhost::raytracer_common::put(pose.right, frame.world_from_camera[0]);
+    arhost::raytracer_common::put(pose.down, frame.world_from_camera[1]);
+    arhost::raytracer_common::put(pose.forward, frame.world_from_camera[2]);
 }
 
 RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 // By columns: a turn about z with other scales along the axes, which are mirrored where `mirror` is −1; then a move.
@@ -75,4 +75,4 @@ TEST(Arena, NormalsStayNormalAndOutside) {
 }
 
 } // namespace
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -6,7 +6,7 @@
 #include <array>
 #include <set>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 TEST(SamplePositions, OneLiesInEachRowAndColumnAndTheirMeanIsTheCentre) {
@@ -52,4 +52,4 @@ TEST(SamplePositions, OfTheSequenceAreEvenHoweverFarItGoes) {
 }
 
 } // namespace
-} // namespace arhost::view
+} // namespace arhost::raytracer_common
