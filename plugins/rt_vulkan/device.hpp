@@ -13,7 +13,7 @@ namespace rt_vulkan {
 
 class Device {
 public:
-    // Enables the extensions that `path` needs.
+    // Enables the extensions that `path` needs. The Instance of `physical` outlives this.
     explicit Device(const PhysicalDevice &physical, Path path = Path::plain);
     ~Device();
     Device(const Device &) = delete;

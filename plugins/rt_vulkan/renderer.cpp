@@ -358,10 +358,11 @@ void Renderer::write_moving_parts() {
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!arhost::raytracer_common::same(camera.intrinsics, intrinsics_))
-        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's intrinsics are not those of start");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's intrinsics differ from those of start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width || image.stride % 4)
-        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the image's size is not that of start");
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "the image's size or stride does not match that of start");
     if (host_.cancelled()) // before the scene is updated
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled before tracing the image");
     Target &target = target_for(image);

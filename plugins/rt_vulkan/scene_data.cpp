@@ -152,8 +152,8 @@ SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Hos
 
 void SceneData::check_cancelled() const {
     if (host_.cancelled())
-        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while building the BVHs");
-    host_.progress(-1, "building the BVHs");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while preparing the scene");
+    host_.progress(-1, "preparing the scene");
 }
 
 std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points) {
