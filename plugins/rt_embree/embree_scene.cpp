@@ -30,7 +30,7 @@ unsigned mask_of(const Object &object) {
 
 void set_transform(Object &object, const float *m) {
     std::copy_n(m, 9, object.transform);
-    arhost::raytracer_common::Cofactors(m).put_normal_transform(object.normal_transform);
+    arhost::raytracer_common::Cofactors(m).write_normal_transform(object.normal_transform);
 }
 
 Object make_object(const arhost_scene &arena, const arhost_object &from) {

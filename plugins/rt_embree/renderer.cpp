@@ -54,10 +54,10 @@ constexpr std::uint32_t enough_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
-    arhost::raytracer_common::put(pose.eye, camera.eye);
-    arhost::raytracer_common::put(pose.right, camera.world_from_camera);
-    arhost::raytracer_common::put(pose.down, camera.world_from_camera + 3);
-    arhost::raytracer_common::put(pose.forward, camera.world_from_camera + 6);
+    arhost::raytracer_common::write(pose.eye, camera.eye);
+    arhost::raytracer_common::write(pose.right, camera.world_from_camera);
+    arhost::raytracer_common::write(pose.down, camera.world_from_camera + 3);
+    arhost::raytracer_common::write(pose.forward, camera.world_from_camera + 6);
     return camera;
 }
 

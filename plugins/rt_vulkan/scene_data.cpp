@@ -318,13 +318,13 @@ void SceneData::set_transform(Object &object, const Mesh &mesh, const float *m) 
     object_extent(mesh.local.low, mesh.local.high, m, object.extent);
     const arhost::raytracer_common::Cofactors cofactors(m);
     float normal_transform[9];
-    cofactors.put_normal_transform(normal_transform);
+    cofactors.write_normal_transform(normal_transform);
     for (int i = 0; i < 3; ++i) {
         std::copy_n(m + std::ptrdiff_t{3} * i, 3, object.transform[i]);
         std::copy_n(normal_transform + std::ptrdiff_t{3} * i, 3, object.normal_transform[i]);
         double translation = 0;
         for (int j = 0; j < 3; ++j) {
-            const double inverse = cofactors.of[3 * i + j] / cofactors.determinant;
+            const double inverse = cofactors.values[3 * i + j] / cofactors.determinant;
             object.object_from_world[j][i] = static_cast<float>(inverse);
             translation -= inverse * m[9 + j];
         }

@@ -15,10 +15,10 @@ using Vec3d = arhost::shading::Vec3T<double>;
 
 void set_camera(const arhost_camera &camera, Frame &frame) {
     const arhost::raytracer_common::Pose pose(camera);
-    arhost::raytracer_common::put(pose.eye, frame.eye);
-    arhost::raytracer_common::put(pose.right, frame.world_from_camera[0]);
-    arhost::raytracer_common::put(pose.down, frame.world_from_camera[1]);
-    arhost::raytracer_common::put(pose.forward, frame.world_from_camera[2]);
+    arhost::raytracer_common::write(pose.eye, frame.eye);
+    arhost::raytracer_common::write(pose.right, frame.world_from_camera[0]);
+    arhost::raytracer_common::write(pose.down, frame.world_from_camera[1]);
+    arhost::raytracer_common::write(pose.forward, frame.world_from_camera[2]);
 }
 
 RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {

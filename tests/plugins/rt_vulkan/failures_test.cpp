@@ -140,7 +140,7 @@ TEST_P(FailingDevice, LossAtTheFirstImageEndsCleanly) {
     tracer_.reset();
 }
 
-// Each allocation of start fails once.
+// Once for each allocation of start, which fails along with all later ones.
 TEST_P(FailingDevice, OutOfMemoryAtStartIsReported) {
     int nth = 1;
     for (;; ++nth) {
