@@ -153,17 +153,17 @@ nlohmann::json measured(const rt_vulkan::PhysicalDevice &device, const arhost::H
 }
 
 int trace(const std::vector<std::string> &words) {
-    const std::string &what = words[1];
+    const std::string &scene_name = words[1];
     const auto width = static_cast<std::uint32_t>(std::stoul(words[2])),
                height = static_cast<std::uint32_t>(std::stoul(words[3]));
-    const bool is_bunny = what == "bunny";
+    const bool is_bunny = scene_name == "bunny";
     double from[6] = {0, 50, 170, 0, 50, 169};
     for (std::size_t i = 0; i < 6 && words.size() == 12; ++i)
         from[i] = std::stod(words[6 + i]);
     scene::LoadCallbacks callbacks; // gpu.py reads from stderr which mesh was loaded
     callbacks.info = callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
     const scene::Arena arena =
-        is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(what), callbacks).build();
+        is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(scene_name), callbacks).build();
 
     const arhost_host printing = bench::printing_host("rt-vulkan-bench");
     const arhost::Host host(&printing);

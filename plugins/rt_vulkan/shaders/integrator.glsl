@@ -5,7 +5,7 @@
 
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
-// Linear light, and alpha. Primary rays ignore catchers, which do not hide virtual objects behind them; occluders
+// Linear light, and alpha. Catchers do not hide virtual objects behind them, so primary rays ignore catchers; occluders
 // hide everything behind them.
 vec4 trace_sample(vec3 direction, Random random) {
     vec3 light = vec3(0.0);
