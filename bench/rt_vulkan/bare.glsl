@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the plugin's speed is compared with: the same primary rays through the same trace(), and nothing else. Into the
-// image goes how far away the hit is, infinity where there is none.
+// The baseline of the speed comparison: the plugin's primary rays through the same trace(), and nothing else. Writes
+// the hit's distance to the image, infinity for a miss.
 
-void write_distance(uvec2 at) {
-    at.y += band.first_row;
-    if (at.x >= frame.width || at.y >= frame.height)
+void write_distance(uvec2 position) {
+    position.y += band.first_row;
+    if (position.x >= frame.width || position.y >= frame.height)
         return;
-    uint pixel = at.y * frame.width + at.x;
+    uint pixel = position.y * frame.width + position.x;
     vec3 direction;
-    float way = INFINITY;
+    float t = INFINITY;
     if (direction_of(pixel, vec2(0.0), direction))
-        way = trace(Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK), false, false).way;
-    image_pixels[pixel] = floatBitsToUint(way);
+        t = trace(Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK), false, false).t;
+    image_pixels[pixel] = floatBitsToUint(t);
 }

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""rt_vulkan on the device that is here: gpu.py [--quick]
+"""Measures rt_vulkan on this machine's device: gpu.py [--quick]
 
-1. The unlit bunny and whole scenes beside a bare trace of the same primary rays.
-2. Where the device is a GPU, the dissertation's scenes, by path.
-3. A long run with changes of the scene: memory, descriptors, the validation layers' messages.
+1. The unlit bunny and whole scenes, compared with a bare trace of the same primary rays.
+2. On a GPU: the dissertation's scenes, by path.
+3. A long run with scene changes: memory, file descriptors, validation messages.
 
-Whole scenes on a processor are traced by `plain` alone, which the plugin takes there, as each path compiles for long.
-What drivers compile is kept in build/gpu."""
+On a CPU, whole scenes are traced by `plain` only, the plugin's choice there, as each path takes long to compile.
+Drivers' compiled shaders are cached in build/gpu."""
 import json
 import os
 import pathlib
@@ -27,7 +27,7 @@ QUICK = "--quick" in sys.argv
 
 
 def traced(scene, size, rounds, paths, view=None):
-    """What was measured by each path, and what was said; `view`: the eye and what it looks at."""
+    """Returns each path's measurements, and the log; `view`: the eye and its target."""
     command = [PROGRAM, "trace", scene, *size, rounds, paths, *(view[0] + view[1] if view else ())]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, env=ENVIRONMENT)
     if done.returncode:
@@ -35,43 +35,42 @@ def traced(scene, size, rounds, paths, view=None):
     return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
 
 
-def note(scene, said):
-    return "   a stand-in for the scan" if "stand-in" in said else coarser(scene, said)
+def note(scene, log):
+    return "   a stand-in for the scan" if "stand-in" in log else coarser(scene, log)
 
 
-def beside_bare(is_gpu):
-    """The unlit bunny is nothing but visibility; the others are for orientation."""
+def compare_with_bare(is_gpu):
+    """The unlit bunny measures visibility only; the other scenes are for orientation."""
     size, rounds, paths = ((800, 600), 101, "all") if is_gpu else ((400, 300), 31, "auto")
     rounds = 3 if QUICK else rounds
-    print(f"an image by rt_vulkan beside a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "
-          f"{rounds} rounds in turn\n"
-          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'speed to that':>14}")
+    print(f"time per image of rt_vulkan and of a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "
+          f"{rounds} alternating rounds\n"
+          f"  {'':10} {'path':9} {'image, ms':>9} {'bare, ms':>9} {'relative speed':>14}")
     missed = []
     for name in ("bunny", "demo", "optix-cs", "optix-gl"):
-        rows, said = traced(*(("bunny", size, rounds, "all") if name == "bunny" else
+        rows, log = traced(*(("bunny", size, rounds, "all") if name == "bunny" else
                               (scene_file(name), size, rounds, paths, VIEWS[name][0])))
         for row in rows:
             speed = 100 * row["bare_ms"] / row["frame_ms"]
             print(f"  {name:10} {row['path']:9} {row['frame_ms']:9.2f} {row['bare_ms']:9.2f} {speed:12.1f} %"
-                  f"{note(name, said) if name != 'bunny' else ''}", flush=True)
+                  f"{note(name, log) if name != 'bunny' else ''}", flush=True)
             if name == "bunny" and row["drawn"] != row["hit"]:
-                missed.append(f"{row['path']}: the bare trace hits {row['hit']} pixels, and {row['drawn']} are drawn")
+                missed.append(f"{row['path']}: the bare trace hits {row['hit']} pixels, but {row['drawn']} are drawn")
     return missed
 
 
 def dissertation():
-    """Frames a second of its scenes; of a frame's time, what the GPU's clock counts and what the way back to the host
-    takes."""
+    """Frames per second of its scenes, and the shares of GPU time and read-back."""
     for width, height in ((800, 600), (1280, 720)):
         for title, scenes in TABLES.items():
-            print(f"{title}: {width}x{height}, frames a second (its own at 800x600 by a GTX 1060, 60 at most)\n"
-                  f"  {'scene':6} {'its own':>8}  {'path':9} {'rt_vulkan':>10} {'on the GPU':>11} {'read back':>10}")
+            print(f"{title}: {width}x{height}, frames per second (the dissertation's at 800x600 on a GTX 1060, at most 60)\n"
+                  f"  {'scene':6} {'diss.':>8}  {'path':9} {'rt_vulkan':>10} {'on the GPU':>11} {'read back':>10}")
             for name, (scene, view, _, alone) in scenes.items():
-                rows, said = traced(scene_file(scene), (width, height), 5 if QUICK else 101, "all", VIEWS[scene][view])
+                rows, log = traced(scene_file(scene), (width, height), 5 if QUICK else 101, "all", VIEWS[scene][view])
                 for row in rows:
                     print(f"  {name:6} {alone:8.2f}  {row['path']:9} {1000 / row['frame_ms']:10.2f} "
                           f"{100 * row['gpu_share']:9.1f} % {100 * row['read_back_share']:8.1f} %"
-                          f"{note(scene, said)}", flush=True)
+                          f"{note(scene, log)}", flush=True)
 
 
 def main():
@@ -79,13 +78,13 @@ def main():
     probe, _ = traced("bunny", (16, 16), 1, "auto")
     is_gpu = probe[0]["is_gpu"]
     print(f"gpu: {probe[0]['device']}")
-    missed = beside_bare(is_gpu)
+    missed = compare_with_bare(is_gpu)
     if is_gpu:
         dissertation()
     else:
-        print("the dissertation's scenes are left out: no GPU is among the Vulkan devices here, and a processor's frames a "
-              "second, shares and ways back say nothing of one's. Above is what a processor can show.")
-    # Not for speed: quickly compiled code will do where a processor runs it.
+        print("the dissertation's scenes are skipped: there is no GPU among the Vulkan devices, and a CPU's frame rates and "
+              "shares say nothing about a GPU's.")
+    # Speed does not matter here: let lavapipe compile quickly.
     images, every = (400, 20) if QUICK else (10_000, 100)
     run = [PROGRAM, "run", str(images), str(every), *(scene_file(name) for name in ("demo", "optix-cs", "moving"))]
     sys.stdout.flush()

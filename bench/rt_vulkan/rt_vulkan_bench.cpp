@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How long rt_vulkan takes for an image, beside a bare trace of the same primary rays by the same trace() in a shader
-// that writes the distance and nothing else; and what it leaves behind in a long run:
+// Compares rt_vulkan's time per image with a bare trace of the same primary rays, by a shader that calls the same
+// trace() and only writes distances; and measures leaks in a long run:
 //
 //   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]
 //
-// prints a JSON line for each path, and
+// prints a JSON line per path, and
 //
 //   rt-vulkan-bench run IMAGES EVERY SCENE.yaml…
 //
-// takes another scene every so many images; it exits 1 where a target is missed.
+// changes the scene every EVERY images, and exits 1 if a target is missed.
 #include "bunny.hpp"
 #include "long_run.hpp"
 #include "renderer.hpp"
+#include "spirv/pipeline.rgen.h"
+#include "spirv/plain.comp.h"
+#include "spirv/query.comp.h"
 
 #include <nlohmann/json.hpp>
 
@@ -32,10 +35,10 @@ arhost_camera camera_from(const double *eye_and_target, bool z_up, std::uint32_t
                         test::pinhole(width, height, f));
 }
 
-// Neighbours in space become neighbours in the list, along a curve of Morton's. Lavapipe seems to build its trees in
-// the triangles' order: by these the scan's own would take it seconds an image.
-void sort_in_space(scene::TriangleMesh &mesh) {
-    const auto place = [&](const auto &triangle) {
+// Sorts triangles along a Morton curve. Lavapipe seems to build acceleration structures in the order of triangles:
+// with the scan's order it takes seconds per image.
+void sort_along_morton_curve(scene::TriangleMesh &mesh) {
+    const auto morton_code = [&](const auto &triangle) {
         const glm::vec3 &p = mesh.positions[triangle[0]]; // within 128 mm of the origin
         std::uint32_t code = 0;
         for (int bit = 9; bit >= 0; --bit)
@@ -44,14 +47,14 @@ void sort_in_space(scene::TriangleMesh &mesh) {
         return code;
     };
     std::sort(mesh.triangles.begin(), mesh.triangles.end(),
-              [&](const auto &a, const auto &b) { return place(a) < place(b); });
+              [&](const auto &a, const auto &b) { return morton_code(a) < morton_code(b); });
 }
 
-// The unlit bunny: as nearly nothing but visibility as a scene can be (rt_embree_bench.cpp, `primary`).
+// The unlit bunny measures little but visibility (rt_embree_bench.cpp, `primary`).
 scene::Arena unlit_bunny() {
     auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);
     mesh.normals.clear();
-    sort_in_space(mesh);
+    sort_along_morton_curve(mesh);
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
     arhost_material grey = scene::make_material(ARHOST_MATERIAL_DIFFUSE);
@@ -71,7 +74,7 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
-// Pages, so that the device may write to them itself.
+// Page-aligned, so that the device can write to it directly.
 class ImageMemory {
 public:
     explicit ImageMemory(const arhost_intrinsics &in)
@@ -82,12 +85,12 @@ public:
         image_.rgba = bytes_.get();
     }
     const arhost_image &image() const { return image_; }
-    std::size_t count(const std::function<bool(std::uint32_t)> &is_meant) const {
+    std::size_t count(const std::function<bool(std::uint32_t)> &predicate) const {
         std::size_t found = 0;
         for (std::size_t i = 0; i < std::size_t{image_.width} * image_.height; ++i) {
             std::uint32_t pixel;
             std::memcpy(&pixel, image_.rgba + 4 * i, sizeof pixel);
-            found += is_meant(pixel);
+            found += predicate(pixel);
         }
         return found;
     }
@@ -97,23 +100,31 @@ private:
     std::unique_ptr<std::uint8_t, decltype(&std::free)> bytes_;
 };
 
-nlohmann::json measured(const rt_vulkan::Instance &instance, const rt_vulkan::PhysicalDevice &device,
-                        const arhost::Host &host, rt_vulkan::Path path, const scene::Arena &arena,
-                        const arhost_camera &view, int rounds) {
+// The plugin's shaders, with the bare trace in place of the image's.
+rt_vulkan::Shaders bare_shaders(rt_vulkan::Path path) {
+    rt_vulkan::Shaders shaders = rt_vulkan::shaders_of(path);
+    using Words = std::span<const std::uint32_t>;
+    shaders.stages[0].words = path == rt_vulkan::Path::plain   ? Words(plain_comp)
+                              : path == rt_vulkan::Path::query ? Words(query_comp)
+                                                               : Words(pipeline_rgen);
+    return shaders;
+}
+
+nlohmann::json measured(const rt_vulkan::PhysicalDevice &device, const arhost::Host &host, rt_vulkan::Path path,
+                        const scene::Arena &arena, const arhost_camera &view, int rounds) {
     const arhost_scene &scene = arena.scene();
     const arhost_raytracer_setup setup{sizeof setup, view.intrinsics.width, view.intrinsics.height, 0,
                                        &scene,       &view.intrinsics};
-    const auto started = [&](const char *shaders) {
-        return std::make_unique<rt_vulkan::Renderer>(setup, rt_vulkan::Settings{}, host, instance, device,
-                                                     rt_vulkan::read_shaders(shaders, path));
-    };
-    const auto plugin = started(ARHOST_PLUGIN_DIRECTORY), bare = started(ARHOST_BARE_SHADERS);
+    const auto plugin = std::make_unique<rt_vulkan::Renderer>(setup, rt_vulkan::Settings{}, host, device,
+                                                              rt_vulkan::shaders_of(path));
+    const auto bare =
+        std::make_unique<rt_vulkan::Renderer>(setup, rt_vulkan::Settings{}, host, device, bare_shaders(path));
 
     scene::MotionEvaluator evaluator(scene);
     const arhost_motion motion = evaluator.at(0);
     const arhost_motion *moving = scene.duration_s > 0 ? &motion : nullptr;
     const ImageMemory picture(view.intrinsics), distances(view.intrinsics);
-    plugin->render(view, picture.image(), moving); // to warm up
+    plugin->render(view, picture.image(), moving); // warm-up
     bare->render(view, distances.image(), moving);
     const std::size_t drawn = picture.count([](std::uint32_t pixel) { return pixel >> 24 == 255; });
     const std::size_t hit = distances.count([](std::uint32_t bits) { return bits < 0x7f800000; });
@@ -142,17 +153,17 @@ nlohmann::json measured(const rt_vulkan::Instance &instance, const rt_vulkan::Ph
 }
 
 int trace(const std::vector<std::string> &words) {
-    const std::string &what = words[1];
+    const std::string &scene_name = words[1];
     const auto width = static_cast<std::uint32_t>(std::stoul(words[2])),
                height = static_cast<std::uint32_t>(std::stoul(words[3]));
-    const bool is_bunny = what == "bunny";
+    const bool is_bunny = scene_name == "bunny";
     double from[6] = {0, 50, 170, 0, 50, 169};
     for (std::size_t i = 0; i < 6 && words.size() == 12; ++i)
         from[i] = std::stod(words[6 + i]);
-    scene::LoadCallbacks callbacks; // gpu.py reads there which mesh it was
+    scene::LoadCallbacks callbacks; // gpu.py reads from stderr which mesh was loaded
     callbacks.info = callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
     const scene::Arena arena =
-        is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(what), callbacks).build();
+        is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(scene_name), callbacks).build();
 
     const arhost_host printing = bench::printing_host("rt-vulkan-bench");
     const arhost::Host host(&printing);
@@ -163,7 +174,7 @@ int trace(const std::vector<std::string> &words) {
         words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_paths(device, words[5])[0]};
     for (const rt_vulkan::Path path : paths) {
         nlohmann::json line =
-            measured(instance, device, host, path, arena,
+            measured(device, host, path, arena,
                      camera_from(from, arena.scene().axes == ARHOST_AXES_Z_UP && !is_bunny, width, height),
                      std::stoi(words[4]));
         line["device"] = device.name;
@@ -174,30 +185,30 @@ int trace(const std::vector<std::string> &words) {
     return 0;
 }
 
-// Without the validation layers, which take memory of their own, and with them.
+// Once without the validation layers, whose own memory would count, and once with them.
 int run(const std::vector<std::string> &words) {
     constexpr double max_growth_mib = 2;
     const int images = std::stoi(words[1]), every = std::stoi(words[2]);
     const std::vector<std::filesystem::path> scenes(words.begin() + 3, words.end());
     bool has_missed = false;
-    const auto judged = [&](bool is_met) {
+    const auto verdict = [&](bool is_met) {
         has_missed |= !is_met;
         return is_met ? "" : ", MISSED";
     };
-    std::printf("%d images, another of %zu scenes every %d\n", images, scenes.size(), every);
+    std::printf("%d images, with a change between %zu scenes every %d\n", images, scenes.size(), every);
     const test::LongRun plain = test::long_run(scenes, images / every, every, {});
-    // In the first half caches fill.
+    // Caches fill in the first half.
     const test::LongRun::State &middle = plain.states[plain.states.size() / 2], &last = plain.states.back();
     const double growth_mib = last.memory_mib - middle.memory_mib;
     std::printf("  memory at half time and at the end  %.1f, %.1f MiB (target: %g MiB more at most%s)\n",
-                middle.memory_mib, last.memory_mib, max_growth_mib, judged(growth_mib <= max_growth_mib));
-    std::printf("  descriptors                         %td, %td (target: no more%s)\n", middle.files, last.files,
-                judged(last.files <= middle.files));
+                middle.memory_mib, last.memory_mib, max_growth_mib, verdict(growth_mib <= max_growth_mib));
+    std::printf("  file descriptors                    %td, %td (target: no more%s)\n", middle.files, last.files,
+                verdict(last.files <= middle.files));
     std::fflush(stdout);
     const test::LongRun validated = test::long_run(scenes, images / every, every, {{"validate", "true"}});
-    std::printf("  the validation layers' messages     %zu (target: none%s)\n", validated.messages(),
-                judged(validated.messages() == 0));
-    if (validated.messages())
+    std::printf("  validation messages                 %zu (target: none%s)\n", validated.validation_messages(),
+                verdict(validated.validation_messages() == 0));
+    if (validated.validation_messages())
         std::fprintf(stderr, "%s", validated.log.c_str());
     return has_missed;
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 bool is_identity(const float *world_from_object) {
     constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
@@ -16,18 +16,18 @@ Cofactors::Cofactors(const float *m) {
         const float *a = m + (column + 1) % 3 * 3, *b = m + (column + 2) % 3 * 3;
         for (int row = 0; row < 3; ++row) {
             const int i = (row + 1) % 3, j = (row + 2) % 3;
-            of[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
+            values[3 * column + row] = double{a[i]} * b[j] - double{a[j]} * b[i];
         }
     }
-    determinant = m[0] * of[0] + m[1] * of[1] + m[2] * of[2];
+    determinant = m[0] * values[0] + m[1] * values[1] + m[2] * values[2];
 }
 
-void Cofactors::put_normal_transform(float *to) const {
+void Cofactors::write_normal_transform(float *to) const {
     double largest = 0;
-    for (const double value : of)
+    for (const double value : values)
         largest = std::max(largest, std::abs(value));
-    for (const double value : of)
+    for (const double value : values)
         *to++ = static_cast<float>(value / (determinant < 0 ? -largest : largest));
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How ray tracers read a scene's arena (arhost/scene.h).
+// Access to a scene's arena (arhost/scene.h).
 #pragma once
 
 #include <arhost/scene.h>
@@ -11,22 +11,22 @@
 #include <cstdint>
 #include <span>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
 inline const std::byte *bytes(const arhost_scene &arena) {
     return reinterpret_cast<const std::byte *>(&arena);
 }
 
-// Of a buffer whose elements are T.
+// A buffer of T.
 template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
     return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
 }
 
-// Of a transform's 12 numbers, column by column.
+// `world_from_object`: a 3×4 transform, column by column, here and below.
 bool is_identity(const float *world_from_object);
 
-// How far an object goes from its own origin, where its box there is low to high; turned into the world, mm along
-// each of its axes. How far a transform moves it is counted as a part of the rays' way (offset_from_surface).
+// The largest distance of an object's points from its origin, along each world axis, in mm; `low` and `high` are its
+// box in object space. Excludes the translation, which offset_from_surface() counts as part of the ray.
 template <class Number>
 void object_extent(const Number (&low)[3], const Number (&high)[3], const float *world_from_object, float (&to)[3]) {
     for (int row = 0; row < 3; ++row) {
@@ -37,16 +37,16 @@ void object_extent(const Number (&low)[3], const Number (&high)[3], const float 
     }
 }
 
-// What brings normals to the world and points back from there, of a transform's first 9 numbers. The inverse is
-// cofactor[row][column] / determinant, read by columns.
+// The cofactors of a transform's 3×3 part, for its inverse and normal transform. The inverse is
+// cofactor[row][column] / determinant, transposed.
 struct Cofactors {
-    double of[9]; // column by column
+    double values[9]; // column by column
     double determinant;
 
     explicit Cofactors(const float *world_from_object);
-    // Normals get their length later, so that of the inverse transposed only the determinant's sign counts: it keeps
-    // a mirrored object's outside outside. Column by column; the largest number is 1.
-    void put_normal_transform(float *to) const;
+    // The inverse transpose, scaled so that its largest element is 1 (normals are normalized later). The
+    // determinant's sign keeps a mirrored object's normals pointing outwards. Column by column.
+    void write_normal_transform(float *to) const;
 };
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 double radical_inverse_2(std::uint32_t i) {
@@ -23,11 +23,11 @@ std::vector<Sample> sample_positions(std::uint32_t count) {
               [](std::uint32_t a, std::uint32_t b) { return radical_inverse_2(a) < radical_inverse_2(b); });
     std::vector<Sample> samples;
     samples.reserve(count);
-    const auto place = [size = static_cast<float>(count)](std::uint32_t i) {
+    const auto offset = [size = static_cast<float>(count)](std::uint32_t i) {
         return (static_cast<float>(i) + 0.5f) / size - 0.5f;
     };
     for (std::uint32_t row = 0; row < count; ++row)
-        samples.push_back({place(columns[row]), place(row)});
+        samples.push_back({offset(columns[row]), offset(row)});
     return samples;
 }
 
@@ -35,12 +35,12 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
     std::vector<Sample> samples;
     samples.reserve(count);
     for (std::uint32_t i = first; i != first + count; ++i) {
-        const auto place = [i](std::uint32_t step) { // of turns of 2³², about 0
+        const auto offset = [i](std::uint32_t step) { // i · step / 2³² mod 1, centred at 0
             return static_cast<float>(static_cast<std::int32_t>(i * step)) * 0x1p-32f;
         };
-        samples.push_back({place(3242174889u), place(2447445414u)});
+        samples.push_back({offset(3242174889u), offset(2447445414u)});
     }
     return samples;
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where in a pixel rays go through: the same in every pixel, and in every ray tracer of arhost.
+// Sample positions in a pixel: the same for every pixel and in all of arhost's ray tracers.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
-// From the pixel's centre: −½ to ½.
+// Offsets from the pixel's centre, in px: −½ to ½.
 struct Sample {
     float x, y;
 };
 
-// One in each of `count` rows and columns of the pixel (N-rooks), the columns in the order of the base-2 radical
-// inverse, so that samples spread evenly; a single one lies at the centre.
+// N-rooks sampling: one sample in each of `count` rows and columns of the pixel, with the columns in the order of the
+// base-2 radical inverse. A single sample is at the centre.
 std::vector<Sample> sample_positions(std::uint32_t count);
 
-// `count` of a sequence without end that is even over the pixel however far it goes, from its number `first`; number
-// 0 lies at the centre (R2: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
+// `count` samples of an infinite low-discrepancy sequence, from index `first`; index 0 is at the centre (R2: M.
+// Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count);
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
 using Vec3d = shading::Vec3T<double>;
@@ -25,11 +25,11 @@ void check_setup(const arhost_raytracer_setup &setup) {
     const arhost_intrinsics &in = *setup.intrinsics;
     if (setup.width < 1 || setup.height < 1 || setup.width > ARHOST_MAX_IMAGE_SIDE ||
         setup.height > ARHOST_MAX_IMAGE_SIDE)
-        refuse("the image's size is not 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
+        refuse("the image's width and height must be 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px");
     if (in.width != setup.width || in.height != setup.height)
-        refuse("the intrinsics belong to an image of another size than the one to make");
+        refuse("the intrinsics are for another image size");
     if (!all_finite({&in.fx, 4}) || !(in.fx > 0) || !(in.fy > 0))
-        refuse("the intrinsics' focal lengths are not above 0, or not finite");
+        refuse("the intrinsics' focal lengths must be finite and above 0");
     const std::uint32_t count = in.coefficient_count;
     const bool fits = in.distortion == ARHOST_DISTORTION_NONE ? count == 0
                       : in.distortion == ARHOST_DISTORTION_BROWN
@@ -37,9 +37,9 @@ void check_setup(const arhost_raytracer_setup &setup) {
                       : in.distortion == ARHOST_DISTORTION_FISHEYE ? count == 4
                                                                    : false;
     if (!fits || !all_finite({in.coefficients, count}))
-        refuse("the distortion's model, or the count or values of its coefficients, are not valid");
+        refuse("the distortion model, or the number or values of its coefficients, is invalid");
     if (setup.scene->magic != ARHOST_SCENE_MAGIC || setup.scene->version != ARHOST_SCENE_VERSION)
-        refuse("the scene is not an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
+        refuse("the scene must be an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
 }
 
 bool same_view(const arhost_camera &a, const arhost_camera &b) {
@@ -58,15 +58,15 @@ bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
 Pose::Pose(const arhost_camera &camera) {
     if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
         refuse("the camera's eye, look_at or up is not finite");
-    constexpr double limit_mm = 1e12; // rays from far beyond leave the range of floats, or of Embree
+    constexpr double limit_mm = 1e12; // farther rays exceed the range of float, or of Embree
     if (std::any_of(camera.eye, camera.eye + 3, [](double number) { return std::abs(number) > limit_mm; }))
-        refuse("the camera's eye lies beyond 1e12 mm");
+        refuse("the camera's eye is beyond 1e12 mm");
     eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
     const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
     const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};
     const Vec3d u = cross(up, w);
     if (!(length(w) > 0))
-        refuse("the camera's look_at is its eye");
+        refuse("the camera's look_at equals its eye");
     if (!(length(u) > 1e-9 * length(up) * length(w)))
         refuse("the camera's up is parallel to its view direction");
     forward = w * (-1 / length(w));
@@ -74,4 +74,4 @@ Pose::Pose(const arhost_camera &camera) {
     down = cross(forward, right);
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -1,31 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What all ray tracers of arhost ask of a setup and a camera, and the camera's axes in the world. What is refused is
-// thrown as arhost::Failure of ARHOST_STATUS_ERROR_INVALID_ARGUMENT.
+// Validation of setups and cameras, and the camera's axes in the world. Invalid input throws arhost::Failure with
+// ARHOST_STATUS_ERROR_INVALID_ARGUMENT.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/shading/lens.hpp>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 
-// Refuses a setup whose images can't be made.
 void check_setup(const arhost_raytracer_setup &setup);
 
 bool same(const arhost_intrinsics &a, const arhost_intrinsics &b);
 bool same_view(const arhost_camera &a, const arhost_camera &b); // eye, look_at and up
 
-// The camera's axes in the world: x right, y down, z forward, each of length 1; the eye in mm.
+// The camera's axes in the world, as unit vectors: x right, y down, z forward; the eye in mm.
 struct Pose {
     shading::Vec3T<double> eye, right, down, forward;
 
     explicit Pose(const arhost_camera &camera);
 };
 
-inline void put(const shading::Vec3T<double> &from, float *to) {
+inline void write(const shading::Vec3T<double> &from, float *to) {
     to[0] = static_cast<float>(from.x);
     to[1] = static_cast<float>(from.y);
     to[2] = static_cast<float>(from.z);
 }
 
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

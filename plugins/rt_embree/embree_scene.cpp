@@ -16,10 +16,10 @@ namespace rt_embree {
 namespace {
 
 using arhost::Failure;
-using arhost::view::bytes;
-using arhost::view::elements;
-using arhost::view::is_identity;
-using arhost::view::object_extent;
+using arhost::raytracer_common::bytes;
+using arhost::raytracer_common::elements;
+using arhost::raytracer_common::is_identity;
+using arhost::raytracer_common::object_extent;
 
 unsigned mask_of(const Object &object) {
     return object.role == ARHOST_ROLE_CATCHER                ? catcher_mask
@@ -30,7 +30,7 @@ unsigned mask_of(const Object &object) {
 
 void set_transform(Object &object, const float *m) {
     std::copy_n(m, 9, object.transform);
-    arhost::view::Cofactors(m).put_normal_transform(object.normal_transform);
+    arhost::raytracer_common::Cofactors(m).write_normal_transform(object.normal_transform);
 }
 
 Object make_object(const arhost_scene &arena, const arhost_object &from) {

@@ -95,7 +95,7 @@ struct Frame {
     Scene scene;
     Rays rays;
     Camera camera;
-    const arhost::view::Sample *samples;
+    const arhost::raytracer_common::Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // samples accumulated before this frame: offset into the random sequences
     float *history[4];          // NULL, or their sums for the pixels of all tiles (as Scratch::sum)

@@ -16,7 +16,7 @@ namespace rt_embree {
 namespace {
 
 using arhost::Failure;
-using arhost::view::Pose, arhost::view::same, arhost::view::same_view;
+using arhost::raytracer_common::Pose, arhost::raytracer_common::same, arhost::raytracer_common::same_view;
 using Vec3d = arhost::shading::Vec3T<double>;
 
 [[noreturn]] void refuse(const std::string &message) {
@@ -54,10 +54,10 @@ constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
-    arhost::view::put(pose.eye, camera.eye);
-    arhost::view::put(pose.right, camera.world_from_camera);
-    arhost::view::put(pose.down, camera.world_from_camera + 3);
-    arhost::view::put(pose.forward, camera.world_from_camera + 6);
+    arhost::raytracer_common::write(pose.eye, camera.eye);
+    arhost::raytracer_common::write(pose.right, camera.world_from_camera);
+    arhost::raytracer_common::write(pose.down, camera.world_from_camera + 3);
+    arhost::raytracer_common::write(pose.forward, camera.world_from_camera + 6);
     return camera;
 }
 
@@ -111,10 +111,10 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
 }
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
-    : host_(host), intrinsics_((arhost::view::check_setup(setup), *setup.intrinsics)),
+    : host_(host), intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
       kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
-      samples_per_frame_(settings.samples), samples_(arhost::view::sample_positions(settings.samples)),
+      samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       single_path_(settings.single_path) {
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
@@ -142,7 +142,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         if (motion || !history_camera_ || !same_view(*history_camera_, camera))
             history_samples_ = 0;
         history_camera_ = camera;
-        samples_ = arhost::view::sample_positions(
+        samples_ = arhost::raytracer_common::sample_positions(
             history_samples_, history_samples_ < max_accumulated_samples ? samples_per_frame_ : 0);
         for (std::size_t i = 0; i < 4; ++i)
             history[i] = history_.data() + i * (history_.size() / 4);

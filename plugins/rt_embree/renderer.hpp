@@ -56,7 +56,7 @@ private:
     ThreadPool threads_;
     RayTable ray_table_;
     std::uint32_t samples_per_frame_;
-    std::vector<arhost::view::Sample> samples_; // of this frame
+    std::vector<arhost::raytracer_common::Sample> samples_; // of this frame
     EmbreeScene scene_;
     std::vector<ScratchMemory> scratch_; // one per thread
     std::int32_t light_samples_;

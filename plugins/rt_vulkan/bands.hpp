@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How many of an image's rows the device is asked for at once. A driver's watchdog takes work of some seconds for a
-// hang, and nothing calls work back: what takes long is asked for in parts, by the time that the last part took.
+// The rows of an image per submission. A driver's watchdog takes seconds of GPU work for a hang, and submitted work
+// can't be cancelled: a slow image is split into bands of rows, whose height follows the last band's duration.
 #pragma once
 
 #include <chrono>
@@ -11,20 +11,20 @@ namespace rt_vulkan {
 
 class Bands {
 public:
-    static constexpr std::uint32_t unit = 8; // px; each band but an image's last has a multiple of this
+    static constexpr std::uint32_t unit = 8; // rows; bands have a multiple of this, except an image's last
     using Milliseconds = std::chrono::duration<double, std::milli>;
 
-    // No band is to take longer than `most`, nor less than half of that where an image does.
-    Bands(std::uint32_t image_rows, Milliseconds most) : image_rows_(image_rows), most_(most) {}
-    // Of the next band; where fewer are left, those.
+    // A band should take `max_time` at most, and at least half of it unless the whole image takes less.
+    Bands(std::uint32_t image_rows, Milliseconds max_time) : image_rows_(image_rows), max_time_(max_time) {}
+    // Of the next band; the image's last may have fewer.
     std::uint32_t rows() const { return rows_; }
-    // So long did so many rows take, with what came before and after them.
-    void took(std::uint32_t rows, Milliseconds time);
+    // Reports the time of a band of `rows`, including work submitted with it.
+    void record(std::uint32_t rows, Milliseconds time);
 
 private:
     std::uint32_t image_rows_;
-    Milliseconds most_;
-    std::uint32_t rows_ = unit; // of what has not been seen yet, the least
+    Milliseconds max_time_;
+    std::uint32_t rows_ = unit; // the first image starts with the minimum
 };
 
 } // namespace rt_vulkan

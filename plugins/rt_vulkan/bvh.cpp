@@ -11,15 +11,15 @@ namespace rt_vulkan {
 namespace {
 
 constexpr int bin_count = 16;
-constexpr float box_cost = 1; // of a step down, by that of a primitive
+constexpr float traversal_cost = 1; // of a node, relative to a primitive test
 
 float half_area(const Box &box) {
     const float x = box.high[0] - box.low[0], y = box.high[1] - box.low[1], z = box.high[2] - box.low[2];
     return x < 0 ? 0 : x * y + y * z + z * x;
 }
 
-// Twice the middle, which is all that sorting needs.
-float middle(const Box &box, int axis) {
+// Twice the centre: sorting and binning need no more.
+float centre(const Box &box, int axis) {
     return box.low[axis] + box.high[axis];
 }
 
@@ -32,62 +32,62 @@ class Builder {
 public:
     Builder(std::span<const Box> boxes, std::uint32_t max_leaf_size, const std::function<void()> &check_cancelled)
         : boxes_(boxes), max_leaf_size_(max_leaf_size), check_cancelled_(check_cancelled) {
-        tree_.order.resize(boxes.size());
-        std::iota(tree_.order.begin(), tree_.order.end(), 0u);
-        tree_.nodes.reserve(2 * boxes.size());
-        tree_.nodes.emplace_back();
+        bvh_.order.resize(boxes.size());
+        std::iota(bvh_.order.begin(), bvh_.order.end(), 0u);
+        bvh_.nodes.reserve(2 * boxes.size());
+        bvh_.nodes.emplace_back();
     }
 
-    Tree build(int max_depth) {
+    Bvh build(int max_depth) {
         struct Task {
             std::uint32_t node, first, count;
-            int depth; // levels that are left below
+            int depth; // levels allowed below
         };
         std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(boxes_.size()), max_depth}};
-        std::uint32_t since_look_up = 0;
+        std::uint32_t since_check = 0;
         while (!tasks.empty()) {
             const Task task = tasks.back();
             tasks.pop_back();
-            if ((since_look_up += task.count) > 1u << 20) {
+            if ((since_check += task.count) > 1u << 20) {
                 check_cancelled_();
-                since_look_up = 0;
+                since_check = 0;
             }
             Box box = empty_box();
             for (std::uint32_t i = 0; i < task.count; ++i)
-                include(box, boxes_[tree_.order[task.first + i]]);
+                include(box, boxes_[bvh_.order[task.first + i]]);
             const std::uint32_t left = split(task.first, task.count, task.depth, box);
-            Node &node = tree_.nodes[task.node];
+            Node &node = bvh_.nodes[task.node];
             std::copy_n(box.low, 3, node.low);
             std::copy_n(box.high, 3, node.high);
-            node.first = left ? static_cast<std::uint32_t>(tree_.nodes.size()) : task.first;
+            node.first = left ? static_cast<std::uint32_t>(bvh_.nodes.size()) : task.first;
             node.count = left ? 0 : task.count;
             if (!left)
                 continue;
             tasks.push_back({node.first, task.first, left, task.depth - 1});
             tasks.push_back({node.first + 1, task.first + left, task.count - left, task.depth - 1});
-            tree_.nodes.emplace_back();
-            tree_.nodes.emplace_back();
+            bvh_.nodes.emplace_back();
+            bvh_.nodes.emplace_back();
         }
-        return std::move(tree_);
+        return std::move(bvh_);
     }
 
 private:
-    // Orders what belongs to a node and returns how many go to the left; 0: the node is a leaf.
+    // Partitions a node's boxes and returns the size of the left part; 0: the node is a leaf.
     std::uint32_t split(std::uint32_t first, std::uint32_t count, int depth, const Box &box) {
         if (count <= 1)
             return 0;
-        const auto begin = tree_.order.begin() + first, end = begin + count;
-        Box middles = empty_box();
+        const auto begin = bvh_.order.begin() + first, end = begin + count;
+        Box centres = empty_box();
         for (auto i = begin; i != end; ++i) {
-            const float point[3] = {middle(boxes_[*i], 0), middle(boxes_[*i], 1), middle(boxes_[*i], 2)};
-            include(middles, point);
+            const float point[3] = {centre(boxes_[*i], 0), centre(boxes_[*i], 1), centre(boxes_[*i], 2)};
+            include(centres, point);
         }
-        // Halves, where other shares could make the tree too deep.
-        const bool must_halve = static_cast<int>(std::bit_width(count - 1)) >= depth;
+        // A median split if another could exceed the depth limit.
+        const bool needs_median = static_cast<int>(std::bit_width(count - 1)) >= depth;
         float best_cost = std::numeric_limits<float>::infinity();
         int best_axis = -1, best_bin = 0;
-        for (int axis = 0; axis < 3 && !must_halve; ++axis) {
-            const float low = middles.low[axis], extent = middles.high[axis] - low;
+        for (int axis = 0; axis < 3 && !needs_median; ++axis) {
+            const float low = centres.low[axis], extent = centres.high[axis] - low;
             if (!(extent > 0))
                 continue;
             std::array<Bin, bin_count> bins;
@@ -96,18 +96,18 @@ private:
                 include(bin.box, boxes_[*i]);
                 ++bin.count;
             }
-            std::array<float, bin_count> cost_of_left{};
+            std::array<float, bin_count> left_costs{};
             Bin left;
             for (int i = 0; i + 1 < bin_count; ++i) {
                 include(left.box, bins[i].box);
                 left.count += bins[i].count;
-                cost_of_left[i] = half_area(left.box) * static_cast<float>(left.count);
+                left_costs[i] = half_area(left.box) * static_cast<float>(left.count);
             }
             Bin right;
             for (int i = bin_count - 1; i > 0; --i) {
                 include(right.box, bins[i].box);
                 right.count += bins[i].count;
-                const float cost = cost_of_left[i - 1] + half_area(right.box) * static_cast<float>(right.count);
+                const float cost = left_costs[i - 1] + half_area(right.box) * static_cast<float>(right.count);
                 if (right.count < count && right.count > 0 && cost < best_cost) {
                     best_cost = cost;
                     best_axis = axis;
@@ -117,10 +117,10 @@ private:
         }
         const float area = half_area(box);
         if (count <= max_leaf_size_ &&
-            !(best_axis >= 0 && best_cost + box_cost * area < area * static_cast<float>(count)))
+            !(best_axis >= 0 && best_cost + traversal_cost * area < area * static_cast<float>(count)))
             return 0;
         if (best_axis >= 0) {
-            const float low = middles.low[best_axis], extent = middles.high[best_axis] - low;
+            const float low = centres.low[best_axis], extent = centres.high[best_axis] - low;
             const auto right = std::partition(begin, end, [&](std::uint32_t i) {
                 return bin_of(boxes_[i], best_axis, low, extent) < static_cast<std::size_t>(best_bin);
             });
@@ -128,23 +128,23 @@ private:
         }
         int longest = 0;
         for (int axis = 1; axis < 3; ++axis)
-            if (middles.high[axis] - middles.low[axis] > middles.high[longest] - middles.low[longest])
+            if (centres.high[axis] - centres.low[axis] > centres.high[longest] - centres.low[longest])
                 longest = axis;
         std::nth_element(begin, begin + count / 2, end, [&](std::uint32_t a, std::uint32_t b) {
-            return middle(boxes_[a], longest) < middle(boxes_[b], longest);
+            return centre(boxes_[a], longest) < centre(boxes_[b], longest);
         });
         return count / 2;
     }
 
     static std::size_t bin_of(const Box &box, int axis, float low, float extent) {
-        const float place = (middle(box, axis) - low) / extent * bin_count;
-        return std::min<std::size_t>(static_cast<std::size_t>(place), bin_count - 1);
+        const float position = (centre(box, axis) - low) / extent * bin_count;
+        return std::min<std::size_t>(static_cast<std::size_t>(position), bin_count - 1);
     }
 
     std::span<const Box> boxes_;
     std::uint32_t max_leaf_size_;
     const std::function<void()> &check_cancelled_;
-    Tree tree_;
+    Bvh bvh_;
 };
 
 } // namespace
@@ -166,37 +166,37 @@ void include(Box &box, const Box &other) {
     include(box, other.high);
 }
 
-Tree build_tree(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
-                const std::function<void()> &check_cancelled) {
+Bvh build_bvh(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
+              const std::function<void()> &check_cancelled) {
     return Builder(boxes, max_leaf_size, check_cancelled).build(max_depth);
 }
 
-void refit(Tree &tree, std::span<const Box> boxes) {
-    for (auto node = tree.nodes.rbegin(); node != tree.nodes.rend(); ++node) {
+void refit(Bvh &bvh, std::span<const Box> boxes) {
+    for (auto node = bvh.nodes.rbegin(); node != bvh.nodes.rend(); ++node) {
         Box box = empty_box();
         for (std::uint32_t i = 0; i < node->count; ++i)
-            include(box, boxes[tree.order[node->first + i]]);
+            include(box, boxes[bvh.order[node->first + i]]);
         if (node->count == 0)
             for (const std::uint32_t child : {node->first, node->first + 1}) {
-                include(box, tree.nodes[child].low);
-                include(box, tree.nodes[child].high);
+                include(box, bvh.nodes[child].low);
+                include(box, bvh.nodes[child].high);
             }
         std::copy_n(box.low, 3, node->low);
         std::copy_n(box.high, 3, node->high);
     }
 }
 
-double relative_area(const Tree &tree) {
+double sah_cost(const Bvh &bvh) {
     double sum = 0;
-    for (const Node &node : tree.nodes) {
+    for (const Node &node : bvh.nodes) {
         Box box;
         std::copy_n(node.low, 3, box.low);
         std::copy_n(node.high, 3, box.high);
         sum += half_area(box);
     }
     Box root;
-    std::copy_n(tree.nodes[0].low, 3, root.low);
-    std::copy_n(tree.nodes[0].high, 3, root.high);
+    std::copy_n(bvh.nodes[0].low, 3, root.low);
+    std::copy_n(bvh.nodes[0].high, 3, root.high);
     return half_area(root) > 0 ? sum / half_area(root) : 1;
 }
 

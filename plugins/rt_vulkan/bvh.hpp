@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Trees of boxes for the plain path.
+// Bounding volume hierarchies for the plain path.
 #pragma once
 
 #include "layout.hpp"
@@ -18,24 +18,24 @@ Box empty_box();
 void include(Box &box, const Box &other);
 void include(Box &box, const float *point);
 
-// Children have higher numbers than their parents. Numbers count from the tree's own first node and first primitive.
-struct Tree {
-    std::vector<Node> nodes;          // at most twice as many as boxes
+// Indices are relative to the BVH's first node and first primitive. Children come after their parents.
+struct Bvh {
+    std::vector<Node> nodes;          // at most twice the number of boxes
     std::vector<std::uint32_t> order; // of the boxes, leaf by leaf
 };
 
-// Bounds on a tree's depth, which together fit the shader's stack (trace_plain.glsl).
-inline constexpr int top_depth = 22, object_depth = 40;
+// Depth limits; their sum fits the shader's stack (trace_plain.glsl).
+inline constexpr int max_top_depth = 22, max_mesh_depth = 40;
 
-// By binned surface area (I. Wald, On fast Construction of SAH-based Bounding Volume Hierarchies, 2007). `boxes` is
-// not empty. Calls `check_cancelled` now and then, which may throw.
-Tree build_tree(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
-                const std::function<void()> &check_cancelled);
+// Binned SAH (I. Wald, On fast Construction of SAH-based Bounding Volume Hierarchies, 2007). `boxes` must not be
+// empty. Calls `check_cancelled` regularly, which may throw.
+Bvh build_bvh(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
+              const std::function<void()> &check_cancelled);
 
-// Brings the nodes round boxes that have moved, without a change of their shape.
-void refit(Tree &tree, std::span<const Box> boxes);
+// Fits the nodes to moved boxes; the topology stays.
+void refit(Bvh &bvh, std::span<const Box> boxes);
 
-// The area of all nodes by the root's: what rays pay for them.
-double relative_area(const Tree &tree);
+// SAH cost: the area of all nodes relative to the root's.
+double sah_cost(const Bvh &bvh);
 
 } // namespace rt_vulkan

@@ -11,12 +11,9 @@ using arhost::Failure;
 
 constexpr VkMemoryPropertyFlags mappable = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
-// Of the first of `types` that has so much left: what is both the device's own and mapped can be little.
+// Tries `types` in order: memory that is both device-local and mappable can be scarce.
 Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::uint32_t> types, const void *next) {
-    VkMemoryAllocateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-    info.pNext = next;
-    info.allocationSize = size;
+    VkMemoryAllocateInfo info{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, .pNext = next, .allocationSize = size};
     VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
     VkDeviceMemory memory = VK_NULL_HANDLE;
     for (std::size_t i = 0; i < types.size() && result == VK_ERROR_OUT_OF_DEVICE_MEMORY; ++i) {
@@ -29,68 +26,41 @@ Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::u
 
 } // namespace
 
-Device::Device(const Instance &instance, const PhysicalDevice &physical, Path path) : physical_(physical) {
-    const InstanceFunctions &from = instance.functions();
-    from.vkGetPhysicalDeviceMemoryProperties(physical.handle, &memory_);
+Device::Device(const PhysicalDevice &physical, Path path) : physical_(physical) {
+    vkGetPhysicalDeviceMemoryProperties(physical.handle, &memory_);
     const float priority = 1;
-    VkDeviceQueueCreateInfo queue{};
-    queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
-    queue.queueFamilyIndex = physical.queue_family;
-    queue.queueCount = 1;
-    queue.pQueuePriorities = &priority;
+    const VkDeviceQueueCreateInfo queue{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                        .queueFamilyIndex = physical.queue_family,
+                                        .queueCount = 1,
+                                        .pQueuePriorities = &priority};
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipeline{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR, .rayTracingPipeline = VK_TRUE};
+    VkPhysicalDeviceRayQueryFeaturesKHR query{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR,
+                                              .rayQuery = VK_TRUE};
+    VkPhysicalDeviceAccelerationStructureFeaturesKHR structures{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR,
+        .pNext = path == Path::query ? static_cast<void *>(&query) : &pipeline,
+        .accelerationStructure = VK_TRUE};
+    const VkPhysicalDeviceBufferDeviceAddressFeatures addresses{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES,
+        .pNext = &structures,
+        .bufferDeviceAddress = VK_TRUE};
     std::vector<const char *> extensions;
     if (physical.imports_host_memory)
         extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
-    VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipeline{};
-    pipeline.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR;
-    pipeline.rayTracingPipeline = VK_TRUE;
-    VkPhysicalDeviceRayQueryFeaturesKHR query{};
-    query.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR;
-    query.rayQuery = VK_TRUE;
-    VkPhysicalDeviceAccelerationStructureFeaturesKHR trees{};
-    trees.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR;
-    trees.accelerationStructure = VK_TRUE;
-    VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
-    addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
-    addresses.pNext = &trees;
-    addresses.bufferDeviceAddress = VK_TRUE;
-    VkDeviceCreateInfo info{};
-    if (path != Path::plain) {
-        extensions.push_back(VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME);
-        extensions.push_back(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME);
-        extensions.push_back(path == Path::query ? VK_KHR_RAY_QUERY_EXTENSION_NAME
-                                                 : VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME);
-        trees.pNext = path == Path::query ? static_cast<void *>(&query) : &pipeline;
-        info.pNext = &addresses;
-    }
-    info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queue;
-    info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
-    info.ppEnabledExtensionNames = extensions.data();
-    check(from.vkCreateDevice(physical.handle, &info, nullptr, &device_), "opening the Vulkan device");
-    const auto refuse = [&](const char *name) {
-        if (functions_.vkDestroyDevice)
-            functions_.vkDestroyDevice(device_, nullptr);
-        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                      "the driver of the Vulkan device '" + physical.name + "' lacks " + name + "; install it again");
-    };
-    const auto load = [&](const char *name) { return from.vkGetDeviceProcAddr(device_, name); };
-#define RT_VULKAN_LOAD(name)                                                                                         \
-    functions_.name = reinterpret_cast<PFN_##name>(load(#name));                                                     \
-    if (!functions_.name)                                                                                            \
-        refuse(#name);
-    RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_LOAD)
-    if (path != Path::plain) {
-        RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_LOAD)
-    }
-    if (path == Path::pipeline) {
-        RT_VULKAN_PIPELINE_FUNCTIONS(RT_VULKAN_LOAD)
-    }
-    if (physical.imports_host_memory) {
-        RT_VULKAN_LOAD(vkGetMemoryHostPointerPropertiesEXT)
-    }
-#undef RT_VULKAN_LOAD
+    if (path != Path::plain)
+        extensions.insert(
+            extensions.end(),
+            {VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME, VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+             path == Path::query ? VK_KHR_RAY_QUERY_EXTENSION_NAME : VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME});
+    const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                  .pNext = path == Path::plain ? nullptr : &addresses,
+                                  .queueCreateInfoCount = 1,
+                                  .pQueueCreateInfos = &queue,
+                                  .enabledExtensionCount = static_cast<std::uint32_t>(extensions.size()),
+                                  .ppEnabledExtensionNames = extensions.data()};
+    check(vkCreateDevice(physical.handle, &info, nullptr, &device_), "opening the Vulkan device");
+    volkLoadDeviceTable(&functions_, device_);
     functions_.vkGetDeviceQueue(device_, physical.queue_family, 0, &queue_);
 }
 
@@ -98,48 +68,43 @@ Device::~Device() {
     functions_.vkDestroyDevice(device_, nullptr);
 }
 
-std::vector<std::uint32_t> Device::memory_types(std::uint32_t allowed, VkMemoryPropertyFlags needed,
-                                                VkMemoryPropertyFlags wished) const {
+std::vector<std::uint32_t> Device::memory_types(std::uint32_t allowed, VkMemoryPropertyFlags required,
+                                                VkMemoryPropertyFlags preferred) const {
     std::vector<std::uint32_t> types;
-    for (const bool is_wished : {true, false})
+    for (const bool is_preferred : {true, false})
         for (std::uint32_t type = 0; type < memory_.memoryTypeCount; ++type) {
             const VkMemoryPropertyFlags flags = memory_.memoryTypes[type].propertyFlags;
-            if (allowed >> type & 1 && (flags & needed) == needed && ((flags & wished) == wished) == is_wished)
+            if (allowed >> type & 1 && (flags & required) == required &&
+                ((flags & preferred) == preferred) == is_preferred)
                 types.push_back(type);
         }
     return types;
 }
 
 Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place) : size_(size) {
-    VkBufferCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
-    info.size = size;
-    info.usage = usage;
-    const DeviceFunctions &vk = device.functions();
-    buffer_ = make<decltype(buffer_), VkBuffer>(device, vk.vkCreateBuffer, info, "making a GPU buffer");
-    VkMemoryRequirements needs;
-    vk.vkGetBufferMemoryRequirements(device.handle(), get(), &needs);
-    const VkMemoryPropertyFlags wished = place == Place::staging     ? 0
-                                         : place == Place::host_read ? VK_MEMORY_PROPERTY_HOST_CACHED_BIT
-                                                                     : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    // Of several the first has the fewest properties besides: to stage, none of the device's own.
+    const VolkDeviceTable &vk = device.functions();
+    const VkBufferCreateInfo info{.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = size, .usage = usage};
+    buffer_ = {device, vk.vkCreateBuffer, info, "creating a GPU buffer"};
+    VkMemoryRequirements requirements;
+    vk.vkGetBufferMemoryRequirements(device.handle(), get(), &requirements);
+    const VkMemoryPropertyFlags preferred = place == Place::staging     ? 0
+                                            : place == Place::host_read ? VK_MEMORY_PROPERTY_HOST_CACHED_BIT
+                                                                        : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+    // Drivers list types with fewer properties first, so staging does not take device-local memory.
     const std::vector<std::uint32_t> types =
-        device.memory_types(needs.memoryTypeBits, place == Place::device ? 0 : mappable, wished);
+        device.memory_types(requirements.memoryTypeBits, place == Place::device ? 0 : mappable, preferred);
     if (types.empty())
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
                                                            "' has no memory that the host can write; choose another");
     const bool has_address = usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
-    VkMemoryAllocateFlagsInfo flags{};
-    flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
-    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
-    // What is to be the device's own would be slow elsewhere, and no one knew.
+    const VkMemoryAllocateFlagsInfo flags{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO,
+                                          .flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT};
+    // No fallback to host memory for device buffers: it would be slow without notice.
     const std::size_t tried = place == Place::device ? 1 : types.size();
-    memory_ = allocated(device, needs.size, std::span(types).first(tried), has_address ? &flags : nullptr);
+    memory_ = allocated(device, requirements.size, std::span(types).first(tried), has_address ? &flags : nullptr);
     check(vk.vkBindBufferMemory(device.handle(), get(), memory_.get(), 0), "binding GPU memory");
     if (has_address) {
-        VkBufferDeviceAddressInfo which{};
-        which.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO;
-        which.buffer = get();
+        const VkBufferDeviceAddressInfo which{.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, .buffer = get()};
         address_ = vk.vkGetBufferDeviceAddress(device.handle(), &which);
     }
     if (place != Place::device) {
@@ -150,45 +115,38 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
 }
 
 Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
-    constexpr auto kind = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
-    constexpr VkDeviceSize page = 4096; // of what is mapped behind the image (arhost/raytracer.h)
-    const DeviceFunctions &vk = device.functions();
-    const VkDeviceSize alignment = device.physical().import_alignment;
-    if (!vk.vkGetMemoryHostPointerPropertiesEXT || alignment > page ||
+    constexpr auto type = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
+    constexpr VkDeviceSize page = 4096; // images are mapped up to a page's end (arhost/raytracer.h)
+    const VolkDeviceTable &vk = device.functions();
+    if (!device.physical().imports_host_memory || device.physical().import_alignment > page ||
         reinterpret_cast<std::uintptr_t>(memory) % page)
         return {};
-    VkMemoryHostPointerPropertiesEXT properties{};
-    properties.sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT;
-    if (vk.vkGetMemoryHostPointerPropertiesEXT(device.handle(), kind, memory, &properties) != VK_SUCCESS)
+    VkMemoryHostPointerPropertiesEXT properties{.sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT};
+    if (vk.vkGetMemoryHostPointerPropertiesEXT(device.handle(), type, memory, &properties) != VK_SUCCESS)
         return {};
-    VkExternalMemoryBufferCreateInfo external{};
-    external.sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO;
-    external.handleTypes = kind;
-    VkBufferCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
-    info.pNext = &external;
-    info.size = (size + page - 1) / page * page;
-    info.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    const VkExternalMemoryBufferCreateInfo external{.sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+                                                    .handleTypes = type};
+    const VkBufferCreateInfo info{.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                  .pNext = &external,
+                                  .size = (size + page - 1) / page * page,
+                                  .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT};
     Buffer buffer;
     buffer.size_ = size;
-    buffer.buffer_ = make<decltype(buffer_), VkBuffer>(device, vk.vkCreateBuffer, info, "making a GPU buffer");
-    VkMemoryRequirements needs;
-    vk.vkGetBufferMemoryRequirements(device.handle(), buffer.get(), &needs);
-    const std::vector<std::uint32_t> types = device.memory_types(needs.memoryTypeBits & properties.memoryTypeBits,
-                                                                 mappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
-    if (types.empty() || needs.size > info.size)
+    buffer.buffer_ = {device, vk.vkCreateBuffer, info, "creating a GPU buffer"};
+    VkMemoryRequirements requirements;
+    vk.vkGetBufferMemoryRequirements(device.handle(), buffer.get(), &requirements);
+    const std::vector<std::uint32_t> types = device.memory_types(
+        requirements.memoryTypeBits & properties.memoryTypeBits, mappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+    if (types.empty() || requirements.size > info.size)
         return {};
-    VkImportMemoryHostPointerInfoEXT import{};
-    import.sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT;
-    import.handleType = kind;
-    import.pHostPointer = memory;
-    VkMemoryAllocateInfo allocation{};
-    allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-    allocation.pNext = &import;
-    allocation.allocationSize = info.size;
-    allocation.memoryTypeIndex = types[0];
+    const VkImportMemoryHostPointerInfoEXT import{
+        .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT, .handleType = type, .pHostPointer = memory};
+    const VkMemoryAllocateInfo allocation{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                          .pNext = &import,
+                                          .allocationSize = info.size,
+                                          .memoryTypeIndex = types[0]};
     VkDeviceMemory handle = VK_NULL_HANDLE;
-    // A driver may refuse memory of some kinds.
+    // A driver may refuse some kinds of memory.
     if (vk.vkAllocateMemory(device.handle(), &allocation, nullptr, &handle) != VK_SUCCESS)
         return {};
     buffer.memory_ = Memory(device, handle);
@@ -197,25 +155,22 @@ Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
 }
 
 Submission::Submission(const Device &device) : device_(device) {
-    VkCommandPoolCreateInfo pool{};
-    pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = device.physical().queue_family;
-    pool_ = make<CommandPool, VkCommandPool>(device, device.functions().vkCreateCommandPool, pool,
-                                             "making a pool of GPU commands");
-    VkFenceCreateInfo fence{};
-    fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-    fence_ = make<Fence, VkFence>(device, device.functions().vkCreateFence, fence, "making a fence");
+    const VkCommandPoolCreateInfo pool{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                       .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT,
+                                       .queueFamilyIndex = device.physical().queue_family};
+    pool_ = {device, device.functions().vkCreateCommandPool, pool, "creating a command pool"};
+    const VkFenceCreateInfo fence{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    fence_ = {device, device.functions().vkCreateFence, fence, "creating a fence"};
 }
 
 VkCommandBuffer Submission::new_commands() const {
-    VkCommandBufferAllocateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    info.commandPool = pool_.get();
-    info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    info.commandBufferCount = 1;
+    const VkCommandBufferAllocateInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                                           .commandPool = pool_.get(),
+                                           .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+                                           .commandBufferCount = 1};
     VkCommandBuffer commands = VK_NULL_HANDLE;
-    check(device_.functions().vkAllocateCommandBuffers(device_.handle(), &info, &commands), "making GPU commands");
+    check(device_.functions().vkAllocateCommandBuffers(device_.handle(), &info, &commands),
+          "allocating a command buffer");
     return commands;
 }
 
@@ -224,9 +179,7 @@ void Submission::free(VkCommandBuffer commands) const {
 }
 
 void Submission::begin(VkCommandBuffer commands, VkCommandBufferUsageFlags flags) const {
-    VkCommandBufferBeginInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    info.flags = flags;
+    const VkCommandBufferBeginInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, .flags = flags};
     check(device_.functions().vkBeginCommandBuffer(commands, &info), "recording GPU commands");
 }
 
@@ -235,38 +188,36 @@ void Submission::end(VkCommandBuffer commands) const {
 }
 
 void Submission::run(std::span<const VkCommandBuffer> commands) const {
-    const DeviceFunctions &vk = device_.functions();
+    const VolkDeviceTable &vk = device_.functions();
     const VkFence fence = fence_.get();
     check(vk.vkResetFences(device_.handle(), 1, &fence), "resetting a fence");
-    VkSubmitInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    info.commandBufferCount = static_cast<std::uint32_t>(commands.size());
-    info.pCommandBuffers = commands.data();
-    check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "starting the GPU's work");
-    const VkResult waited = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX);
-    if (waited != VK_SUCCESS)
-        vk.vkDeviceWaitIdle(device_.handle()); // what is under way makes use of what ends now
-    check(waited, "waiting for the GPU");
+    const VkSubmitInfo info{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+                            .commandBufferCount = static_cast<std::uint32_t>(commands.size()),
+                            .pCommandBuffers = commands.data()};
+    check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "submitting GPU commands");
+    const VkResult result = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX);
+    if (result != VK_SUCCESS)
+        vk.vkDeviceWaitIdle(device_.handle()); // the caller destroys objects that the commands may still use
+    check(result, "waiting for the GPU");
 }
 
-void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
+void barrier(const VolkDeviceTable &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
              VkPipelineStageFlags to, VkAccessFlags used) {
-    VkMemoryBarrier memory{};
-    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-    memory.srcAccessMask = written;
-    memory.dstAccessMask = used;
+    const VkMemoryBarrier memory{
+        .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER, .srcAccessMask = written, .dstAccessMask = used};
     vk.vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
 void upload(const Device &device, const Submission &submission, const Buffer &to,
             std::span<const std::span<const std::byte>> parts) {
-    constexpr std::size_t most = std::size_t{16} << 20;
+    constexpr std::size_t max_staging_size = std::size_t{16} << 20; // bytes
     std::size_t total = 0;
     for (const auto &part : parts)
         total += part.size();
     if (total == 0)
         return;
-    const Buffer staging(device, std::min(total, most), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
+    const Buffer staging(device, std::min(total, max_staging_size), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                         Buffer::Place::staging);
     const VkCommandBuffer commands = submission.new_commands();
     std::size_t filled = 0, written = 0;
     const auto flush = [&] {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A logical device with one queue, and what is made of it: buffers and the other handles that end themselves.
+// A logical device with one queue, and RAII wrappers of its handles: buffers with memory, commands, and the rest.
 #pragma once
 
 #include "instance.hpp"
@@ -11,79 +11,48 @@
 
 namespace rt_vulkan {
 
-// clang-format off
-#define RT_VULKAN_DEVICE_FUNCTIONS(use) \
-    use(vkDestroyDevice) use(vkGetDeviceQueue) use(vkDeviceWaitIdle) use(vkQueueSubmit) use(vkCreateBuffer) \
-    use(vkDestroyBuffer) use(vkGetBufferMemoryRequirements) use(vkAllocateMemory) use(vkFreeMemory) \
-    use(vkBindBufferMemory) use(vkMapMemory) use(vkCreateDescriptorSetLayout) \
-    use(vkDestroyDescriptorSetLayout) use(vkCreateDescriptorPool) use(vkDestroyDescriptorPool) \
-    use(vkAllocateDescriptorSets) use(vkUpdateDescriptorSets) use(vkCreatePipelineLayout) \
-    use(vkDestroyPipelineLayout) use(vkCreateShaderModule) use(vkDestroyShaderModule) \
-    use(vkCreatePipelineCache) use(vkDestroyPipelineCache) use(vkGetPipelineCacheData) \
-    use(vkCreateComputePipelines) use(vkDestroyPipeline) use(vkCreateCommandPool) use(vkDestroyCommandPool) \
-    use(vkAllocateCommandBuffers) use(vkFreeCommandBuffers) use(vkBeginCommandBuffer) \
-    use(vkEndCommandBuffer) use(vkCmdBindPipeline) use(vkCmdBindDescriptorSets) use(vkCmdDispatch) \
-    use(vkCmdPushConstants) use(vkCmdCopyBuffer) use(vkCmdUpdateBuffer) use(vkCmdPipelineBarrier) \
-    use(vkCmdResetQueryPool) use(vkCmdWriteTimestamp) use(vkCreateQueryPool) use(vkDestroyQueryPool) \
-    use(vkGetQueryPoolResults) use(vkCreateFence) use(vkDestroyFence) use(vkWaitForFences) \
-    use(vkResetFences)
-
-// Of the paths by the device's own trees; NULL on the plain one.
-#define RT_VULKAN_TRACING_FUNCTIONS(use) \
-    use(vkGetBufferDeviceAddress) use(vkCreateAccelerationStructureKHR) \
-    use(vkDestroyAccelerationStructureKHR) use(vkGetAccelerationStructureBuildSizesKHR) \
-    use(vkGetAccelerationStructureDeviceAddressKHR) use(vkCmdBuildAccelerationStructuresKHR) \
-    use(vkCmdCopyAccelerationStructureKHR) use(vkCmdWriteAccelerationStructuresPropertiesKHR)
-
-// Of the pipeline path; NULL on the others.
-#define RT_VULKAN_PIPELINE_FUNCTIONS(use) \
-    use(vkCreateRayTracingPipelinesKHR) use(vkGetRayTracingShaderGroupHandlesKHR) use(vkCmdTraceRaysKHR)
-// clang-format on
-
-struct DeviceFunctions {
-    RT_VULKAN_DEVICE_FUNCTIONS(RT_VULKAN_DECLARE)
-    RT_VULKAN_TRACING_FUNCTIONS(RT_VULKAN_DECLARE)
-    RT_VULKAN_PIPELINE_FUNCTIONS(RT_VULKAN_DECLARE)
-    PFN_vkGetMemoryHostPointerPropertiesEXT vkGetMemoryHostPointerPropertiesEXT; // NULL: it can't import
-};
-
 class Device {
 public:
-    // With what `path` needs.
-    Device(const Instance &instance, const PhysicalDevice &physical, Path path = Path::plain);
+    // Enables the extensions that `path` needs. The Instance of `physical` outlives this.
+    explicit Device(const PhysicalDevice &physical, Path path = Path::plain);
     ~Device();
     Device(const Device &) = delete;
     Device &operator=(const Device &) = delete;
 
     VkDevice handle() const { return device_; }
     VkQueue queue() const { return queue_; }
-    const DeviceFunctions &functions() const { return functions_; }
+    const VolkDeviceTable &functions() const { return functions_; }
     const PhysicalDevice &physical() const { return physical_; }
-    // Those in `allowed` that have all of `needed`, first those that have `wished`, too.
-    std::vector<std::uint32_t> memory_types(std::uint32_t allowed, VkMemoryPropertyFlags needed,
-                                            VkMemoryPropertyFlags wished) const;
+    // The types in `allowed` with all of `required`; those that also have `preferred` come first.
+    std::vector<std::uint32_t> memory_types(std::uint32_t allowed, VkMemoryPropertyFlags required,
+                                            VkMemoryPropertyFlags preferred) const;
 
 private:
     PhysicalDevice physical_;
     VkPhysicalDeviceMemoryProperties memory_{};
     VkDevice device_ = VK_NULL_HANDLE;
     VkQueue queue_ = VK_NULL_HANDLE;
-    DeviceFunctions functions_{};
+    VolkDeviceTable functions_{};
 };
 
-// A handle that `Destroy` ends with the device.
-template <class Handle, auto destroy> class Owned {
+// Owns a handle of a device, which outlives it; `destroy` is the member of VolkDeviceTable that destroys it.
+template <class Handle, auto destroy> class Unique {
 public:
-    Owned() = default;
-    Owned(const Device &device, Handle handle) : device_(&device), handle_(handle) {}
-    Owned(Owned &&other) noexcept
+    Unique() = default;
+    Unique(const Device &device, Handle handle) : device_(&device), handle_(handle) {}
+    // Calls `create`, a vkCreate… function; `what` names the operation in error messages.
+    template <class Create, class Info>
+    Unique(const Device &device, Create create, const Info &info, const char *what) : device_(&device) {
+        check(create(device.handle(), &info, nullptr, &handle_), what);
+    }
+    Unique(Unique &&other) noexcept
         : device_(other.device_), handle_(std::exchange(other.handle_, Handle{VK_NULL_HANDLE})) {}
-    Owned &operator=(Owned &&other) noexcept {
+    Unique &operator=(Unique &&other) noexcept {
         std::swap(device_, other.device_);
         std::swap(handle_, other.handle_);
         return *this;
     }
-    ~Owned() {
+    ~Unique() {
         if (handle_)
             (device_->functions().*destroy)(device_->handle(), handle_, nullptr);
     }
@@ -94,27 +63,19 @@ private:
     Handle handle_ = VK_NULL_HANDLE;
 };
 
-using Memory = Owned<VkDeviceMemory, &DeviceFunctions::vkFreeMemory>;
-using Fence = Owned<VkFence, &DeviceFunctions::vkDestroyFence>;
-using QueryPool = Owned<VkQueryPool, &DeviceFunctions::vkDestroyQueryPool>;
-using CommandPool = Owned<VkCommandPool, &DeviceFunctions::vkDestroyCommandPool>;
-using DescriptorSetLayout = Owned<VkDescriptorSetLayout, &DeviceFunctions::vkDestroyDescriptorSetLayout>;
-using DescriptorPool = Owned<VkDescriptorPool, &DeviceFunctions::vkDestroyDescriptorPool>;
-using PipelineLayout = Owned<VkPipelineLayout, &DeviceFunctions::vkDestroyPipelineLayout>;
-using ShaderModule = Owned<VkShaderModule, &DeviceFunctions::vkDestroyShaderModule>;
-using PipelineCache = Owned<VkPipelineCache, &DeviceFunctions::vkDestroyPipelineCache>;
-using Pipeline = Owned<VkPipeline, &DeviceFunctions::vkDestroyPipeline>;
-using AccelerationStructure = Owned<VkAccelerationStructureKHR, &DeviceFunctions::vkDestroyAccelerationStructureKHR>;
+using Memory = Unique<VkDeviceMemory, &VolkDeviceTable::vkFreeMemory>;
+using Fence = Unique<VkFence, &VolkDeviceTable::vkDestroyFence>;
+using QueryPool = Unique<VkQueryPool, &VolkDeviceTable::vkDestroyQueryPool>;
+using CommandPool = Unique<VkCommandPool, &VolkDeviceTable::vkDestroyCommandPool>;
+using DescriptorSetLayout = Unique<VkDescriptorSetLayout, &VolkDeviceTable::vkDestroyDescriptorSetLayout>;
+using DescriptorPool = Unique<VkDescriptorPool, &VolkDeviceTable::vkDestroyDescriptorPool>;
+using PipelineLayout = Unique<VkPipelineLayout, &VolkDeviceTable::vkDestroyPipelineLayout>;
+using ShaderModule = Unique<VkShaderModule, &VolkDeviceTable::vkDestroyShaderModule>;
+using PipelineCache = Unique<VkPipelineCache, &VolkDeviceTable::vkDestroyPipelineCache>;
+using Pipeline = Unique<VkPipeline, &VolkDeviceTable::vkDestroyPipeline>;
+using AccelerationStructure = Unique<VkAccelerationStructureKHR, &VolkDeviceTable::vkDestroyAccelerationStructureKHR>;
 
-// Calls a vkCreate… and owns what it makes.
-template <class Owner, class Handle, class Create, class Info>
-Owner make(const Device &device, Create create, const Info &info, const char *what) {
-    Handle handle = VK_NULL_HANDLE;
-    check(create(device.handle(), &info, nullptr, &handle), what);
-    return Owner(device, handle);
-}
-
-// The next multiple of `alignment`, where there is such a demand.
+// The next multiple of `alignment`; 0: no alignment is required.
 inline VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
     return alignment ? (size + alignment - 1) / alignment * alignment : size;
 }
@@ -123,33 +84,33 @@ inline VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
 class Buffer {
 public:
     enum class Place {
-        device,       // fastest for the device
-        host_written, // mapped, for what the host writes and the device reads again and again
-        staging,      // mapped, for what the host writes and is copied from there
-        host_read     // mapped, for what the device writes and the host reads
+        device,       // fastest for the device, not mapped
+        host_written, // mapped; the host writes, the device reads repeatedly
+        staging,      // mapped; the host writes, the device copies from it
+        host_read     // mapped; the device writes, the host reads
     };
     Buffer() = default;
     Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place);
-    // Memory of the host's as a buffer to copy to; empty where the device does not take it.
+    // Host memory as a copy destination; empty if the device can't import it.
     static Buffer imported(const Device &device, void *memory, VkDeviceSize size);
 
     VkBuffer get() const { return buffer_.get(); }
     VkDeviceSize size() const { return size_; }
-    // For the device, of one that was made with VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
+    // Requires VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
     VkDeviceAddress address() const { return address_; }
     explicit operator bool() const { return memory_.get() != VK_NULL_HANDLE; }
     std::span<std::byte> mapped() const { return {mapped_, static_cast<std::size_t>(size_)}; }
 
 private:
-    // In this order: the buffer ends before its memory.
+    // In this order: the buffer is destroyed before its memory.
     Memory memory_;
-    Owned<VkBuffer, &DeviceFunctions::vkDestroyBuffer> buffer_;
+    Unique<VkBuffer, &VolkDeviceTable::vkDestroyBuffer> buffer_;
     VkDeviceSize size_ = 0; // bytes
     VkDeviceAddress address_ = 0;
     std::byte *mapped_ = nullptr;
 };
 
-// Records commands, runs them and waits for their end.
+// Records command buffers, submits them and waits for completion.
 class Submission {
 public:
     explicit Submission(const Device &device);
@@ -166,11 +127,11 @@ private:
     Fence fence_;
 };
 
-// What is written by one step is there for another.
-void barrier(const DeviceFunctions &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
+// Makes writes of stage `from` available to stage `to`.
+void barrier(const VolkDeviceTable &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
              VkPipelineStageFlags to, VkAccessFlags used);
 
-// Writes parts, one behind the other, to a device buffer by way of a small one that the host can write.
+// Writes `parts`, concatenated, to a device buffer via a staging buffer.
 void upload(const Device &device, const Submission &submission, const Buffer &to,
             std::span<const std::span<const std::byte>> parts);
 

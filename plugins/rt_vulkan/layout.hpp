@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the shaders read, as shaders/scene.glsl declares it: std430, the frame std140. Offsets count elements.
+// The shaders' buffers, as shaders/scene.glsl declares them: std430, the frame std140. Offsets count elements.
 #pragma once
 
 #include <arhost/scene.h>
@@ -16,9 +16,9 @@ struct Object {
     float object_from_world[4][4]; // columns
     float transform[3][4], normal_transform[3][4];
     std::uint32_t material, role, mask, flags;
-    std::uint32_t root; // of its tree of ours; where the device has its own, the mesh's first primitive
+    std::uint32_t root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
-    float reach[3], unused;
+    float extent[3], unused;
 };
 
 struct Material {
@@ -59,7 +59,7 @@ struct Light {
 };
 
 struct Texture {
-    std::uint32_t format, first_texel, wrap_u, wrap_v; // first_texel: in words
+    std::uint32_t format, first_texel, wrap_u, wrap_v; // first_texel: in 32-bit words
     std::int32_t width, height, unused[2];
 };
 
@@ -67,7 +67,7 @@ struct Node {
     float low[3];
     std::uint32_t first;
     float high[3];
-    std::uint32_t count; // 0: `first` and the one after it are nodes
+    std::uint32_t count; // of primitives or objects; 0: an inner node, whose children are `first` and the next
 };
 
 struct Primitive {
@@ -77,7 +77,7 @@ struct Primitive {
     float edge_2[3], unused_2;
 };
 
-inline constexpr std::uint32_t max_samples = 256; // a pixel and frame
+inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
 
 struct Frame {
     float eye[3];
@@ -117,13 +117,13 @@ enum Binding : std::uint32_t {
     history_binding,
     image_binding,
     drawn_binding,
-    binding_count,                // of buffers
-    trees_binding = binding_count // the device's own, on the paths that have them
+    binding_count,                    // of buffers
+    top_level_binding = binding_count // the acceleration structure, on hardware paths
 };
 
-// The shaders' specialization constants, by their numbers.
+// The shaders' specialization constants, in order of their ids.
 struct Specialization {
-    std::int32_t waiting_capacity;
+    std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
     std::uint32_t ray_dimensions, has_slopes, has_textures;
 };

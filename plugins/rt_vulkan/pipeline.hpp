@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shaders of a path, compiled by the driver for a scene, and the command that runs them for each pixel.
+// A path's compiled shaders, specialized for a scene, and the command that runs them for each pixel.
 #pragma once
 
 #include "device.hpp"
@@ -9,36 +9,34 @@
 
 namespace rt_vulkan {
 
-inline constexpr std::uint32_t group_side = 8; // of a compute shader's invocations
+inline constexpr std::uint32_t group_side = 8; // px; work groups of the compute shaders are square
 
-// Some of an image's rows, which a first one and their number tell.
+// A range of an image's rows.
 struct Rows {
     std::uint32_t first, count;
     bool operator==(const Rows &) const = default;
 };
-// The constants that are pushed with them (shaders/scene.glsl).
-inline constexpr std::uint32_t pushed_size = sizeof Rows::first;
+// The push constants of shaders/scene.glsl.
+inline constexpr std::uint32_t push_constants_size = sizeof Rows::first;
 
 class ImagePipeline {
 public:
-    // Compiles, which takes a while, unless the driver's result has been kept from an earlier time.
+    // Compiles for seconds, unless the pipeline cache has the driver's result.
     ImagePipeline(const Device &device, const Shaders &shaders, VkPipelineLayout layout,
                   const Specialization &constants);
 
     void record(VkCommandBuffer commands, VkDescriptorSet set, std::uint32_t width, Rows rows) const;
 
 private:
-    void compile(const Shaders &shaders, std::span<const VkPipelineShaderStageCreateInfo> stages,
-                 const PipelineCache &cache);
-    void make_table();
+    void compile(Path path, std::span<const VkPipelineShaderStageCreateInfo> stages, const PipelineCache &cache);
+    void make_binding_table();
 
     const Device &device_;
     VkPipelineLayout layout_;
     VkShaderStageFlags stage_flags_;
     Pipeline pipeline_;
-    // Of the pipeline for ray tracing: its shader binding table.
-    Buffer table_;
-    VkStridedDeviceAddressRegionKHR generate_{}, miss_{}, hit_{};
+    Buffer binding_table_; // of `pipeline` only
+    VkStridedDeviceAddressRegionKHR raygen_{}, miss_{}, hit_{};
 };
 
 } // namespace rt_vulkan

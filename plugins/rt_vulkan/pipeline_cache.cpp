@@ -1,43 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline_cache.hpp"
 
-#include "file_bytes.hpp"
-
 #include <cstdlib>
 #include <fcntl.h>
+#include <filesystem>
+#include <fstream>
 #include <unistd.h>
 
 namespace rt_vulkan {
 namespace {
 
-// Each scene adds to it: one that has more is begun anew.
-constexpr std::uintmax_t largest_cache = std::uintmax_t{64} << 20;
+namespace fs = std::filesystem;
 
-// Where a device's are kept, of this version of its driver; empty: nowhere.
-std::filesystem::path file_of(const Device &device) {
+// Each scene adds to the cache; a larger file is discarded.
+constexpr std::uintmax_t max_size = std::uintmax_t{64} << 20; // bytes
+
+// One file per device and driver version; empty: nowhere.
+fs::path file_of(const Device &device) {
     const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
     if (!caches || *caches != '/') // a relative one is to be ignored (XDG Base Directory Specification)
         return {};
-    const std::string which = hexadecimal(device.physical().properties.pipelineCacheUUID);
-    return std::filesystem::path(caches) / ("rt_vulkan-" + which + ".pipelines");
+    return fs::path(caches) /
+           ("rt_vulkan-" + hexadecimal(device.physical().properties.pipelineCacheUUID) + ".pipelines");
+}
+
+std::vector<char> read(const fs::path &file) {
+    std::error_code failed;
+    if (!fs::is_regular_file(file, failed)) // reading a folder would throw
+        return {};
+    const std::uintmax_t size = fs::file_size(file, failed);
+    if (failed || size > max_size)
+        return {};
+    std::vector<char> bytes(size);
+    std::ifstream stream(file, std::ios::binary);
+    if (!stream.read(bytes.data(), static_cast<std::streamsize>(size)))
+        return {};
+    return bytes;
 }
 
 } // namespace
 
 PipelineCache read_pipeline_cache(const Device &device) {
-    std::vector<char> data;
-    if (const auto file = file_of(device); !file.empty())
-        data = file_bytes(file, largest_cache);
-    VkPipelineCacheCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO;
-    info.initialDataSize = data.size(); // the driver looks at its header, and ignores another driver's
-    info.pInitialData = data.data();
-    return make<PipelineCache, VkPipelineCache>(device, device.functions().vkCreatePipelineCache, info,
-                                                "making a pipeline cache");
+    const std::vector<char> data = read(file_of(device));
+    const VkPipelineCacheCreateInfo info{
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
+        .initialDataSize = data.size(), // the driver checks its header, and ignores data of another driver
+        .pInitialData = data.data()};
+    return {device, device.functions().vkCreatePipelineCache, info, "creating a pipeline cache"};
 }
 
-void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
-    const auto file = file_of(device);
+void write_pipeline_cache(const Device &device, const PipelineCache &cache) {
+    const fs::path file = file_of(device);
     if (file.empty())
         return;
     std::size_t size = 0;
@@ -47,7 +60,7 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
     std::vector<char> data(size);
     const VkResult result = get(device.handle(), cache.get(), &size, data.data());
     data.resize(size);
-    if (result != VK_SUCCESS || data.size() > largest_cache || data == file_bytes(file, largest_cache))
+    if (result != VK_SUCCESS || data.size() > max_size || data == read(file))
         return;
     std::string temporary = file.string() + ".XXXXXX"; // each process has its own
     const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);
@@ -59,9 +72,9 @@ void keep_pipeline_cache(const Device &device, const PipelineCache &cache) {
     stream.close();
     std::error_code failed;
     if (stream)
-        std::filesystem::rename(temporary, file, failed);
+        fs::rename(temporary, file, failed);
     if (!stream || failed)
-        std::filesystem::remove(temporary, failed);
+        fs::remove(temporary, failed);
 }
 
 } // namespace rt_vulkan

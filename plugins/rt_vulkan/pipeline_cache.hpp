@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The driver's compiled shaders, in a file from one start to the next: $XDG_CACHE_HOME/rt_vulkan-DEVICE.pipelines.
+// Keeps the driver's compiled shaders between starts, in $XDG_CACHE_HOME/rt_vulkan-DEVICE.pipelines.
 #pragma once
 
 #include "device.hpp"
 
 namespace rt_vulkan {
 
-// Empty where there is no such file, or it is of no use.
+// Empty if the file is missing or unusable.
 PipelineCache read_pipeline_cache(const Device &device);
 
-// Renamed into place, so that no one reads half of it. A cache that can't be written is no fault.
-void keep_pipeline_cache(const Device &device, const PipelineCache &cache);
+// Replaces the file atomically. Failures are ignored: the cache only saves time.
+void write_pipeline_cache(const Device &device, const PipelineCache &cache);
 
 } // namespace rt_vulkan

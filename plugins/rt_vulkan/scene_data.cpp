@@ -16,13 +16,13 @@ namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
-using arhost::view::bytes;
-using arhost::view::elements;
-using arhost::view::is_identity;
-using arhost::view::object_extent;
+using arhost::raytracer_common::bytes;
+using arhost::raytracer_common::elements;
+using arhost::raytracer_common::is_identity;
+using arhost::raytracer_common::object_extent;
 
-// From here on a refitted tree costs rays more than building a new one does.
-constexpr double tolerable_decay = 1.3;
+// SAH cost relative to the last build, above which a rebuild pays off.
+constexpr double max_degradation = 1.3;
 constexpr std::uint32_t max_leaf_size = 4;
 
 template <std::size_t count> void copy(const float (&from)[count], float (&to)[count]) {
@@ -74,28 +74,28 @@ Light light_of(const arhost_light &from) {
     return to;
 }
 
-// As an 8-bit code has it: the mean over several samples then rounds to that code.
+// Rounds to an 8-bit code, so that the mean of several samples yields that code.
 float alpha_of_code(float alpha) {
     return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
 
-// The box in the world round a transformed one (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990),
-// with room for what single precision loses on a ray's way to the object's axes.
+// The world box of a transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990), with a
+// margin for the rounding of rays that are transformed to object space.
 Box in_world(const Box &local, const float *m) {
     Box world;
-    float reach[3];
-    object_extent(local.low, local.high, m, reach);
+    float extent[3];
+    object_extent(local.low, local.high, m, extent);
     for (int row = 0; row < 3; ++row) {
         double low = m[9 + row], high = low;
-        const double room = 2e-6 * (std::abs(low) + reach[row]);
+        const double margin = 2e-6 * (std::abs(low) + extent[row]);
         for (int axis = 0; axis < 3; ++axis) {
             const double a = double{m[3 * axis + row]} * local.low[axis],
                          b = double{m[3 * axis + row]} * local.high[axis];
             low += std::min(a, b);
             high += std::max(a, b);
         }
-        world.low[row] = static_cast<float>(low - room);
-        world.high[row] = static_cast<float>(high + room);
+        world.low[row] = static_cast<float>(low - margin);
+        world.high[row] = static_cast<float>(high + margin);
     }
     return world;
 }
@@ -104,18 +104,18 @@ Bytes bytes_of(const auto &vector) {
     return std::as_bytes(std::span(vector));
 }
 
-// Primitives in the geometry's order, as the device's own trees number them.
-Tree without_nodes(std::size_t count) {
-    Tree tree;
-    tree.order.resize(count);
-    std::iota(tree.order.begin(), tree.order.end(), 0u);
-    return tree;
+// Primitives in the geometry's order, as acceleration structures number them; no nodes.
+Bvh unordered(std::size_t count) {
+    Bvh bvh;
+    bvh.order.resize(count);
+    std::iota(bvh.order.begin(), bvh.order.end(), 0u);
+    return bvh;
 }
 
 } // namespace
 
-SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Host &host)
-    : arena_(arena), has_trees_(has_trees), host_(host) {
+SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Host &host)
+    : arena_(arena), has_bvhs_(has_bvhs), host_(host) {
     for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
         materials_.push_back(material_of(material));
     for (const arhost_light &light : elements<arhost_light>(arena, arena.lights))
@@ -128,8 +128,8 @@ SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Ho
     const auto objects = elements<arhost_object>(arena, arena.objects);
     for (const arhost_object &object : objects)
         anything_moves_ |= object.moves || object.deforms;
-    if (has_trees)
-        nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top tree's
+    if (has_bvhs)
+        nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top-level BVH's
     for (const arhost_object &object : objects)
         if (object.deforms)
             add_normals(mesh_of(object.geometry, true), geometries[object.geometry]);
@@ -147,13 +147,13 @@ SceneData::SceneData(const arhost_scene &arena, bool has_trees, const arhost::Ho
         }
         add_object(object, meshes_.at(object.geometry));
     }
-    build_top();
+    build_top_level();
 }
 
 void SceneData::check_cancelled() const {
     if (host_.cancelled())
-        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the trees were built");
-    host_.progress(-1, "building the trees");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while preparing the scene");
+    host_.progress(-1, "preparing the scene");
 }
 
 std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points) {
@@ -195,7 +195,7 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     const std::vector<Box> boxes = boxes_of(arena_, geometry, points);
     Mesh &mesh = meshes_[number];
     mesh.first_primitive = static_cast<std::uint32_t>(primitives_.size());
-    mesh.root = has_trees_ ? static_cast<std::uint32_t>(nodes_.size()) : mesh.first_primitive;
+    mesh.root = has_bvhs_ ? static_cast<std::uint32_t>(nodes_.size()) : mesh.first_primitive;
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
     mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
     mesh.local = empty_box();
@@ -204,17 +204,17 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
         return mesh;
     for (const Box &box : boxes)
         include(mesh.local, box);
-    if (has_trees_) {
-        mesh.tree = build_tree(boxes, max_leaf_size, object_depth, [this] { check_cancelled(); });
-        mesh.built_area = relative_area(mesh.tree);
-        nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.tree.nodes.size()));
+    if (has_bvhs_) {
+        mesh.bvh = build_bvh(boxes, max_leaf_size, max_mesh_depth, [this] { check_cancelled(); });
+        mesh.built_cost = sah_cost(mesh.bvh);
+        nodes_.resize(nodes_.size() + (deforms ? 2 * boxes.size() : mesh.bvh.nodes.size()));
     } else {
-        mesh.tree = without_nodes(boxes.size());
+        mesh.bvh = unordered(boxes.size());
     }
     primitives_.resize(primitives_.size() + boxes.size());
-    write_tree(mesh, geometry, points);
+    write_bvh(mesh, geometry, points);
     if (!deforms)
-        mesh.tree = {};
+        mesh.bvh = {};
     const std::byte *corners = bytes(arena_) + geometry.indices.offset;
     for (std::uint32_t i = 0; i < geometry.indices.count; ++i, corners += geometry.indices.stride) {
         std::uint32_t corner[3];
@@ -241,17 +241,17 @@ void SceneData::add_texcoords(Mesh &mesh, const arhost_geometry &geometry) {
         return;
     mesh.first_texcoord = static_cast<std::uint32_t>(attributes_.size());
     for (std::uint32_t i = 0; i < geometry.texcoords.count; ++i) {
-        float place[2];
-        std::memcpy(place, bytes(arena_) + geometry.texcoords.offset + std::size_t{geometry.texcoords.stride} * i,
-                    sizeof place);
-        attributes_.insert(attributes_.end(), place, place + 2);
+        float texcoord[2];
+        std::memcpy(texcoord, bytes(arena_) + geometry.texcoords.offset + std::size_t{geometry.texcoords.stride} * i,
+                    sizeof texcoord);
+        attributes_.insert(attributes_.end(), texcoord, texcoord + 2);
     }
 }
 
-// The nodes and the primitives, leaf by leaf.
-void SceneData::write_tree(const Mesh &mesh, const arhost_geometry &geometry, Points points) {
-    for (std::size_t i = 0; i < mesh.tree.nodes.size(); ++i) {
-        Node node = mesh.tree.nodes[i];
+// Writes the nodes, and the primitives in leaf order.
+void SceneData::write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Points points) {
+    for (std::size_t i = 0; i < mesh.bvh.nodes.size(); ++i) {
+        Node node = mesh.bvh.nodes[i];
         node.first += node.count ? mesh.first_primitive : mesh.root;
         nodes_[mesh.root + i] = node;
     }
@@ -260,8 +260,8 @@ void SceneData::write_tree(const Mesh &mesh, const arhost_geometry &geometry, Po
         std::memcpy(p.data(), points.first + std::size_t{points.stride} * vertex, sizeof p);
         return p;
     };
-    for (std::size_t i = 0; i < mesh.tree.order.size(); ++i) {
-        const std::uint32_t number = mesh.tree.order[i];
+    for (std::size_t i = 0; i < mesh.bvh.order.size(); ++i) {
+        const std::uint32_t number = mesh.bvh.order[i];
         Primitive primitive{};
         primitive.number = number;
         if (geometry.type == ARHOST_GEOMETRY_SPHERES) {
@@ -305,36 +305,35 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
         object.flags |= rt_vulkan::has_holes;
     if (from.moves || !is_identity(from.world_from_object))
         object.flags |= has_transform;
-    place(object, mesh, from.world_from_object);
+    set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
     objects_.push_back(object);
     solid_objects_ += !mesh.is_empty;
-    auto &at = places_.emplace_back();
-    std::copy_n(from.world_from_object, 12, at.begin());
+    std::copy_n(from.world_from_object, 12, transforms_.emplace_back().begin());
 }
 
-void SceneData::place(Object &object, const Mesh &mesh, const float *m) {
-    object_extent(mesh.local.low, mesh.local.high, m, object.reach);
-    const arhost::view::Cofactors cofactors(m);
+void SceneData::set_transform(Object &object, const Mesh &mesh, const float *m) {
+    object_extent(mesh.local.low, mesh.local.high, m, object.extent);
+    const arhost::raytracer_common::Cofactors cofactors(m);
     float normal_transform[9];
-    cofactors.put_normal_transform(normal_transform);
+    cofactors.write_normal_transform(normal_transform);
     for (int i = 0; i < 3; ++i) {
         std::copy_n(m + std::ptrdiff_t{3} * i, 3, object.transform[i]);
         std::copy_n(normal_transform + std::ptrdiff_t{3} * i, 3, object.normal_transform[i]);
-        double back = 0;
+        double translation = 0;
         for (int j = 0; j < 3; ++j) {
-            const double inverse = cofactors.of[3 * i + j] / cofactors.determinant;
+            const double inverse = cofactors.values[3 * i + j] / cofactors.determinant;
             object.object_from_world[j][i] = static_cast<float>(inverse);
-            back -= inverse * m[9 + j];
+            translation -= inverse * m[9 + j];
         }
-        object.object_from_world[3][i] = static_cast<float>(back);
+        object.object_from_world[3][i] = static_cast<float>(translation);
     }
 }
 
-void SceneData::build_top() {
-    if (!has_trees_)
+void SceneData::build_top_level() {
+    if (!has_bvhs_)
         return;
     std::vector<Box> boxes;
     std::vector<std::uint32_t> numbers;
@@ -343,32 +342,33 @@ void SceneData::build_top() {
         const Mesh &mesh = meshes_.at(from[i].geometry);
         if (mesh.is_empty)
             continue;
-        boxes.push_back(objects_[i].flags & has_transform ? in_world(mesh.local, places_[i].data()) : mesh.local);
+        boxes.push_back(objects_[i].flags & has_transform ? in_world(mesh.local, transforms_[i].data()) : mesh.local);
         numbers.push_back(i);
     }
     if (boxes.empty())
         return;
-    if (boxes.size() > std::size_t{1} << top_depth)
-        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the scene has more than " + std::to_string(1 << top_depth) +
-                                                           " objects: join some, or use rt_embree");
-    const Tree tree = build_tree(boxes, 1, top_depth, [this] { check_cancelled(); });
-    for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
-        nodes_[i] = tree.nodes[i];
+    if (boxes.size() > std::size_t{1} << max_top_depth)
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the scene has more than " +
+                                                           std::to_string(1 << max_top_depth) +
+                                                           " objects: merge some, or use rt_embree");
+    const Bvh bvh = build_bvh(boxes, 1, max_top_depth, [this] { check_cancelled(); });
+    for (std::size_t i = 0; i < bvh.nodes.size(); ++i) {
+        nodes_[i] = bvh.nodes[i];
         if (nodes_[i].count)
-            nodes_[i].first = numbers[tree.order[nodes_[i].first]];
+            nodes_[i].first = numbers[bvh.order[nodes_[i].first]];
     }
 }
 
-void SceneData::move(const arhost_motion &motion) {
+void SceneData::update(const arhost_motion &motion) {
     const auto from = elements<arhost_object>(arena_, arena_.objects);
     for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
         const arhost_moved_object &moved = motion.moved[i];
-        place(objects_[moved.object], meshes_.at(from[moved.object].geometry), moved.world_from_object);
-        std::copy_n(moved.world_from_object, 12, places_[moved.object].begin());
+        set_transform(objects_[moved.object], meshes_.at(from[moved.object].geometry), moved.world_from_object);
+        std::copy_n(moved.world_from_object, 12, transforms_[moved.object].begin());
     }
     for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
         deform(motion.deformed[i]);
-    build_top();
+    build_top_level();
 }
 
 void SceneData::deform(const arhost_deformed_geometry &deformed) {
@@ -381,20 +381,21 @@ void SceneData::deform(const arhost_deformed_geometry &deformed) {
     mesh.local = empty_box();
     for (std::uint32_t i = 0; i < deformed.vertex_count; ++i)
         include(mesh.local, deformed.positions + std::size_t{3} * i);
-    object_extent(mesh.local.low, mesh.local.high, places_[deformed.object].data(), objects_[deformed.object].reach);
-    if (has_trees_)
-        refit_tree(mesh, boxes_of(arena_, geometry, points));
-    write_tree(mesh, geometry, points);
+    object_extent(mesh.local.low, mesh.local.high, transforms_[deformed.object].data(),
+                  objects_[deformed.object].extent);
+    if (has_bvhs_)
+        refit_bvh(mesh, boxes_of(arena_, geometry, points));
+    write_bvh(mesh, geometry, points);
     if (mesh.first_normal != ARHOST_NONE && deformed.normals)
         std::copy_n(deformed.normals, std::size_t{3} * geometry.normals.count,
                     attributes_.begin() + mesh.first_normal);
 }
 
-void SceneData::refit_tree(Mesh &mesh, std::span<const Box> boxes) {
-    refit(mesh.tree, boxes);
-    if (relative_area(mesh.tree) > tolerable_decay * mesh.built_area) {
-        mesh.tree = build_tree(boxes, max_leaf_size, object_depth, [this] { check_cancelled(); });
-        mesh.built_area = relative_area(mesh.tree);
+void SceneData::refit_bvh(Mesh &mesh, std::span<const Box> boxes) {
+    refit(mesh.bvh, boxes);
+    if (sah_cost(mesh.bvh) > max_degradation * mesh.built_cost) {
+        mesh.bvh = build_bvh(boxes, max_leaf_size, max_mesh_depth, [this] { check_cancelled(); });
+        mesh.built_cost = sah_cost(mesh.bvh);
         ++rebuilds_;
     }
 }
@@ -477,7 +478,7 @@ std::size_t SceneData::moving_size(Binding binding) const {
     }
 }
 
-void SceneData::forget_still_parts() {
+void SceneData::release_static_parts() {
     const auto keep = [](auto &vector, std::size_t count) {
         vector.resize(count);
         vector.shrink_to_fit();

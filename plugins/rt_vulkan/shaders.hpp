@@ -1,31 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A path's shaders, as they lie beside the plugin.
+// The compiled shaders of each path, embedded in the plugin.
 #pragma once
 
 #include "instance.hpp"
 
 #include <cstdint>
-#include <filesystem>
+#include <span>
 #include <vector>
 
 namespace rt_vulkan {
 
 struct Shader {
     VkShaderStageFlagBits stage;
-    std::vector<std::uint32_t> words; // SPIR-V
+    std::span<const std::uint32_t> words; // SPIR-V
 };
 
 struct Shaders {
     Path path;
-    std::vector<Shader> stages;
+    std::vector<Shader> stages; // of `pipeline`: raygen, miss, closest hit, any hit, intersection
 
     VkShaderStageFlags stage_flags() const;
-    // The step of the device's work that they run in.
-    VkPipelineStageFlags pipeline_stage() const;
+    VkPipelineStageFlags pipeline_stage() const; // for barriers
 };
 
-// A path's shaders, as they lie in `folder`; throws, naming the file, where one is missing or no SPIR-V.
-Shaders read_shaders(const std::filesystem::path &folder, Path path);
+Shaders shaders_of(Path path);
 
 } // namespace rt_vulkan

@@ -13,19 +13,19 @@ using Vec3d = arhost::shading::Vec3T<double>;
 
 } // namespace
 
-void look(const arhost_camera &camera, Frame &frame) {
-    const arhost::view::Pose pose(camera);
-    arhost::view::put(pose.eye, frame.eye);
-    arhost::view::put(pose.right, frame.world_from_camera[0]);
-    arhost::view::put(pose.down, frame.world_from_camera[1]);
-    arhost::view::put(pose.forward, frame.world_from_camera[2]);
+void set_camera(const arhost_camera &camera, Frame &frame) {
+    const arhost::raytracer_common::Pose pose(camera);
+    arhost::raytracer_common::write(pose.eye, frame.eye);
+    arhost::raytracer_common::write(pose.right, frame.world_from_camera[0]);
+    arhost::raytracer_common::write(pose.down, frame.world_from_camera[1]);
+    arhost::raytracer_common::write(pose.forward, frame.world_from_camera[2]);
 }
 
 RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {
     const arhost::shading::Lens lens(intrinsics);
     RayTable table{intrinsics.distortion == ARHOST_DISTORTION_FISHEYE ? 3u : 2u, {}};
-    const std::size_t numbers_a_pixel = table.dimensions * (has_slopes ? 3u : 1u);
-    table.numbers.resize(numbers_a_pixel * intrinsics.width * intrinsics.height);
+    const std::size_t values_per_pixel = table.dimensions * (has_slopes ? 3u : 1u);
+    table.values.resize(values_per_pixel * intrinsics.width * intrinsics.height);
     const auto store = [&](Vec3d d, float *to) {
         to[0] = static_cast<float>(d.x);
         to[1] = static_cast<float>(d.y);
@@ -50,9 +50,9 @@ RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {
     const auto work = [&] {
         for (std::uint32_t y; (y = next_row.fetch_add(1, std::memory_order_relaxed)) < intrinsics.height;)
             for (std::uint32_t x = 0; x < intrinsics.width; ++x)
-                fill(x, y, &table.numbers[numbers_a_pixel * (std::size_t{y} * intrinsics.width + x)]);
+                fill(x, y, &table.values[values_per_pixel * (std::size_t{y} * intrinsics.width + x)]);
     };
-    std::vector<std::jthread> threads; // joined at the end: only then the table is read
+    std::vector<std::jthread> threads; // joined before the table is read
     for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i)
         threads.emplace_back(work);
     work();

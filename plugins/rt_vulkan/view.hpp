@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The camera as the shaders read it: its axes in the world, and where each pixel looks.
+// The camera as the shaders read it: its axes in the world, and each pixel's ray direction.
 #pragma once
 
 #include "layout.hpp"
@@ -12,14 +12,14 @@
 namespace rt_vulkan {
 
 // Writes the frame's eye and axes.
-void look(const arhost_camera &camera, Frame &frame);
+void set_camera(const arhost_camera &camera, Frame &frame);
 
-// Each pixel's direction in the camera's axes (x right, y down, z forward), row by row, z only where it is not 1
-// throughout; with `has_slopes`, then what it gains along rows and along columns, per px. x is 1e30 where the lens
-// sees nothing.
+// Each pixel's direction in camera coordinates (x right, y down, z forward), row by row; z only if `dimensions` is 3,
+// else it is 1. With `has_slopes`, the direction is followed by its derivatives along x and y, per px. x is 1e30 for
+// pixels outside the lens's field of view.
 struct RayTable {
     std::uint32_t dimensions; // 2 or 3
-    std::vector<float> numbers;
+    std::vector<float> values;
 };
 RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes);
 

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What lamps and the environment send to surfaces, and what keeps it from them (rt_embree's kernel/lights.inl).
+// Direct light of lamps and the environment, and its shadows (rt_embree's kernel/lights.inl).
 
-// One point of a light, as a surface point sees it.
+// Light from one point of a light source at a surface point.
 struct Incidence {
-    vec3 way;         // to the light, as far as it is; of length 1 to what is infinitely far
-    float end;        // of the way: 1, or infinity
-    vec3 direction;   // length 1
-    float cosine;     // of the surface's inclination; 0 where the light is behind it
+    vec3 to_light;    // the vector to the point; unit length if infinitely far
+    float t_max;      // 1, or infinity
+    vec3 direction;   // unit length
+    float cosine;     // to the surface normal; 0 if the light is behind the surface
     float irradiance; // per unit of intensity, at cosine 1
     vec3 intensity;
     bool from_environment;
 };
 
-Incidence incidence_along(Surface s, vec3 way, float end, float irradiance, vec3 intensity) {
-    vec3 direction = normalize(way);
-    return Incidence(way, end, direction, lambert_on_facet(s.normal, s.geometric_normal, direction), irradiance,
+Incidence incidence_along(Surface s, vec3 to_light, float t_max, float irradiance, vec3 intensity) {
+    vec3 direction = normalize(to_light);
+    return Incidence(to_light, t_max, direction, lambert_on_facet(s.normal, s.geometric_normal, direction), irradiance,
                      intensity, false);
 }
 
@@ -23,19 +23,19 @@ bool is_extended(uint lamp) {
     return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
 }
 
-// `where` chooses the point of an extended light.
-Incidence incidence(uint lamp, Surface s, vec2 where) {
+// `sample_uv` chooses the point on an area light.
+Incidence incidence(uint lamp, Surface s, vec2 sample_uv) {
     uint type = lights[lamp].type;
     vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
     if (type == DIRECTIONAL_LIGHT)
         return incidence_along(s, -axis, INFINITY, 1.0, intensity);
-    vec3 way = lights[lamp].position - s.position;
+    vec3 to_light = lights[lamp].position - s.position;
     if (type == RECTANGLE_LIGHT)
-        way = vector_to_rectangle(way, lights[lamp].axis_u, lights[lamp].axis_v, where.x, where.y);
+        to_light = vector_to_rectangle(to_light, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x, sample_uv.y);
     else if (type == SPHERE_LIGHT)
-        way = vector_to_disc(way, lights[lamp].radius, where.x, where.y);
+        to_light = vector_to_disc(to_light, lights[lamp].radius, sample_uv.x, sample_uv.y);
     bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
-    Incidence arriving = incidence_along(s, way, 1.0, point_light_falloff(falls_off, dot(way, way)), intensity);
+    Incidence arriving = incidence_along(s, to_light, 1.0, point_light_falloff(falls_off, dot(to_light, to_light)), intensity);
     if (type == SPOT_LIGHT)
         arriving.irradiance *= spot_attenuation(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
                                           lights[lamp].cosine_outer);
@@ -44,49 +44,49 @@ Incidence incidence(uint lamp, Surface s, vec2 where) {
     return arriving;
 }
 
-// What comes to a surface point from a light.
-struct Passage {
-    bool open;      // nothing opaque lies between
-    bool is_tinted; // but glass does
-    vec3 tint;      // what it lets through
+// Visibility of a light from a surface point.
+struct Visibility {
+    bool is_unoccluded; // nothing opaque lies between
+    bool is_tinted;     // glass lies between
+    vec3 tint;          // the glass's transmittance
 };
 
-// Real surfaces cast no shadow on each other: that one is in the video. First a ray for what is opaque, then one from
-// each surface of glass to the next, in one loop: trace() is long.
-Passage passage(Incidence arriving, Surface s) {
-    const int max_surfaces = 64; // what lies behind them is taken for clear: ends loops between coincident faces
-    vec3 start = s.position + s.geometric_normal * s.offset, left = arriving.way;
-    bool ends = arriving.end < INFINITY;
+// Real surfaces cast no shadows on each other: the video shows those. First a ray against opaque objects, then one from
+// each glass surface to the next, in one loop, as inlined trace() is long.
+Visibility visibility(Incidence arriving, Surface s) {
+    const int max_surfaces = 64; // the rest counts as clear: ends loops between coincident faces
+    vec3 start = s.position + s.geometric_normal * s.offset, to_light = arriving.to_light;
+    bool is_finite_distance = arriving.t_max < INFINITY;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
-    Ray ray = Ray(start, ends ? left - s.geometric_normal * s.offset : left, arriving.end, mask);
-    Passage way = Passage(false, false, vec3(1.0));
+    Ray ray = Ray(start, is_finite_distance ? to_light - s.geometric_normal * s.offset : to_light, arriving.t_max, mask);
+    Visibility result = Visibility(false, false, vec3(1.0));
     for (int i = 0; i <= max_surfaces; ++i) {
         Hit hit = trace(ray, i == 0, false);
         bool is_hit = hit.object != NONE;
         if (i == 0)
-            way.open = !is_hit;
+            result.is_unoccluded = !is_hit;
         if (!has_glass || is_hit == (i == 0))
             break;
         if (i > 0) {
-            way.is_tinted = true;
+            result.is_tinted = true;
             Surface glass = surface_at(ray, hit, false);
-            way.tint *= glass_shadow(materials[objects[hit.object].material].shadow_attenuation,
+            result.tint *= glass_shadow(materials[objects[hit.object].material].shadow_attenuation,
                                      abs(dot(glass.normal, arriving.direction)));
-            if (!(largest(way.tint) > 1e-3))
+            if (!(largest(result.tint) > 1e-3))
                 break;
-            // On behind it.
+            // Continue behind it.
             vec3 next = glass.position - glass.geometric_normal * glass.offset;
-            if (ends)
-                left -= next - start;
+            if (is_finite_distance)
+                to_light -= next - start;
             start = next;
         }
-        ray = Ray(start, left, arriving.end, GLASS_MASK);
+        ray = Ray(start, to_light, arriving.t_max, GLASS_MASK);
     }
-    return way;
+    return result;
 }
 
-// The place of `value` in cumulative sums: the first that is larger.
-int search(uint first, int count, float value) {
+// The index of the first cumulative sum above `value`.
+int search_sums(uint first, int count, float value) {
     int low = 0, high = count - 1;
     while (low < high) {
         int middle = (low + high) >> 1;
@@ -98,7 +98,7 @@ int search(uint first, int count, float value) {
     return low;
 }
 
-// The sum before a place, and what the place adds.
+// The sum before an element, and the element's own value.
 vec2 step_of_sums(uint first, int i) {
     float before = i > 0 ? uintBitsToFloat(tables[first + uint(i - 1)]) : 0.0;
     return vec2(before, uintBitsToFloat(tables[first + uint(i)]) - before);
@@ -112,102 +112,102 @@ vec3 environment_light(vec3 direction) {
            frame.environment_intensity;
 }
 
-// A direction chosen by the environment's brightness.
-Incidence sample_environment(Surface s, vec2 where) {
+// A direction sampled in proportion to the environment's brightness.
+Incidence sample_environment(Surface s, vec2 sample_uv) {
     int width = textures[frame.environment_texture].width, height = textures[frame.environment_texture].height;
-    int row = search(frame.environment_rows, height, where.y);
+    int row = search_sums(frame.environment_rows, height, sample_uv.y);
     vec2 row_step = step_of_sums(frame.environment_rows, row);
     uint first = frame.environment_columns + uint(row * width);
-    int column = search(first, width, where.x);
+    int column = search_sums(first, width, sample_uv.x);
     vec2 column_step = step_of_sums(first, column);
-    float u = (float(column) + fraction_of_step(where.x, column_step.x, column_step.y)) * (1.0 / float(width));
-    float v = (float(row) + fraction_of_step(where.y, row_step.x, row_step.y)) * (1.0 / float(height));
+    float u = (float(column) + fraction_of_step(sample_uv.x, column_step.x, column_step.y)) * (1.0 / float(width));
+    float v = (float(row) + fraction_of_step(sample_uv.y, row_step.x, row_step.y)) * (1.0 / float(height));
     // The rotation's transpose is its inverse.
-    vec3 way = equirectangular_direction(u, v) * frame.environment_from_world;
+    vec3 direction = equirectangular_direction(u, v) * frame.environment_from_world;
     float density = equirectangular_density(row_step.y * column_step.y * (float(width) * float(height)), v);
-    // The texel's own, as the density is: between texels the mixed light would be too much for the darker one's.
+    // Unfiltered, like the density: interpolated light would be too bright for the density of a darker texel.
     vec3 light = texel_at(frame.environment_texture, column, row).rgb * frame.environment_intensity;
-    Incidence arriving = incidence_along(s, way, INFINITY, irradiance_of_density(density), light);
+    Incidence arriving = incidence_along(s, direction, INFINITY, irradiance_of_density(density), light);
     arriving.from_environment = true;
     return arriving;
 }
 
-// The light that surfaces other than mirrors and glass send back along the ray; or of catchers, how much of the light
-// that they would receive is hidden by virtual objects.
-struct Gathered {
+// Light reflected along the ray by surfaces other than mirrors and glass; of catchers, how much of their irradiance
+// virtual objects block.
+struct DirectLight {
     vec3 light;
-    float irradiance, hidden_part, tinted_part;
-    vec3 weighted_colour; // by channel, with coloured shadows
+    float irradiance, blocked, tinted;
+    vec3 weighted_alpha; // per channel, for coloured shadows
 };
 
-void add_shadow(inout Gathered sum, Incidence arriving, Passage way, float share) {
+void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, float share) {
     float power = arriving.intensity.x + arriving.intensity.y + arriving.intensity.z;
     float weight = arriving.cosine * arriving.irradiance * power * share;
     sum.irradiance += weight;
-    if (!way.open)
-        sum.hidden_part += weight;
-    else if (way.is_tinted)
-        sum.tinted_part += weight;
+    if (!visible.is_unoccluded)
+        sum.blocked += weight;
+    else if (visible.is_tinted)
+        sum.tinted += weight;
     vec3 opaque = vec3(frame.shadow_alpha_opaque);
-    vec3 through = way.is_tinted ? opaque * (vec3(1.0) - way.tint) : vec3(0.0);
-    sum.weighted_colour += (way.open ? through : opaque) * weight;
+    vec3 through = visible.is_tinted ? opaque * (vec3(1.0) - visible.tint) : vec3(0.0);
+    sum.weighted_alpha += (visible.is_unoccluded ? through : opaque) * weight;
 }
 
-void add_reflected(inout Gathered sum, Surface s, vec3 to_eye, Incidence arriving, Passage way, float share) {
+void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, Incidence arriving, Visibility visible, float share) {
     vec3 reflected = s.diffuse * arriving.cosine;
     if (s.is_rough) {
-        vec3 half_way = normalize(arriving.direction + to_eye);
-        vec3 fresnel = schlick(s.specular, dot(to_eye, half_way));
+        vec3 half_vector = normalize(arriving.direction + to_eye);
+        vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
         reflected *= vec3(1.0) - fresnel;
-        // The environment's glint comes with the ray that goes on from here.
+        // The environment's specular reflection comes with the secondary ray.
         if (!arriving.from_environment)
             reflected +=
-                fresnel * ggx_lobe(arriving.cosine, dot(s.normal, to_eye), dot(s.normal, half_way), s.alpha);
+                fresnel * ggx_lobe(arriving.cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
     } else if (s.exponent > 0.0) {
         reflected += s.specular * phong(s.normal, arriving.direction, to_eye, s.exponent);
     }
-    sum.light += reflected * way.tint * arriving.intensity * (arriving.irradiance * share);
+    sum.light += reflected * visible.tint * arriving.intensity * (arriving.irradiance * share);
 }
 
-Gathered gathered(Surface s, vec3 to_eye, bool catches, Random random) {
-    Gathered sum = Gathered(s.ambient * frame.ambient + s.emission, 0.0, 0.0, 0.0, vec3(0.0));
+DirectLight direct_light(Surface s, vec3 to_eye, bool catches, Random random) {
+    DirectLight sum = DirectLight(s.ambient * frame.ambient + s.emission, 0.0, 0.0, 0.0, vec3(0.0));
     uint count = frame.light_count + (frame.environment_texture != NONE ? 1u : 0u);
     for (uint lamp = 0u; lamp < count; ++lamp) {
         bool is_environment = lamp == frame.light_count;
         bool has_points = is_environment || is_extended(lamp);
-        uint points = has_points ? frame.light_samples : 1u;
-        float share = 1.0 / float(points);
-        for (uint point = 0u; point < points; ++point) {
+        uint point_count = has_points ? frame.light_samples : 1u;
+        float share = 1.0 / float(point_count);
+        for (uint point = 0u; point < point_count; ++point) {
             uint purpose = is_environment ? ENVIRONMENT_PURPOSE : FIRST_LAMP_PURPOSE + lamp;
-            vec2 where = has_points ? pair(random, purpose, point, points) : vec2(0.5);
+            vec2 sample_uv = has_points ? pair(random, purpose, point, point_count) : vec2(0.5);
             Incidence arriving;
             if (is_environment)
-                arriving = sample_environment(s, where);
+                arriving = sample_environment(s, sample_uv);
             else
-                arriving = incidence(lamp, s, where);
+                arriving = incidence(lamp, s, sample_uv);
             if (!(arriving.cosine > 0.0) || !(catches || arriving.irradiance > 0.0))
                 continue;
-            Passage way = passage(arriving, s);
+            Visibility visible = visibility(arriving, s);
             if (catches)
-                add_shadow(sum, arriving, way, share);
-            else if (way.open)
-                add_reflected(sum, s, to_eye, arriving, way, share);
+                add_shadow(sum, arriving, visible, share);
+            else if (visible.is_unoccluded)
+                add_reflected(sum, s, to_eye, arriving, visible, share);
         }
     }
     return sum;
 }
 
-// What lies over the video where a catcher is: its colour, linear, and its alpha.
-vec4 caught_shadow(Gathered sum) {
+// The overlay of a shadow catcher: linear colour and alpha.
+vec4 catcher_shadow(DirectLight sum) {
     if (frame.coloured_shadows == 0u)
-        return vec4(vec3(0.0), shadow_alpha(fraction_of_light(sum.hidden_part, sum.irradiance),
-                                            fraction_of_light(sum.tinted_part, sum.irradiance),
+        return vec4(vec3(0.0), shadow_alpha(fraction_of_light(sum.blocked, sum.irradiance),
+                                            fraction_of_light(sum.tinted, sum.irradiance),
                                             frame.shadow_alpha_opaque, frame.shadow_alpha_translucent));
-    // Each channel's own alpha; the colour makes up for what the common one takes too much.
-    vec3 own = vec3(fraction_of_light(sum.weighted_colour.x, sum.irradiance),
-                    fraction_of_light(sum.weighted_colour.y, sum.irradiance),
-                    fraction_of_light(sum.weighted_colour.z, sum.irradiance));
-    float alpha = largest(own);
-    return vec4(srgb_decode(shadow_colour_encoded(own.x, alpha)), srgb_decode(shadow_colour_encoded(own.y, alpha)),
-                srgb_decode(shadow_colour_encoded(own.z, alpha)), alpha);
+    // An alpha per channel; the colour compensates for the common alpha, their maximum.
+    vec3 alphas = vec3(fraction_of_light(sum.weighted_alpha.x, sum.irradiance),
+                    fraction_of_light(sum.weighted_alpha.y, sum.irradiance),
+                    fraction_of_light(sum.weighted_alpha.z, sum.irradiance));
+    float alpha = largest(alphas);
+    return vec4(srgb_decode(shadow_colour_encoded(alphas.x, alpha)), srgb_decode(shadow_colour_encoded(alphas.y, alpha)),
+                srgb_decode(shadow_colour_encoded(alphas.z, alpha)), alpha);
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The nearest hit of a ray.
+// Closest hit: reports it in the payload.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_tracing : require
 #include "payload.glsl"
 
-layout(location = 0) rayPayloadInEXT Found met;
-hitAttributeEXT vec2 at;
+layout(location = 0) rayPayloadInEXT Payload payload;
+hitAttributeEXT vec2 uv;
 
 void main() {
-    met = Found(gl_HitTEXT, at, uint(gl_InstanceCustomIndexEXT), uint(gl_PrimitiveID));
+    payload = Payload(gl_HitTEXT, uv, uint(gl_InstanceCustomIndexEXT), uint(gl_PrimitiveID));
 }

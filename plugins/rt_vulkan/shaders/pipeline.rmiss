@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A ray that hits nothing: of one from the eye, alpha is 0.
+// Miss: reports it in the payload.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_tracing : require
 #include "payload.glsl"
 
-layout(location = 0) rayPayloadInEXT Found met;
+layout(location = 0) rayPayloadInEXT Payload payload;
 
 void main() {
-    met.object = FOUND_NOTHING;
+    payload.object = MISS;
 }

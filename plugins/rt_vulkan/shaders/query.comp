@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The query path: a compute shader that asks the device what rays hit.
+// The query path: renders a pixel by ray queries in a compute shader.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_query : require

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the shader is given: the buffers, as layout.hpp writes them. Offsets count elements.
+// The shaders' buffers and constants, as in layout.hpp. Offsets count elements.
 
 const uint NONE = 0xffffffffu;
 #define INFINITY uintBitsToFloat(0x7f800000u)
@@ -13,26 +13,26 @@ const uint FALLOFF_INVERSE_SQUARE = 2u;
 const uint TEXEL_SRGB8 = 1u, TEXEL_RGBA8 = 2u, TEXEL_RGBA32F = 3u;
 const uint WRAP_CLAMP = 2u, WRAP_MIRROR = 3u;
 
-// Which objects a ray can hit.
+// Object.mask and Ray.mask: which objects a ray can hit.
 const uint OPAQUE_MASK = 1u, GLASS_MASK = 2u, CATCHER_MASK = 4u, OCCLUDER_MASK = 8u, ALL_MASKS = 15u;
 // Object.flags
 const uint HAS_TRANSFORM = 1u, IS_SPHERES = 2u, HAS_HOLES = 4u;
 
-layout(constant_id = 0) const int waiting_capacity = 1; // rays that can wait at once, of a pixel
+layout(constant_id = 0) const int stack_capacity = 1; // pending rays per pixel
 layout(constant_id = 1) const bool has_glass = true;
 layout(constant_id = 2) const bool has_catchers = true;
-layout(constant_id = 3) const bool has_holes = true; // any object
+layout(constant_id = 3) const bool has_holes = true; // any object does
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_slopes = false;
-layout(constant_id = 6) const bool has_textures = true; // any material
+layout(constant_id = 6) const bool has_textures = true; // any material does
 
 struct Object {
     mat4x3 object_from_world;
-    mat3 transform, normal_transform; // from the object to the world: of directions, and of normals
+    mat3 transform, normal_transform; // object to world, of directions and of normals
     uint material, role, mask, flags;
-    uint root; // of its tree, among the nodes; where the device has its own, its mesh's first primitive
-    uint first_index, first_normal, first_texcoord; // NONE where there are none
-    vec3 reach;                                     // raytracer_common/arena.hpp
+    uint root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
+    uint first_index, first_normal, first_texcoord; // NONE if absent
+    vec3 extent;                                    // object_extent() in raytracer_common/arena.hpp
 };
 
 struct Material {
@@ -73,12 +73,12 @@ struct Light {
 };
 
 struct Texture {
-    uint format, first_texel, wrap_u, wrap_v; // first_texel: in words
+    uint format, first_texel, wrap_u, wrap_v; // first_texel: in 32-bit words
     int width, height, unused, unused_2;
 };
 
-// A box round two nodes (count 0: `first` and the one after it), or round primitives. Of the top tree, whose leaves
-// are objects.
+// Inner nodes have count 0 and the children `first` and first + 1. Leaves have `count` primitives, in the top-level BVH
+// one object.
 struct Node {
     vec3 low;
     uint first;
@@ -86,8 +86,7 @@ struct Node {
     uint count;
 };
 
-// A triangle: a corner, from its second corner to it, and from it to its third. A sphere: its centre, and edge_1.x
-// its radius.
+// A triangle abc: a, a - b and c - a. A sphere: its centre, and its radius in edge_1.x.
 struct Primitive {
     vec3 corner;
     uint number; // in the geometry
@@ -111,13 +110,13 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint environment_texture;
     float environment_intensity;
     mat3 environment_from_world;
-    uint environment_rows, environment_columns, unused, unused_2; // among the tables
-    vec4 samples[256];                                            // x, y: where they lie in a pixel, −½ to ½
+    uint environment_rows, environment_columns, unused, unused_2; // indices into `tables`
+    vec4 samples[256];                                            // x, y: offsets from the pixel's centre, −½ to ½
 }
 frame;
 
 layout(push_constant) uniform Band {
-    uint first_row; // of those that are traced now
+    uint first_row;
 }
 band;
 
@@ -140,7 +139,7 @@ layout(std430, set = 0, binding = 6) readonly buffer Indices {
     uint indices[];
 };
 layout(std430, set = 0, binding = 7) readonly buffer Attributes {
-    float attributes[]; // vertices' normals and texcoords
+    float attributes[]; // vertex normals and texcoords
 };
 layout(std430, set = 0, binding = 8) readonly buffer Textures {
     Texture textures[];
@@ -149,19 +148,19 @@ layout(std430, set = 0, binding = 9) readonly buffer Texels {
     uint texels[];
 };
 layout(std430, set = 0, binding = 10) readonly buffer Tables {
-    uint tables[]; // sRGB codes, their light, the environment's sums
+    uint tables[]; // sRGB encoding and decoding, the environment's cumulative sums
 };
 layout(std430, set = 0, binding = 11) readonly buffer Rays {
-    float rays[]; // a pixel's direction in the camera's axes, and its slopes
+    float rays[]; // make_ray_table() in view.hpp
 };
 layout(std430, set = 0, binding = 12) buffer History {
-    vec4 history[]; // sums of the samples before, premultiplied
+    vec4 history[]; // sums of earlier samples, premultiplied
 };
 layout(std430, set = 0, binding = 13) writeonly buffer Image {
     uint image_pixels[];
 };
 layout(std430, set = 0, binding = 14) coherent buffer Drawn {
-    int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // the part that holds all alpha above 0
+    int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // the bounding box of pixels with alpha above 0
 };
 
 const uint FIRST_SRGB_CELL = 0u, FIRST_LIGHT_OF_CODE = 1665u;

@@ -1,79 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where a ray has hit, all that shading needs (rt_embree's kernel/surface.inl).
+// Shading data of a hit (rt_embree's kernel/surface.inl).
 
 struct Surface {
     vec3 position;
-    vec3 geometric_normal, normal; // of the facet, and interpolated over it: length 1, to the ray's origin
-    bool from_behind;              // the ray came from where the facet's own normal does not point
-    float offset;                  // mm; how far above the facet secondary rays start
-    float way;                     // mm, of the ray
+    vec3 geometric_normal, normal; // of the facet, and interpolated: unit length, facing the ray's origin
+    bool is_back_face;             // the ray hit the side that the facet's normal points away from
+    float offset;                  // mm; of secondary rays' origins above the facet
+    float distance;                // mm, from the ray's origin
     bool is_real;                  // a catcher or occluder
-    // Of what lamps make bright, by shaded().
+    // Of lit materials, set by add_material().
     vec3 ambient, diffuse, specular, emission;
     float exponent; // Phong's
-    float alpha;    // GGX's, where `is_rough`
-    bool is_rough;  // metallic-roughness: `specular` is the reflectance at a right angle
+    float alpha;    // GGX's, if `is_rough`
+    bool is_rough;  // metallic-roughness: `specular` is the reflectance at normal incidence
 };
 
-vec3 normal_at(uint object, uint number, vec2 at) {
+vec3 normal_at(uint object, uint number, vec2 uv) {
     uint first = objects[object].first_index + 3u * number, base = objects[object].first_normal;
-    vec3 share = vec3(1.0 - at.x - at.y, at.x, at.y), sum = vec3(0.0);
+    vec3 weights = vec3(1.0 - uv.x - uv.y, uv.x, uv.y), sum = vec3(0.0);
     for (int i = 0; i < 3; ++i) {
         uint from = base + 3u * indices[first + uint(i)];
-        sum += vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * share[i];
+        sum += vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * weights[i];
     }
     return sum;
 }
 
-vec3 textured(Hit hit, uint number) {
+vec3 texture_colour(Hit hit, uint number) {
     if (objects[hit.object].first_texcoord == NONE)
         return vec3(1.0);
-    return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.at)).rgb;
+    return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.uv)).rgb;
 }
 
-// The normal that the object's normal texture asks for in place of `normal`. The tangent is the facet's own.
-vec3 bent(Hit hit, vec3 facet, vec3 normal) {
+// `normal` perturbed by the normal texture, with the facet's tangents.
+vec3 normal_mapped(Hit hit, vec3 facet, vec3 normal) {
     uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
-    vec2 place[3];
+    vec2 texcoords[3];
     for (int i = 0; i < 3; ++i) {
         uint from = objects[hit.object].first_texcoord + 2u * indices[first + uint(i)];
-        place[i] = vec2(attributes[from], attributes[from + 1u]);
+        texcoords[i] = vec2(attributes[from], attributes[from + 1u]);
     }
     vec3 edge_1 = -primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
-    vec2 by_1 = place[1] - place[0], by_2 = place[2] - place[0];
-    vec3 along_u = tangent_along_u(edge_1, edge_2, by_1.x, by_2.x, by_1.y, by_2.y);
-    vec3 along_v = tangent_along_v(edge_1, edge_2, by_1.x, by_2.x, by_1.y, by_2.y);
+    vec2 delta_1 = texcoords[1] - texcoords[0], delta_2 = texcoords[2] - texcoords[0];
+    vec3 along_u = tangent_along_u(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
+    vec3 along_v = tangent_along_v(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
     if ((objects[hit.object].flags & HAS_TRANSFORM) != 0u) {
         along_u = objects[hit.object].transform * along_u;
         along_v = objects[hit.object].transform * along_v;
     }
     return perturbed_normal(normal, facet, along_u, along_v,
-                       textured(hit, materials[objects[hit.object].material].normal_texture));
+                       texture_colour(hit, materials[objects[hit.object].material].normal_texture));
 }
 
-// `bends`: where normal textures may count.
-Surface surface_at(Ray ray, Hit hit, bool bends) {
+// `normal_maps`: whether to apply normal textures.
+Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     uint object = hit.object, material = objects[object].material;
-    precise vec3 ahead = ray.direction * hit.way;
+    precise vec3 path = ray.direction * hit.t;
     vec3 geometric = hit.facet, normal = hit.facet;
     if (objects[object].first_normal != NONE)
-        normal = normal_at(object, primitives[hit.primitive].number, hit.at);
+        normal = normal_at(object, primitives[hit.primitive].number, hit.uv);
     if ((objects[object].flags & HAS_TRANSFORM) != 0u) {
         geometric = objects[object].normal_transform * geometric;
         normal = objects[object].normal_transform * normal;
     }
-    if (has_textures && bends && materials[material].model == METALLIC_ROUGHNESS &&
+    if (has_textures && normal_maps && materials[material].model == METALLIC_ROUGHNESS &&
         materials[material].normal_texture != NONE && objects[object].first_texcoord != NONE)
-        normal = bent(hit, geometric, normal);
+        normal = normal_mapped(hit, geometric, normal);
 
     Surface s;
-    s.position = ray.origin + ahead;
-    s.way = length(ahead);
+    s.position = ray.origin + path;
+    s.distance = length(path);
     s.is_real = objects[object].role != VIRTUAL;
     s.geometric_normal = normalize_or(geometric, -normalize(ray.direction));
-    s.offset = offset_from_surface(s.position, ahead, s.geometric_normal, objects[object].reach);
-    s.from_behind = dot(s.geometric_normal, ray.direction) > 0.0;
+    s.offset = offset_from_surface(s.position, path, s.geometric_normal, objects[object].extent);
+    s.is_back_face = dot(s.geometric_normal, ray.direction) > 0.0;
     s.geometric_normal = facing(s.geometric_normal, -ray.direction);
     s.normal = shading_normal(normal, s.geometric_normal);
     s.ambient = s.diffuse = s.specular = s.emission = vec3(0.0);
@@ -82,8 +82,8 @@ Surface surface_at(Ray ray, Hit hit, bool bends) {
     return s;
 }
 
-// Adds the material's colours; the material is not a mirror, nor glass.
-void shaded(inout Surface s, Hit hit) {
+// Sets the material's properties; not for mirrors and glass.
+void add_material(inout Surface s, Hit hit) {
     uint material = objects[hit.object].material, model = materials[material].model;
     bool is_rough = model == METALLIC_ROUGHNESS;
     s.ambient = materials[material].ambient;
@@ -91,7 +91,7 @@ void shaded(inout Surface s, Hit hit) {
     s.emission = materials[material].emission;
     float metallic = materials[material].metallic, roughness = materials[material].roughness;
     if (has_textures) {
-        // One loop, since sampling is long.
+        // One loop, as inlined sampling is long.
         uvec3 numbers = uvec3(materials[material].colour_texture, materials[material].metallic_roughness_texture,
                               materials[material].emission_texture);
         if (!is_rough)
@@ -101,7 +101,7 @@ void shaded(inout Surface s, Hit hit) {
         for (int i = 0; i < 3; ++i) {
             if (numbers[i] == NONE)
                 continue;
-            vec3 factors = textured(hit, numbers[i]);
+            vec3 factors = texture_colour(hit, numbers[i]);
             if (i == 0) {
                 s.ambient *= factors;
                 s.diffuse *= factors;

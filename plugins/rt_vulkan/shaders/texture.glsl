@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Textures in a buffer: images would be sampled by each device in its own way.
+// Textures in a buffer, with bilinear filtering in the shader: hardware samplers differ in rounding.
 
 int wrapped(int i, int size, uint wrap) {
     if (wrap == WRAP_CLAMP)
         return clamp(i, 0, size - 1);
     int period = wrap == WRAP_MIRROR ? 2 * size : size;
-    int times = int(floor((float(i) + 0.5) * (1.0 / float(period))));
-    int within = i - times * period;
+    int repeats = int(floor((float(i) + 0.5) * (1.0 / float(period))));
+    int within = i - repeats * period;
     return wrap == WRAP_MIRROR && within >= size ? period - 1 - within : within;
 }
 
@@ -27,24 +27,24 @@ vec4 texel_at(uint number, int x, int y) {
     return linear;
 }
 
-// Far outside only the fraction counts, and whole numbers must fit.
-float near_zero(float t, uint wrap) {
+// Reduces a far coordinate to an equivalent one near 0, so that integer texel coordinates don't overflow.
+float reduced(float t, uint wrap) {
     if (wrap == WRAP_CLAMP)
         return clamp(t, -1.0, 2.0);
     float bounded = clamp(t, -1e6, 1e6);
     return bounded - 2.0 * floor(bounded * 0.5);
 }
 
-// Between the four texels round a place.
-vec4 sample_texture(uint number, vec2 place) {
+// Bilinear.
+vec4 sample_texture(uint number, vec2 texcoord) {
     uint wrap_u = textures[number].wrap_u, wrap_v = textures[number].wrap_v;
     int width = textures[number].width, height = textures[number].height;
-    vec2 at = vec2(near_zero(place.x, wrap_u), near_zero(place.y, wrap_v)) * vec2(width, height) - 0.5;
-    vec2 corner = floor(at), share = at - corner;
+    vec2 at = vec2(reduced(texcoord.x, wrap_u), reduced(texcoord.y, wrap_v)) * vec2(width, height) - 0.5;
+    vec2 corner = floor(at), weights = at - corner;
     int x0 = wrapped(int(corner.x), width, wrap_u), x1 = wrapped(int(corner.x) + 1, width, wrap_u);
     int y0 = wrapped(int(corner.y), height, wrap_v), y1 = wrapped(int(corner.y) + 1, height, wrap_v);
     vec4 a = texel_at(number, x0, y0), b = texel_at(number, x1, y0);
     vec4 c = texel_at(number, x0, y1), d = texel_at(number, x1, y1);
-    vec4 top = a + (b - a) * share.x, bottom = c + (d - c) * share.x;
-    return top + (bottom - top) * share.y;
+    vec4 top = a + (b - a) * weights.x, bottom = c + (d - c) * weights.x;
+    return top + (bottom - top) * weights.y;
 }

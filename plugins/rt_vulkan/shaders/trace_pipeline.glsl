@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What rays hit, by VK_KHR_ray_tracing_pipeline: the device walks trees of its own (acceleration.hpp) and calls the
-// shaders pipeline.rint about spheres, pipeline.rahit about what may be a hole or face away, and in the end
-// pipeline.rchit or pipeline.rmiss. None of them sends rays: those that go on are sent by the integrator's loop.
+// trace() by VK_KHR_ray_tracing_pipeline. The device traverses its acceleration structures and calls pipeline.rint for
+// spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or pipeline.rmiss. None of them
+// traces further rays: the integrator's loop does.
 
-layout(set = 0, binding = 15) uniform accelerationStructureEXT trees;
-layout(location = 0) rayPayloadEXT Found met;
+layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
+layout(location = 0) rayPayloadEXT Payload payload;
 
-Hit trace(Ray ray, bool any, bool passes_backs) {
+Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))
         return no_hit(ray);
-    met.object = 0u; // of a hit by `any`, whose object is of no matter
-    traceRayEXT(trees,
-                (any ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
-                    (passes_backs ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),
-                ray.mask, 0, 0, 0, ray.origin, 0.0, ray.direction, ray.end, 0);
-    if (met.object == FOUND_NOTHING)
+    payload.object = 0u; // stays if closest hit is skipped: any value but MISS
+    traceRayEXT(top_level,
+                (any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
+                    (cull_back_faces ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),
+                ray.mask, 0, 0, 0, ray.origin, 0.0, ray.direction, ray.t_max, 0);
+    if (payload.object == MISS)
         return no_hit(ray);
-    if (any)
-        return Hit(ray.end, vec2(0.0), vec3(0.0), met.object, 0u);
-    return hit_of(ray, met.object, objects[met.object].root + met.number, met.way, met.at);
+    if (any_hit)
+        return Hit(ray.t_max, vec2(0.0), vec3(0.0), payload.object, 0u);
+    return recomputed_hit(ray, payload.object, objects[payload.object].root + payload.number, payload.t, payload.uv);
 }

@@ -6,10 +6,10 @@
 #include <array>
 #include <set>
 
-namespace arhost::view {
+namespace arhost::raytracer_common {
 namespace {
 
-TEST(SamplePositions, OneLiesInEachRowAndColumnAndTheirMeanIsTheCentre) {
+TEST(SamplePositions, HaveOneInEachRowAndColumnAndAreCentred) {
     for (unsigned count = 1; count <= 256; ++count) {
         std::set<unsigned> rows, columns;
         double x = 0, y = 0;
@@ -26,7 +26,7 @@ TEST(SamplePositions, OneLiesInEachRowAndColumnAndTheirMeanIsTheCentre) {
     }
 }
 
-TEST(SamplePositions, OfTheSequenceBeginAtTheCentreAndGoOnWhereOthersHaveEnded) {
+TEST(SamplePositions, OfTheSequenceStartAtTheCentreAndContinue) {
     const auto all = sample_positions(0, 12), later = sample_positions(5, 7);
     EXPECT_EQ(all[0].x, 0);
     EXPECT_EQ(all[0].y, 0);
@@ -37,7 +37,7 @@ TEST(SamplePositions, OfTheSequenceBeginAtTheCentreAndGoOnWhereOthersHaveEnded) 
     }
 }
 
-TEST(SamplePositions, OfTheSequenceAreEvenHoweverFarItGoes) {
+TEST(SamplePositions, OfTheSequenceStayEvenlyDistributed) {
     for (const std::uint32_t first : {0u, 1000u, 60000u}) {
         std::array<int, 64> cells{};
         for (const Sample &sample : sample_positions(first, 4096)) {
@@ -46,10 +46,10 @@ TEST(SamplePositions, OfTheSequenceAreEvenHoweverFarItGoes) {
             const int row = std::min(static_cast<int>((sample.y + 0.5f) * 8), 7);
             ++cells[static_cast<std::size_t>(8 * row + column)];
         }
-        for (const int count : cells) // 64 each; chance would spread them by 8
+        for (const int count : cells) // 64 each; the standard deviation of random samples would be 8
             EXPECT_NEAR(count, 64, 4);
     }
 }
 
 } // namespace
-} // namespace arhost::view
+} // namespace arhost::raytracer_common

@@ -58,7 +58,7 @@ TEST(RayTable, OffCentreSamplesProjectToTheirPositions) {
         for (int number = 0; number < 64; ++number) {
             const float *block = rays.blocks + number * rays.block_size();
             const double x = number % 8 * 4, y = number / 8 * 4;
-            for (const arhost::view::Sample &sample : arhost::view::sample_positions(16)) {
+            for (const arhost::raytracer_common::Sample &sample : arhost::raytracer_common::sample_positions(16)) {
                 double d[3] = {0, 0, 1};
                 for (int i = 0; i < rays.dimensions; ++i)
                     d[i] = block[16 * i] + block[step + 16 * i] * sample.x + block[2 * step + 16 * i] * sample.y;

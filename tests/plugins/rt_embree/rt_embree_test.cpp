@@ -571,7 +571,7 @@ TEST(Samples, CompositeToTheMeanOfPerSampleComposites) {
     const arhost_intrinsics in = pinhole();
     const Picture all = Tracer(sphere_over_catcher(), {{"samples", std::to_string(count)}}).render(from_the_side(in));
     std::vector<Picture> singles;
-    for (const view::Sample &sample : view::sample_positions(count)) {
+    for (const raytracer_common::Sample &sample : raytracer_common::sample_positions(count)) {
         arhost_intrinsics shifted = in;
         shifted.cx -= sample.x;
         shifted.cy -= sample.y;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the Vulkan loader is told of this machine's drivers, as a test can change it.
+// Copies of this machine's Vulkan driver manifests, for tests to change.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace arhost::test {
 
-// Copies all drivers' manifests to `folder`; the list of them is for VK_DRIVER_FILES.
+// Copies all driver manifests to `folder`; returns their list for VK_DRIVER_FILES.
 inline std::string copy_drivers(const std::filesystem::path &folder) {
     namespace fs = std::filesystem;
     fs::create_directories(folder);

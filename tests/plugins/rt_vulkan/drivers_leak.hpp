@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// For a program's one file that is to look for no leaks: Mesa's drivers leak, and have been unloaded when that is
-// told, so that no suppression can name them.
+// Disables leak checks; include in one file of a program. Mesa's drivers leak, and are unloaded when leaks are
+// reported, so that suppressions can't name them.
 #pragma once
 
 #if defined(__SANITIZE_ADDRESS__)

@@ -7,7 +7,7 @@
 
 namespace arhost::test {
 
-// Set as long as this lives; then as before.
+// Sets a variable, and restores it on destruction.
 class EnvironmentVariable {
 public:
     EnvironmentVariable(const char *name, const std::string &value) : name_(name) {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A Vulkan layer that passes everything on to the driver, until it is to fail. ARHOST_TEST_VULKAN_FAILS, which is
-// read at each such call, says when:
-//   submit:N    at a device's Nth vkQueueSubmit it is lost, and stays so
-//   wait:N      at its Nth vkWaitForFences it is, when the work is done
-//   allocate:N  from its Nth vkAllocateMemory on it has no memory left
-//   pipelines:N it makes no Nth pipeline for ray tracing, nor later ones
-//   device-with:EXTENSION  it can't be opened with that
-// Where ARHOST_TEST_VULKAN_IS_A_GPU is "query" or "pipeline", all devices say that they are discrete GPUs, and lack
-// the extensions of later paths. Where ARHOST_TEST_VULKAN_IS_OLD is "all", they know Vulkan 1.0 only; where it is
-// "first", the one that is asked first.
+// A Vulkan layer that injects failures. ARHOST_TEST_VULKAN_FAILS, read at each such call, names the failure:
+//   submit:N    a device's Nth vkQueueSubmit loses the device
+//   wait:N      its Nth vkWaitForFences completes the work and loses the device
+//   allocate:N  its Nth vkAllocateMemory and all later ones are out of memory
+//   pipelines:N creating its Nth ray tracing pipeline and all later ones fails
+//   device-with:EXTENSION  opening the device with that extension fails
+// With ARHOST_TEST_VULKAN_IS_A_GPU=query or =pipeline, all devices claim to be discrete GPUs without the extensions
+// of later paths. With ARHOST_TEST_VULKAN_IS_OLD=all, all devices support Vulkan 1.0 only; with =first, the first one
+// queried.
 #include <vulkan/vk_layer.h>
 
 #include <cstdint>
@@ -24,11 +23,11 @@ namespace {
 struct NextInstance {
     VkInstance handle;
     PFN_vkGetInstanceProcAddr get;
-    // Later on loaders may answer with the first layer's.
+    // Loaded at creation: later, loaders may return the first layer's.
     PFN_vkDestroyInstance destroy;
     PFN_vkGetPhysicalDeviceProperties2 get_properties;
     PFN_vkEnumerateDeviceExtensionProperties list_extensions;
-    VkPhysicalDevice asked_first = VK_NULL_HANDLE;
+    VkPhysicalDevice first_queried = VK_NULL_HANDLE;
 };
 struct NextDevice {
     VkDevice handle;
@@ -38,7 +37,7 @@ struct NextDevice {
 };
 
 std::mutex mutex;
-std::map<void *, NextInstance> instances; // by what the handles of all that is an instance's begin with
+std::map<void *, NextInstance> instances; // by dispatch key: the first word of all handles of an instance
 std::map<void *, NextDevice> devices;
 
 void *key_of(const void *handle) {
@@ -57,24 +56,24 @@ template <class Function> Function next(const NextDevice &device, const char *na
     return reinterpret_cast<Function>(device.get(device.handle, name));
 }
 
-// Whether this call, the `count`th of `what`, is to fail.
+// Whether the `count`th call of `what` should fail.
 bool fails(const char *what, std::uint64_t count) {
-    const char *told = std::getenv("ARHOST_TEST_VULKAN_FAILS");
-    const std::string begin = std::string(what) + ":";
-    return told && !std::strncmp(told, begin.c_str(), begin.size()) &&
-           count >= std::strtoull(told + begin.size(), nullptr, 10);
+    const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    const std::string prefix = std::string(what) + ":";
+    return failure && !std::strncmp(failure, prefix.c_str(), prefix.size()) &&
+           count >= std::strtoull(failure + prefix.size(), nullptr, 10);
 }
 
 bool fails_with(const char *extension) {
-    const char *told = std::getenv("ARHOST_TEST_VULKAN_FAILS");
-    return told && told == std::string("device-with:") + extension;
+    const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    return failure && failure == std::string("device-with:") + extension;
 }
 
-// The loader's own link in a create info's chain, where the next layer or the driver is named.
+// The loader's link in a create info's chain, which leads to the next layer or the driver.
 template <class Link> Link *link_of(const void *chain, VkStructureType type) {
     for (auto *info = static_cast<const Link *>(chain); info; info = static_cast<const Link *>(info->pNext))
         if (info->sType == type && info->function == VK_LAYER_LINK_INFO)
-            return const_cast<Link *>(info); // the interface asks layers to move it on
+            return const_cast<Link *>(info); // the layer interface requires layers to advance it
     return nullptr;
 }
 
@@ -89,11 +88,11 @@ VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
         next<PFN_vkCreateInstance>(VK_NULL_HANDLE, get, "vkCreateInstance")(info, allocator, instance);
     if (result == VK_SUCCESS) {
         const std::lock_guard lock(mutex);
-        const auto ask = [&](const char *name) { return get(*instance, name); };
+        const auto load = [&](const char *name) { return get(*instance, name); };
         instances[key_of(*instance)] = {
-            *instance, get, reinterpret_cast<PFN_vkDestroyInstance>(ask("vkDestroyInstance")),
-            reinterpret_cast<PFN_vkGetPhysicalDeviceProperties2>(ask("vkGetPhysicalDeviceProperties2")),
-            reinterpret_cast<PFN_vkEnumerateDeviceExtensionProperties>(ask("vkEnumerateDeviceExtensionProperties"))};
+            *instance, get, reinterpret_cast<PFN_vkDestroyInstance>(load("vkDestroyInstance")),
+            reinterpret_cast<PFN_vkGetPhysicalDeviceProperties2>(load("vkGetPhysicalDeviceProperties2")),
+            reinterpret_cast<PFN_vkEnumerateDeviceExtensionProperties>(load("vkEnumerateDeviceExtensionProperties"))};
     }
     return result;
 }
@@ -149,7 +148,7 @@ VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice handle, std::uint32_t co
     NextDevice &device = devices.at(key_of(handle));
     if (device.lost)
         return VK_ERROR_DEVICE_LOST;
-    // The driver knows of no loss: what it works on must not be destroyed before it has done it.
+    // The driver does not know of the loss: wait, so that nothing in use is destroyed.
     const VkResult result =
         next<PFN_vkWaitForFences>(device, "vkWaitForFences")(handle, count, fences, all, timeout_ns);
     device.lost = fails("wait", ++device.waits);
@@ -185,11 +184,11 @@ VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical, VkPhysicalD
     if (std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU"))
         properties->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
     const std::lock_guard lock(mutex);
-    VkPhysicalDevice &asked_first = instances.at(key_of(physical)).asked_first;
-    if (!asked_first)
-        asked_first = physical;
+    VkPhysicalDevice &first_queried = instances.at(key_of(physical)).first_queried;
+    if (!first_queried)
+        first_queried = physical;
     const char *old = std::getenv("ARHOST_TEST_VULKAN_IS_OLD");
-    if (old && (asked_first == physical || !std::strcmp(old, "all")))
+    if (old && (first_queried == physical || !std::strcmp(old, "all")))
         properties->properties.apiVersion = VK_API_VERSION_1_0;
 }
 
@@ -199,11 +198,11 @@ VKAPI_ATTR VkResult VKAPI_CALL list_extensions(VkPhysicalDevice physical, const 
     const char *last_path = std::getenv("ARHOST_TEST_VULKAN_IS_A_GPU");
     for (std::uint32_t i = 0; extensions && i < *count && last_path && !std::strcmp(last_path, "query"); ++i)
         if (!std::strcmp(extensions[i].extensionName, VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME))
-            std::strcpy(extensions[i].extensionName, "VK_ARHOST_left_out");
+            std::strcpy(extensions[i].extensionName, "VK_ARHOST_hidden");
     return result;
 }
 
-PFN_vkVoidFunction own(const char *name, bool of_instance) {
+PFN_vkVoidFunction intercepted(const char *name, bool of_instance) {
     const struct {
         const char *name;
         PFN_vkVoidFunction function;
@@ -229,14 +228,14 @@ PFN_vkVoidFunction own(const char *name, bool of_instance) {
 }
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device_function(VkDevice device, const char *name) {
-    if (const PFN_vkVoidFunction function = own(name, false))
+    if (const PFN_vkVoidFunction function = intercepted(name, false))
         return function;
     const std::lock_guard lock(mutex);
     return devices.at(key_of(device)).get(device, name);
 }
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance_function(VkInstance instance, const char *name) {
-    if (const PFN_vkVoidFunction function = own(name, true))
+    if (const PFN_vkVoidFunction function = intercepted(name, true))
         return function;
     if (!instance)
         return nullptr;

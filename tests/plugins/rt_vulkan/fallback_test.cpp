@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A run whose Vulkan device is gone: the host's other ray tracer goes on.
+// A run whose Vulkan driver disappears: the fallback ray tracer takes over.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
 #include "two_tracers.hpp"
@@ -17,15 +17,15 @@ using testing::HasSubstr;
 
 constexpr int frames = 400;
 
-class DriverThatGoes : public testing::Test {
+class LostDriver : public testing::Test {
 protected:
     void SetUp() override {
 #if defined(__SANITIZE_ADDRESS__)
-        GTEST_SKIP() << "what drivers leak would be the worker's fault";
+        GTEST_SKIP() << "leaks of drivers would fail the worker";
 #endif
         ARHOST_REQUIRE_VULKAN();
     }
-    DriverThatGoes() : drivers_(run_.path("drivers")), list_(copy_drivers(drivers_)) {
+    LostDriver() : drivers_(run_.path("drivers")), list_(copy_drivers(drivers_)) {
         run_.write("scene.yaml", small_scene);
     }
     void start(const char *more) {
@@ -40,18 +40,18 @@ protected:
             ::setenv("VK_ICD_FILENAMES", list_.c_str(), 1);
         });
     }
-    // Of the frames that have come to the output so far.
+    // Frames with an overlay that have reached the output.
     std::ptrdiff_t overlaid() const {
         const auto lines =
             run_.exists("out/counted.txt") ? counted(run_, "out/counted.txt") : std::vector<CountedLine>();
         return std::ranges::count_if(lines, [](const CountedLine &line) { return line.kind != ARHOST_OVERLAY_NONE; });
     }
-    void take_drivers_away() {
+    void remove_drivers() {
         while (run_.running() && overlaid() < 20)
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         fs::remove_all(drivers_);
         ASSERT_GT(run_.worker("rt_vulkan"), 0) << run_.output();
-        ::kill(run_.worker("rt_vulkan"), SIGKILL); // as a lost device ends it
+        ::kill(run_.worker("rt_vulkan"), SIGKILL); // as after a device loss
     }
 
     ArhostRun run_;
@@ -63,25 +63,25 @@ private:
 
 } // namespace
 
-TEST_F(DriverThatGoes, HandsOverToTheFallbackInMidRun) {
+TEST_F(LostDriver, FallsBackInMidRun) {
     start(", fallback: rt_embree");
-    take_drivers_away();
+    remove_drivers();
     EXPECT_EQ(run_.wait(), 0) << run_.output();
     EXPECT_THAT(run_.output(), HasSubstr("falling back to rt_embree"));
     const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));
     EXPECT_EQ(stats["frames"]["composited"], frames);
-    EXPECT_GE(stats["frames"]["augmented"], frames - 5) << "those of the moment alone are without";
+    EXPECT_GE(stats["frames"]["augmented"], frames - 5) << "only the frames of the switch lack an overlay";
     EXPECT_GE(overlaid(), frames - 5);
     const nlohmann::json &device = stats["stages"]["device"], &all = stats["stages"]["raytracer"];
     EXPECT_GE(device["count"], 20) << stats["stages"];
-    EXPECT_LT(device["count"], all["count"]) << "the fallback has no device";
+    EXPECT_LT(device["count"], all["count"]) << "the fallback reports no device time";
     EXPECT_GT(device["p50_ms"], 0.0);
     EXPECT_LE(device["max_ms"], all["max_ms"]);
 }
 
-TEST_F(DriverThatGoes, LeavesTheVideoAsItIsWhereThereIsNoFallback) {
+TEST_F(LostDriver, ContinuesAsPlainVideoWithoutAFallback) {
     start("");
-    take_drivers_away();
+    remove_drivers();
     EXPECT_EQ(run_.wait(), 1) << run_.output();
     EXPECT_THAT(run_.output(), HasSubstr("Vulkan"));
     const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Many images of scenes that take turns, through the plugin, and what they leave behind.
+// Renders many images of alternating scenes through the plugin, and measures what leaks.
 #pragma once
 
 #include "scene/loader.hpp"
@@ -22,12 +22,12 @@ namespace arhost::test {
 struct LongRun {
     struct State {
         double memory_mib;    // resident
-        std::ptrdiff_t files; // descriptors
+        std::ptrdiff_t files; // open file descriptors
     };
-    std::vector<State> states; // once the plugin has stopped, after each scene
+    std::vector<State> states; // after each scene, with the plugin stopped
     std::string log;
 
-    std::size_t messages() const { // of the validation layers
+    std::size_t validation_messages() const {
         std::size_t count = 0;
         for (std::size_t at = 0; (at = log.find("Vulkan validation: ", at)) != std::string::npos; ++at)
             ++count;
@@ -35,8 +35,8 @@ struct LongRun {
     }
 };
 
-// What has been freed is given back first: else how it lies in pieces would count.
-inline LongRun::State state_now() {
+// Returns freed memory to the system first, as fragmentation is not a leak.
+inline LongRun::State current_state() {
     ::malloc_trim(0);
     std::size_t pages = 0, resident = 0;
     std::ifstream("/proc/self/statm") >> pages >> resident;
@@ -45,8 +45,8 @@ inline LongRun::State state_now() {
         std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator())};
 }
 
-// `changes` times another scene, each time so many small images from the dissertation's marker's surroundings. Throws
-// with what the plugin says where it fails.
+// Starts `changes` times with the next scene, each time for `images` small images near the dissertation's marker.
+// Throws with the plugin's log if it fails.
 inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int changes, int images,
                         const Options &options) {
     PluginUnderTest plugin("rt_vulkan");
@@ -61,7 +61,7 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
     const auto &functions = plugin.functions<arhost_raytracer>();
     const arhost_intrinsics intrinsics = pinhole(48, 36, 48);
     constexpr std::size_t slots = 3, page = 4096;
-    // In pages of their own, as the host's, so that the device may write to them itself.
+    // Page-aligned like the host's, so that the device can write to them directly.
     const std::size_t size = 2 * page;
     const std::unique_ptr<std::uint8_t, decltype(&std::free)> memory(
         static_cast<std::uint8_t *>(std::aligned_alloc(page, slots * size)), &std::free);
@@ -86,7 +86,7 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
             require(functions.render(plugin.instance(), &request, &image, &info));
         }
         functions.stop(plugin.instance());
-        run.states.push_back(state_now());
+        run.states.push_back(current_state());
     }
     run.log = plugin.log();
     return run;

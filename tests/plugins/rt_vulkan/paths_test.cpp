@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The same picture by the device's own trees as by ours, scene by scene, from afar and from near.
+// The hardware paths give the plain path's images, for each scene from far and near.
 #include "scene_views.hpp"
 
 namespace arhost::test {
 
-class SamePictureByPath : public testing::TestWithParam<std::tuple<std::string, View>> {};
+class PathImages : public testing::TestWithParam<std::tuple<std::string, View>> {};
 
-TEST_P(SamePictureByPath, AsThePlainPathGives) {
+TEST_P(PathImages, MatchThePlainPath) {
     const auto &[path, view] = GetParam();
     ARHOST_REQUIRE_VULKAN(path);
     const std::filesystem::path file = file_of(view);
@@ -27,28 +27,28 @@ TEST_P(SamePictureByPath, AsThePlainPathGives) {
         keep(got, name);
         const Likeness like = likeness(got, expected);
         std::cout << name << ": " << like << std::endl;
-        // Which of two facets is hit where they meet, or lie in one plane, each device decides in its own way.
+        // Devices differ in which of two adjacent or coplanar facets they hit.
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
         if (traced.plugin().log().find("llvmpipe") != std::string::npos) {
-            EXPECT_EQ(like.squares, 0) << like; // it rounds as we write
+            EXPECT_EQ(like.squares, 0) << like; // it evaluates expressions as written
         } else if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
             EXPECT_GE(like.psnr(), 45) << like;
         }
         shown += like.inside;
     }
-    EXPECT_GT(shown, 200) << "hardly anything to compare";
+    EXPECT_GT(shown, 200) << "too few pixels to compare";
 }
 
 constexpr auto name_of = [](const auto &info) {
     return std::get<0>(info.param) + "_" + name_of_view(std::get<1>(info.param));
 };
-// Between them they have whatever a path does in its own way: spheres, holes, lights, what moves and deforms, glass.
+// These cover all that is specific to a path: spheres, holes, lights, motion, deformation, glass.
 const auto some_scenes = scenes_named({"classes", "room", "moving", "optix-skybox-teapot", "vkray-hbf"});
-INSTANTIATE_TEST_SUITE_P(SomeScenes, SamePictureByPath,
-                         testing::Combine(testing::Values("query", "pipeline"), some_scenes), name_of);
-// Minutes of compiling: tools/likeness runs them.
-INSTANTIATE_TEST_SUITE_P(DISABLED_EveryScene, SamePictureByPath,
+INSTANTIATE_TEST_SUITE_P(SomeScenes, PathImages, testing::Combine(testing::Values("query", "pipeline"), some_scenes),
+                         name_of);
+// Compiling takes minutes: tools/likeness runs them.
+INSTANTIATE_TEST_SUITE_P(DISABLED_EveryScene, PathImages,
                          testing::Combine(testing::Values("query", "pipeline"), every_scene), name_of);
 
 } // namespace arhost::test

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The same picture as rt_embree's, scene by scene, from afar and from near.
+// rt_vulkan gives rt_embree's images, for each scene from far and near.
 #include "scene_views.hpp"
 
 namespace arhost::test {
 
-class SamePicture : public testing::TestWithParam<View> {};
+class SceneImages : public testing::TestWithParam<View> {};
 
-TEST_P(SamePicture, AsRtEmbreeGives) {
+TEST_P(SceneImages, MatchRtEmbree) {
     ARHOST_REQUIRE_VULKAN();
     const std::filesystem::path file = file_of(GetParam());
     const Options options{{"samples", GetParam().samples}};
@@ -38,23 +38,22 @@ TEST_P(SamePicture, AsRtEmbreeGives) {
         if (glass) { // see below
             Picture by_robust(small);
             ASSERT_EQ(robust.try_render(view, by_robust, &then), ARHOST_STATUS_OK);
-            const int most = likeness(by_robust, expected).colours_off;
-            EXPECT_LE(like.colours_off, most + 3 * std::sqrt(most) + 1) << like; // but for the luck of a count
+            const int robust_off = likeness(by_robust, expected).colours_off;
+            EXPECT_LE(like.colours_off, robust_off + 3 * std::sqrt(robust_off) + 1) << like; // 3 sigma of a count
         }
         shown += like.inside;
     }
-    EXPECT_GT(shown, 200) << "hardly anything to compare";
+    EXPECT_GT(shown, 200) << "too few pixels to compare";
 }
 
 constexpr auto name_of = [](const auto &info) { return name_of_view(info.param); };
-INSTANTIATE_TEST_SUITE_P(Scenes, SamePicture, every_scene, name_of);
+INSTANTIATE_TEST_SUITE_P(Scenes, SceneImages, every_scene, name_of);
 
-// Behind glass the last bits of a hit decide which facet is next. The measure is how much rt_embree differs from
-// itself where Embree traverses its trees in its robust way. A few bright pixels are most of it: so a walk's pictures
-// are taken for one.
+// Behind glass the last bits of a hit decide which facet is hit next. The tolerance is the difference between
+// rt_embree's robust and fast traversal. A few bright pixels dominate it: the images of a camera path are summed up.
 class BehindGlass : public testing::TestWithParam<View> {};
 
-TEST_P(BehindGlass, RtVulkanIsNoFartherFromRtEmbreeThanThatFromItself) {
+TEST_P(BehindGlass, DifferenceIsBelowThatOfEmbreesRobustAndFastTraversal) {
     ARHOST_REQUIRE_VULKAN();
     const std::filesystem::path file = file_of(GetParam());
     Tracer vulkan(scene::load_scene(file), {}, "rt_vulkan"), embree(scene::load_scene(file), {}),
@@ -79,7 +78,7 @@ TEST_P(BehindGlass, RtVulkanIsNoFartherFromRtEmbreeThanThatFromItself) {
     EXPECT_EQ(of_vulkan.alphas_off_inside, 0);
 }
 
-// Minutes: tools/likeness runs them.
+// They take minutes: tools/likeness runs them.
 INSTANTIATE_TEST_SUITE_P(DISABLED_Scenes, BehindGlass,
                          scenes_named({"optix-gd", "optix-gl", "optix-skybox-lucy", "optix-skybox-teapot"}), name_of);
 

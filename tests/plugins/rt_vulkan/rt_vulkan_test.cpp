@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The plugin on the device that is here, and what it says where there is none.
+// The plugin on this machine's device, and its messages if there is none.
 #include "drivers_leak.hpp"
 #include "environment_variable.hpp"
 #include "large_surfaces.hpp"
@@ -28,10 +28,9 @@ namespace {
 
 using testing::HasSubstr;
 
-// Keeps what is logged.
 struct LoggingHost {
     std::string text;
-    int asked = 0; // whether it cancels
+    int cancel_checks = 0;
     arhost_host host{sizeof host,
                      ARHOST_ABI_VERSION,
                      "arhost-test",
@@ -42,7 +41,7 @@ struct LoggingHost {
                      },
                      [](const arhost_host *, double, const char *) {},
                      [](const arhost_host *self) {
-                         ++static_cast<LoggingHost *>(self->context)->asked;
+                         ++static_cast<LoggingHost *>(self->context)->cancel_checks;
                          return 0;
                      },
                      [](const arhost_host *, const char *) -> const void * { return nullptr; }};
@@ -55,7 +54,7 @@ template <class Call> std::string refusal(arhost_status status, Call call) {
         EXPECT_EQ(failure.status(), status) << failure.what();
         return failure.what();
     }
-    ADD_FAILURE() << "nothing was refused";
+    ADD_FAILURE() << "no failure was thrown";
     return "";
 }
 
@@ -69,10 +68,10 @@ arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> co
     return in;
 }
 
-void expect_same_picture(const arhost_camera &view, const Options &options, const std::string &path = "auto") {
-    Options own = options;
-    own["path"] = path;
-    const Picture got = picture_by("rt_vulkan", rich_scene(), view, own);
+void expect_rt_embrees_picture(const arhost_camera &view, const Options &options, const std::string &path = "auto") {
+    Options with_path = options;
+    with_path["path"] = path;
+    const Picture got = picture_by("rt_vulkan", rich_scene(), view, with_path);
     const Likeness like = likeness(got, picture_by("rt_embree", rich_scene(), view, options));
     EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
     EXPECT_EQ(like.alphas_off_inside, 0) << like;
@@ -83,27 +82,28 @@ void expect_same_picture(const arhost_camera &view, const Options &options, cons
 
 } // namespace
 
-// ---- The same picture ------------------------------------------------------------------------------
+// ---- Equality with rt_embree -----------------------------------------------------------------------
 
 class RichScene : public testing::Test {
 protected:
     void SetUp() override { ARHOST_REQUIRE_VULKAN(); }
 };
 
-TEST_F(RichScene, IsRtEmbrees) {
-    expect_same_picture(from_the_side(small), {});
+TEST_F(RichScene, MatchesRtEmbree) {
+    expect_rt_embrees_picture(from_the_side(small), {});
 }
-TEST_F(RichScene, WithSeveralSamplesIsRtEmbrees) {
-    expect_same_picture(from_the_side(small), {{"samples", "3"}, {"light_samples", "2"}});
+TEST_F(RichScene, WithSeveralSamplesMatchesRtEmbree) {
+    expect_rt_embrees_picture(from_the_side(small), {{"samples", "3"}, {"light_samples", "2"}});
 }
-TEST_F(RichScene, WithOnePathThroughGlassIsRtEmbrees) {
-    expect_same_picture(from_the_side(small), {{"glass", "path"}});
+TEST_F(RichScene, WithOnePathThroughGlassMatchesRtEmbree) {
+    expect_rt_embrees_picture(from_the_side(small), {{"glass", "path"}});
 }
-TEST_F(RichScene, ThroughALensIsRtEmbrees) {
-    expect_same_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
-    expect_same_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})), {{"samples", "2"}});
+TEST_F(RichScene, ThroughALensMatchesRtEmbree) {
+    expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
+    expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})),
+                              {{"samples", "2"}});
 }
-TEST_F(RichScene, AccumulatedIsRtEmbrees) {
+TEST_F(RichScene, AccumulatedMatchesRtEmbree) {
     const Options options{{"accumulate", "true"}, {"samples", "2"}};
     Tracer vulkan(rich_scene(), options, "rt_vulkan"), embree(rich_scene(), options);
     ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
@@ -120,11 +120,11 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     const Likeness like = likeness(got, expected);
     EXPECT_EQ(like.alphas_off, 0) << like;
     EXPECT_GE(like.psnr(), 45) << like;
-    // Another camera begins anew, and back again is the first picture.
+    // Another camera restarts the accumulation; so does the first one afterwards.
     ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_STATUS_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
-    // So does the one after an image that was cancelled half-way: the second still is in bands.
+    // So does an image cancelled in the middle: the second one is still traced in bands.
     ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     vulkan.plugin().cancel(1);
@@ -133,31 +133,31 @@ TEST_F(RichScene, AccumulatedIsRtEmbrees) {
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
 }
-TEST_F(RichScene, AgainAndAgainIsTheSameBytes) {
+TEST_F(RichScene, RepeatedGivesTheSameBytes) {
     Tracer tracer(rich_scene(), {}, "rt_vulkan");
     const auto first = tracer.render(from_the_side(small)).pixels();
     tracer.render(from_the_side(pinhole(64, 48, 64)));
     EXPECT_EQ(tracer.render(from_the_side(small)).pixels(), first);
 }
 
-// ---- Each path --------------------------------------------------------------------------------------
+// ---- Each path -------------------------------------------------------------------------------------
 
 namespace {
 
-arhost_camera of_moving(const arhost_intrinsics &intrinsics = small) {
+arhost_camera moving_camera(const arhost_intrinsics &intrinsics = small) {
     return camera({25, -330, 150}, {0, 0, 50}, {0, 0, 1}, intrinsics);
 }
 
 const std::string moving_scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
 const auto all_paths = testing::Values("plain", "query", "pipeline");
 
-// What a renderer is made of, by a path.
+// The arguments of a Renderer for a path.
 struct RendererParts {
     explicit RendererParts(const std::string &path)
         : device(rt_vulkan::choose_device(instance.devices(), "auto")),
-          shaders(rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::choose_paths(device, path)[0])) {}
+          shaders(rt_vulkan::shaders_of(rt_vulkan::choose_paths(device, path)[0])) {}
     rt_vulkan::Renderer renderer(const arhost_raytracer_setup &setup, const rt_vulkan::Settings &settings = {}) {
-        return {setup, settings, host, instance, device, shaders};
+        return {setup, settings, host, device, shaders};
     }
     LoggingHost logging;
     const Host host{&logging.host};
@@ -178,23 +178,23 @@ protected:
 };
 INSTANTIATE_TEST_SUITE_P(Paths, EachPath, all_paths, name_of_path);
 
-TEST_P(EachPath, GivesRtEmbreesPicture) {
-    expect_same_picture(from_the_side(small), {}, GetParam());
+TEST_P(EachPath, MatchesRtEmbree) {
+    expect_rt_embrees_picture(from_the_side(small), {}, GetParam());
 }
 
-TEST_P(EachPath, LetsNoLargeSurfaceCastShadowsOnItself) {
+TEST_P(EachPath, DoesNotSelfShadowLargeSurfaces) {
     for (const LargeSurface &surface : large_surfaces)
         EXPECT_EQ(pixels_out_of_light(surface, "rt_vulkan", {{"path", GetParam()}}), 0) << surface;
 }
 
-TEST_P(EachPath, KeepsTheShadowsOfWhatIsFlatOnALargeFloor) {
+TEST_P(EachPath, KeepsContactShadowsOnALargeFloor) {
     for (const float side_mm : {1e2f, 1e6f}) {
         Tracer tracer(plate_on_floor(side_mm), {{"path", GetParam()}}, "rt_vulkan");
         EXPECT_TRUE(has_its_shadow(tracer.render(camera_over_plate()))) << side_mm;
     }
 }
 
-TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
+TEST_P(EachPath, CancelsAnImageAndContinues) {
     const auto scene = [] { return scene::load_scene(moving_scene); };
     Tracer tracer(scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
@@ -203,11 +203,11 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     const std::vector<Pixel> untouched = picture.pixels();
     const auto rendered = [&](double time_s) {
         const arhost_motion motion = evaluator.at(time_s);
-        return tracer.try_render(of_moving(), picture, &motion);
+        return tracer.try_render(moving_camera(), picture, &motion);
     };
-    tracer.plugin().cancel(1); // once the first band is done
+    tracer.plugin().cancel(1); // after the first band
     EXPECT_EQ(rendered(0.7), ARHOST_STATUS_ERROR_CANCELLED);
-    EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while an image was traced"));
+    EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while tracing the image"));
     EXPECT_EQ(picture.pixels(), untouched);
     tracer.plugin().reset_cancel();
     ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
@@ -217,24 +217,24 @@ TEST_P(EachPath, LeavesAnImageThatIsCancelledAndFollowsOn) {
     EXPECT_EQ(after, picture.pixels());
 }
 
-TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
+TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
     RendererParts parts(GetParam());
     scene::Arena arena = rich_scene().build();
     for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
         const arhost_intrinsics in = pinhole(96, height, 96);
         const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &arena.scene(), &in};
-        // The first image is in bands in any case, as no one knows how long it takes; the second may be.
-        const auto third = [&](rt_vulkan::Bands::Milliseconds longest_band) {
+        // The first image always uses bands, as its time is unknown; the second may.
+        const auto third = [&](rt_vulkan::Bands::Milliseconds max_band_time) {
             rt_vulkan::Settings settings;
-            settings.longest_band = longest_band;
+            settings.max_band_time = max_band_time;
             rt_vulkan::Renderer renderer = parts.renderer(setup, settings);
             rt_vulkan::Rectangle drawn{};
             Picture picture(in);
             for (int image = 0; image < 3; ++image) {
-                const int asked = parts.logging.asked;
+                const int checks = parts.logging.cancel_checks;
                 drawn = renderer.render(from_the_side(in), picture.image());
-                const int expected = longest_band.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
-                EXPECT_TRUE(image < 2 || parts.logging.asked - asked == expected) << "a look before each band";
+                const int expected = max_band_time.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
+                EXPECT_TRUE(image < 2 || parts.logging.cancel_checks - checks == expected) << "one check per band";
             }
             EXPECT_TRUE(picture.only_pixels_written());
             return std::tuple(picture.pixels(), drawn.x, drawn.y, drawn.width, drawn.height);
@@ -243,14 +243,14 @@ TEST_P(EachPath, InBandsGivesTheSamePictureAsAtOnce) {
     }
 }
 
-TEST_P(EachPath, IsToldOf) {
+TEST_P(EachPath, IsLogged) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
 }
 
-// Of an image for which trees are built anew, too.
-TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
+// Including images that rebuild acceleration structures.
+TEST_P(EachPath, ReportsTheDeviceTimeIfTheStructHasTheField) {
     LoggingHost logging;
     const Host host(&logging.host);
     const rt_vulkan::Instance instance(host, false);
@@ -264,7 +264,7 @@ TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
         const arhost_motion motion = evaluator.at(time_s);
         picture.info = {sizeof picture.info, 0, 0, 0, 0, 0, 0};
         const auto begin = std::chrono::steady_clock::now();
-        ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
         const std::chrono::nanoseconds took = std::chrono::steady_clock::now() - begin;
         EXPECT_EQ(picture.info.device_time_ns > 0, has_clock);
         EXPECT_LE(picture.info.device_time_ns, static_cast<std::uint64_t>(took.count()));
@@ -272,27 +272,27 @@ TEST_P(EachPath, TellsTheDevicesTimeWhereThereIsAPlaceForIt) {
     constexpr std::uint64_t untouched = 7;
     picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched};
     const arhost_motion motion = evaluator.at(1.5);
-    ASSERT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK);
-    EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct ends before it";
+    ASSERT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK);
+    EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct lacks the field";
     EXPECT_TRUE(picture.info.has_region);
 }
 
-// Things are where they should be however long they have moved, on trees that have been refitted, and then built.
-TEST_P(EachPath, FollowsWhatMoves) {
+// After many refits and rebuilds.
+TEST_P(EachPath, FollowsMotion) {
     const arhost_intrinsics tiny = pinhole(48, 36, 48);
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan"),
         embree(scene::load_scene(moving_scene));
     ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.plugin().log();
     ASSERT_EQ(embree.start(tiny), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
-    constexpr int frames = 130; // more than two times as many refits as there are between buildings
+    constexpr int frames = 130; // more than two rebuild intervals
     for (int frame = 0; frame < frames; ++frame) {
         const arhost_motion motion = evaluator.at(0.1 * frame);
         Picture got(tiny), expected(tiny);
-        ASSERT_EQ(tracer.try_render(of_moving(tiny), got, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.try_render(moving_camera(tiny), got, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
         if (frame % 13)
             continue;
-        ASSERT_EQ(embree.try_render(of_moving(tiny), expected, &motion), ARHOST_STATUS_OK);
+        ASSERT_EQ(embree.try_render(moving_camera(tiny), expected, &motion), ARHOST_STATUS_OK);
         const Likeness like = likeness(got, expected);
         EXPECT_LE(like.alphas_off, like.pixels / 500) << "frame " << frame << ": " << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << "frame " << frame << ": " << like;
@@ -300,7 +300,7 @@ TEST_P(EachPath, FollowsWhatMoves) {
     }
 }
 
-TEST_P(EachPath, TakesOneSceneAfterAnother) {
+TEST_P(EachPath, RendersSeveralScenesInTurn) {
     RendererParts parts(GetParam());
     const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
         scene::Arena arena = std::move(scene).build();
@@ -313,17 +313,17 @@ TEST_P(EachPath, TakesOneSceneAfterAnother) {
         return picture.pixels();
     };
     const auto first = picture_of(rich_scene(), from_the_side(small));
-    const auto second = picture_of(scene::load_scene(moving_scene), of_moving());
+    const auto second = picture_of(scene::load_scene(moving_scene), moving_camera());
     EXPECT_NE(first, second);
-    const auto nothing = picture_of(scene::ArenaBuilder(), of_moving());
+    const auto nothing = picture_of(scene::ArenaBuilder(), moving_camera());
     EXPECT_EQ(std::count(nothing.begin(), nothing.end(), Pixel{0, 0, 0, 0}), small.width * small.height);
     EXPECT_EQ(picture_of(rich_scene(), from_the_side(small)), first);
 }
 
-// ---- Where images go -------------------------------------------------------------------------------
+// ---- Image memory ----------------------------------------------------------------------------------
 
-// Page-aligned memory, as that of slots, goes to the device itself; what is beside the rows stays as it is.
-TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
+// The device writes directly to page-aligned memory, such as slots; padding stays untouched.
+TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     ARHOST_REQUIRE_VULKAN();
     RendererParts parts("plain");
     if (!parts.device.imports_host_memory)
@@ -343,7 +343,7 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
     if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
         GTEST_SKIP() << parts.device.name
-                     << " does not take such memory"; // AMD's Linux driver takes none that is shared
+                     << " does not import such memory"; // AMD's Linux driver refuses shared memory
     EXPECT_TRUE(renderer.wrote_in_place());
     const arhost_image elsewhere = copied.image(); // 64 bytes aligned
     renderer.render(view, elsewhere);
@@ -359,10 +359,10 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
     for (std::size_t i = size; i < pages; ++i)
         touched += memory[i] != 0xa5;
     EXPECT_EQ(differ, 0u) << "rows";
-    EXPECT_EQ(touched, 0u) << "bytes that are not the image's";
+    EXPECT_EQ(touched, 0u) << "bytes outside the image";
     munmap(memory, pages);
 
-    // The region is the smallest that holds all alpha.
+    // The region is the bounding box of alpha above 0.
     rt_vulkan::Rectangle tight{small.width, small.height, 0, 0};
     std::uint32_t x1 = 0, y1 = 0;
     for (std::uint32_t y = 0; y < small.height; ++y)
@@ -377,9 +377,9 @@ TEST(Image, InPagesIsWrittenByTheDeviceWhereItCanImportThem) {
               std::tuple(tight.x, tight.y, x1, y1));
 }
 
-// ---- What it is made from --------------------------------------------------------------------------
+// ---- Loader, device, path and cache ----------------------------------------------------------------
 
-TEST(Loader, ThatIsMissingIsToldOf) {
+TEST(Loader, ReportsAMissingLibrary) {
     LoggingHost logging;
     EXPECT_THAT(
         refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
@@ -387,10 +387,10 @@ TEST(Loader, ThatIsMissingIsToldOf) {
         testing::AllOf(HasSubstr("no Vulkan loader"), HasSubstr("libvulkan-none.so.1"), HasSubstr("libvulkan1")));
     EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
                         [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
-                HasSubstr("libm.so.6 is no Vulkan loader"));
+                HasSubstr("libm.so.6 is not a Vulkan loader"));
 }
 
-TEST(Device, ThatIsMissingIsToldOf) {
+TEST(Device, ReportsAMissingDriver) {
     const EnvironmentVariable drivers("VK_DRIVER_FILES", "/nonexistent/none.json"),
         old_name("VK_ICD_FILENAMES", "/nonexistent/none.json");
     PluginUnderTest plugin("rt_vulkan");
@@ -404,10 +404,10 @@ TEST(Device, ThatIsMissingIsToldOf) {
 
 TEST(Device, IsChosenByNumberNameOrUuid) {
     using rt_vulkan::PhysicalDevice;
-    PhysicalDevice sound{};
-    sound.properties.apiVersion = VK_API_VERSION_1_1;
-    sound.properties.limits.maxPerStageDescriptorStorageBuffers = 14;
-    std::vector<PhysicalDevice> devices(3, sound);
+    PhysicalDevice usable{};
+    usable.properties.apiVersion = VK_API_VERSION_1_1;
+    usable.properties.limits.maxPerStageDescriptorStorageBuffers = 14;
+    std::vector<PhysicalDevice> devices(3, usable);
     devices[0].name = "llvmpipe (LLVM 15)";
     devices[0].uuid = "6d657361000000000000000000000000";
     devices[0].properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_CPU;
@@ -423,27 +423,27 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     EXPECT_EQ(chosen("2"), "Little GPU");
     EXPECT_EQ(chosen("LLVMPIPE"), "llvmpipe (LLVM 15)");
     EXPECT_EQ(chosen("little"), "Little GPU");
-    EXPECT_EQ(chosen("15"), "llvmpipe (LLVM 15)") << "a part of a name, as no device has that number";
+    EXPECT_EQ(chosen("15"), "llvmpipe (LLVM 15)") << "a part of the name, as no device has this number";
     devices[2].name = "Big GPU Ti";
-    EXPECT_EQ(chosen("big gpu"), "Big GPU") << "the whole name comes before a part of one";
+    EXPECT_EQ(chosen("big gpu"), "Big GPU") << "a whole name takes precedence over a part";
     devices[2].name = "Little GPU";
     EXPECT_EQ(chosen("0F112233-4455-6677-8899-aabbccddeeff"), "Little GPU");
     for (const char *none : {"3", "radeon", "", "0011"})
         EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen(none); }),
-                    testing::AllOf(HasSubstr("option 'device': no device is"), HasSubstr("1 'Big GPU'"),
+                    testing::AllOf(HasSubstr("option 'device': no device matches"), HasSubstr("1 'Big GPU'"),
                                    HasSubstr("6d657361")))
             << none;
     EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
     devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 13;
-    EXPECT_EQ(chosen("auto"), "Little GPU") << "as the big one lacks buffers";
-    EXPECT_EQ(chosen("big"), "Big GPU") << "which is refused when it starts";
+    EXPECT_EQ(chosen("auto"), "Little GPU") << "the big one lacks buffers";
+    EXPECT_EQ(chosen("big"), "Big GPU") << "refused at start";
     devices[2].properties.apiVersion = VK_API_VERSION_1_0;
     EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)");
     devices[0].queue_family = VK_QUEUE_FAMILY_IGNORED;
-    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "the first, where none will do";
+    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "the first if none is usable";
 }
 
-TEST(Path, IsChosenByWhatTheDeviceHas) {
+TEST(Path, IsChosenFromThoseTheDeviceSupports) {
     using rt_vulkan::Path;
     using Paths = std::vector<Path>;
     rt_vulkan::PhysicalDevice device{};
@@ -452,13 +452,13 @@ TEST(Path, IsChosenByWhatTheDeviceHas) {
     const auto chosen = [&](const char *wanted) { return rt_vulkan::choose_paths(device, wanted); };
     EXPECT_EQ(chosen("auto"), Paths{Path::plain});
     EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("query"); }),
-                testing::AllOf(HasSubstr("option 'path'"), HasSubstr("'Little GPU' has no 'query'"),
-                               HasSubstr("it has plain")));
+                testing::AllOf(HasSubstr("option 'path'"), HasSubstr("'Little GPU' does not support 'query'"),
+                               HasSubstr("it supports plain")));
     device.paths = {Path::plain, Path::query};
     EXPECT_EQ(chosen("auto"), (Paths{Path::query, Path::plain}));
     EXPECT_EQ(chosen("plain"), Paths{Path::plain});
     EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }),
-                HasSubstr("it has plain, query"));
+                HasSubstr("it supports plain, query"));
     device.paths = {Path::plain, Path::query, Path::pipeline};
     EXPECT_EQ(chosen("auto"), (Paths{Path::pipeline, Path::query, Path::plain}));
     EXPECT_EQ(chosen("query"), Paths{Path::query});
@@ -467,17 +467,17 @@ TEST(Path, IsChosenByWhatTheDeviceHas) {
     EXPECT_EQ(chosen("pipeline"), Paths{Path::pipeline});
 }
 
-TEST(Device, OptionThatNamesNoneIsRefused) {
+TEST(Device, UnknownNameIsRefused) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
     EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(plugin.log(), HasSubstr("there are: 0 '"));
+    EXPECT_THAT(plugin.log(), HasSubstr("available: 0 '"));
     EXPECT_EQ(plugin.create({{"device", "0"}}), ARHOST_STATUS_OK);
 }
 
 TEST(Device, IsListedByTheHost) {
 #if defined(__SANITIZE_ADDRESS__)
-    GTEST_SKIP() << "what drivers leak would be the worker's fault";
+    GTEST_SKIP() << "leaks of drivers would fail the worker";
 #endif
     ARHOST_REQUIRE_VULKAN();
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
@@ -489,71 +489,42 @@ TEST(Device, IsListedByTheHost) {
     for (const auto &device : rt_vulkan::Instance(Host(&logging.host), false).devices()) {
         EXPECT_THAT(text, HasSubstr(device.name));
         EXPECT_THAT(text, HasSubstr(device.uuid));
-        const std::string lacks = rt_vulkan::what_it_lacks(device);
-        EXPECT_THAT(text, HasSubstr(lacks.empty() ? "paths: " + rt_vulkan::list_of(device.paths) : lacks));
+        const std::string missing = rt_vulkan::missing_requirement(device);
+        EXPECT_THAT(text, HasSubstr(missing.empty() ? "paths: " + rt_vulkan::list_of(device.paths) : missing));
     }
 }
 
-TEST(Device, WithoutWhatIsNeededIsRefused) {
+TEST(Device, LackingARequirementIsRefused) {
     ARHOST_REQUIRE_VULKAN();
     LoggingHost logging;
     const Host host(&logging.host);
     const rt_vulkan::Instance instance(host, false);
-    const rt_vulkan::PhysicalDevice sound = instance.devices()[0];
-    const auto shaders = rt_vulkan::read_shaders(ARHOST_PLUGIN_DIRECTORY, rt_vulkan::Path::plain);
+    const rt_vulkan::PhysicalDevice usable = instance.devices()[0];
+    const auto shaders = rt_vulkan::shaders_of(rt_vulkan::Path::plain);
     scene::Arena arena = rich_scene().build();
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &small};
-    const auto complaint = [&](auto spoil) {
-        rt_vulkan::PhysicalDevice device = sound;
-        spoil(device);
+    const auto complaint = [&](auto change) {
+        rt_vulkan::PhysicalDevice device = usable;
+        change(device);
         return refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                       [&] { rt_vulkan::Renderer(setup, {}, host, instance, device, shaders); });
+                       [&] { rt_vulkan::Renderer(setup, {}, host, device, shaders); });
     };
     EXPECT_THAT(complaint([](auto &device) { device.properties.apiVersion = VK_API_VERSION_1_0; }),
-                testing::AllOf(HasSubstr(sound.name), HasSubstr("1.1 is needed"), HasSubstr("option 'device'")));
+                testing::AllOf(HasSubstr(usable.name), HasSubstr("1.1 is required"), HasSubstr("option 'device'")));
     EXPECT_THAT(complaint([](auto &device) { device.queue_family = VK_QUEUE_FAMILY_IGNORED; }),
-                HasSubstr("can't compute"));
+                HasSubstr("has no compute queue"));
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 13; }),
-                HasSubstr("reads 13 buffers at once, and 14 are needed"));
+                HasSubstr("supports 13 storage buffers per stage; 14 are required"));
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxStorageBufferRange = 64; }),
-                HasSubstr("reads 1 MiB at most: use smaller"));
+                HasSubstr("supports at most 1 MiB: use smaller"));
 }
 
-TEST(Shader, ThatIsMissingOrDamagedIsRefused) {
-    const ScratchFolder folder;
-    const auto plugin_file = folder.path() / "rt_vulkan.so", shader_file = folder.path() / "rt_vulkan_plain.comp.spv";
-    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan.so", plugin_file);
-    const auto relative = std::filesystem::relative(folder.path() / "rt_vulkan", ARHOST_PLUGIN_DIRECTORY).string();
-    const auto complaint = [&] {
-        PluginUnderTest plugin(relative);
-        EXPECT_EQ(plugin.create({{"path", "plain"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-        return plugin.log();
-    };
-    EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is missing")));
-    std::ofstream(shader_file) << "This is no shader, but long enough to be taken for one.";
-    EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is damaged")));
-    std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_plain.comp.spv", shader_file,
-                               std::filesystem::copy_options::overwrite_existing);
-    const auto whole = std::filesystem::file_size(shader_file);
-    for (const auto size : {whole - 4, whole - 1, whole / 2, std::uintmax_t{20}}) {
-        std::filesystem::resize_file(shader_file, size);
-        EXPECT_THAT(complaint(), HasSubstr("is damaged")) << size;
-    }
-    std::filesystem::resize_file(shader_file, std::uintmax_t{3} << 30); // read at once, it would take long
-    EXPECT_THAT(complaint(), HasSubstr("can't be read"));
-    for (const char *other : {"query.comp", "pipeline.rgen", "pipeline.rmiss"}) {
-        std::filesystem::copy_file(ARHOST_PLUGIN_DIRECTORY "/rt_vulkan_" + std::string(other) + ".spv", shader_file,
-                                   std::filesystem::copy_options::overwrite_existing);
-        EXPECT_THAT(complaint(), testing::AllOf(HasSubstr(shader_file), HasSubstr("is another one"))) << other;
-    }
-}
-
-TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
+TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     ARHOST_REQUIRE_VULKAN();
     const ScratchFolder folder;
     const EnvironmentVariable caches("XDG_CACHE_HOME", folder.path().string());
-    Tracer tracer(scene::ArenaBuilder(), {}, "rt_vulkan"); // of nothing, whose shader is soon compiled
-    const auto files = [&] {                               // Mesa has its own there
+    Tracer tracer(scene::ArenaBuilder(), {}, "rt_vulkan"); // empty, so that the shader compiles quickly
+    const auto files = [&] {                               // Mesa's own caches are there, too
         std::vector<std::filesystem::path> files;
         for (const auto &entry : std::filesystem::directory_iterator(folder.path()))
             if (entry.path().filename().string().starts_with("rt_vulkan"))
@@ -565,15 +536,18 @@ TEST(PipelineCache, IsKeptAndGarbageInItDoesNoHarm) {
     const auto file = files()[0];
     EXPECT_THAT(file.filename(), testing::ResultOf([](const auto &name) { return name.string(); },
                                                    testing::ContainsRegex("^rt_vulkan-[0-9a-f]{32}.pipelines$")))
-        << "a device's own";
+        << "one per device";
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "written anew";
-    std::filesystem::remove(file);
-    std::filesystem::create_directory(file); // can't be replaced
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
+    std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1); // too large to read
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(files(), std::vector{file}) << "nothing unfinished is left";
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
+    std::filesystem::remove(file);
+    std::filesystem::create_directory(file); // rename() can't replace it
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    EXPECT_EQ(files(), std::vector{file}) << "no temporary file is left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
@@ -594,27 +568,27 @@ protected:
     LoggingHost logging;
 };
 
-TEST_F(Validation, HearsOfAMistake) {
+TEST_F(Validation, ReportsAMissingUsageFlag) {
     const Host host(&logging.host);
     const rt_vulkan::Instance instance(host, true);
     const auto devices = instance.devices();
-    const rt_vulkan::Device device(instance, devices[0]);
+    const rt_vulkan::Device device(devices[0]);
     ASSERT_EQ(logging.text, "");
     const rt_vulkan::Submission submission(device);
     const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, rt_vulkan::Buffer::Place::device);
     const VkCommandBuffer commands = submission.new_commands();
     submission.begin(commands);
     const std::int32_t zeros[4] = {};
-    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros); // not made to be written to
+    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros); // lacks TRANSFER_DST
     submission.end(commands);
     EXPECT_THAT(logging.text, HasSubstr("Vulkan validation: "));
 }
 
-TEST_F(Validation, HearsOfAHazard) {
+TEST_F(Validation, ReportsAWriteAfterWriteHazard) {
     const Host host(&logging.host);
     const rt_vulkan::Instance instance(host, true);
     const auto devices = instance.devices();
-    const rt_vulkan::Device device(instance, devices[0]);
+    const rt_vulkan::Device device(devices[0]);
     const rt_vulkan::Submission submission(device);
     const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, rt_vulkan::Buffer::Place::device);
     const VkCommandBuffer commands = submission.new_commands();
@@ -635,19 +609,19 @@ protected:
 };
 INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
 
-TEST_P(ValidationOfPath, HasNothingToSay) {
+TEST_P(ValidationOfPath, ReportsNothing) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    for (int frame = 0; frame < 5; ++frame) { // in bands, and from the third on, if not before, at once
+    for (int frame = 0; frame < 5; ++frame) { // first in bands; at once from the third at the latest
         Picture picture(small);
         EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
     }
-    tracer.render(from_the_side(pinhole(65, 47, 65))); // stops, which leaves nothing behind, and starts
+    tracer.render(from_the_side(pinhole(65, 47, 65))); // restarts with another size
     EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
 }
 
-TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
+TEST_P(ValidationOfPath, ReportsNothingForMotion) {
     Tracer tracer(scene::load_scene(moving_scene), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     scene::MotionEvaluator evaluator(tracer.scene());
@@ -655,7 +629,7 @@ TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
     for (const double time_s : {0.0, 0.7, 0.0, 0.3}) {
         const arhost_motion motion = evaluator.at(time_s);
         Picture picture(small);
-        EXPECT_EQ(tracer.try_render(of_moving(), picture, &motion), ARHOST_STATUS_OK);
+        EXPECT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK);
         pictures.push_back(picture.pixels());
     }
     EXPECT_NE(pictures[0], pictures[1]);
@@ -663,9 +637,9 @@ TEST_P(ValidationOfPath, HasNothingToSayOfMotion) {
     EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
 }
 
-// ---- Refusals --------------------------------------------------------------------------------------
+// ---- Invalid input ---------------------------------------------------------------------------------
 
-class Refusal : public testing::Test {
+class InvalidInput : public testing::Test {
 protected:
     void SetUp() override {
         ARHOST_REQUIRE_VULKAN();
@@ -679,7 +653,7 @@ protected:
     std::optional<Tracer> tracer;
 };
 
-TEST_F(Refusal, OfCamerasThatCannotBe) {
+TEST_F(InvalidInput, CamerasAreRefused) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
@@ -691,7 +665,7 @@ TEST_F(Refusal, OfCamerasThatCannotBe) {
     EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
+TEST_F(InvalidInput, IntrinsicsAreRefused) {
     arhost_intrinsics in = small;
     in.fx = 0;
     EXPECT_EQ(tracer->start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -699,7 +673,7 @@ TEST_F(Refusal, OfIntrinsicsThatCannotBe) {
     EXPECT_EQ(tracer->start(pinhole(0, 10)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Refusal, ToGoOnOnceCancelled) {
+TEST_F(InvalidInput, CancelledCallsFail) {
     ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK);
     tracer->plugin().cancel();
     Picture picture(small);
@@ -707,7 +681,7 @@ TEST_F(Refusal, ToGoOnOnceCancelled) {
     EXPECT_EQ(tracer->start(small), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST(Plugin, DeclaresTheLensAndTheGpu) {
+TEST(Plugin, DeclaresLensDistortionAndGpuUse) {
     const PluginUnderTest plugin("rt_vulkan");
     EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
     ASSERT_NE(plugin.descriptor().needs, nullptr);

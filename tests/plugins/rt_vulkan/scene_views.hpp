@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every scene, from afar and from near: what pictures are compared of.
+// All scenes and camera positions of the image comparisons.
 #pragma once
 
 #include "scene/loader.hpp"
@@ -20,7 +20,7 @@
 namespace arhost::test {
 
 struct View {
-    std::string name, scene; // below the project's folder
+    std::string name, scene; // scene: relative to the project's root
     std::string samples = "1";
     double time_s = 0;
 };
@@ -30,11 +30,11 @@ inline std::ostream &operator<<(std::ostream &stream, const View &view) {
 
 inline const arhost_intrinsics small = pinhole(128, 96, 128);
 
-// Where the dissertation's marker lies, as its camera sees it; `nearness` 1 is from afar.
+// Looks at the dissertation's marker; `nearness` 1 is far.
 inline arhost_camera camera_for(const arhost_scene &scene, double nearness, const arhost_intrinsics &size) {
-    const double away = -330 * nearness, up = 150 * nearness;
-    return scene.axes == ARHOST_AXES_Z_UP ? camera({25 * nearness, away, up}, {0, 0, 50}, {0, 0, 1}, size)
-                                          : camera({25 * nearness, up, -away}, {0, 50, 0}, {0, 1, 0}, size);
+    const double back = -330 * nearness, up = 150 * nearness;
+    return scene.axes == ARHOST_AXES_Z_UP ? camera({25 * nearness, back, up}, {0, 0, 50}, {0, 0, 1}, size)
+                                          : camera({25 * nearness, up, -back}, {0, 50, 0}, {0, 1, 0}, size);
 }
 
 inline const double nearnesses[] = {1.0, 0.45};
@@ -43,7 +43,7 @@ inline std::filesystem::path file_of(const View &view) {
     return std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
 }
 
-// For eyes: ARHOST_KEEP_PICTURES=FOLDER.
+// Writes the picture for inspection, if ARHOST_KEEP_PICTURES=FOLDER.
 inline void keep(const Picture &picture, const std::string &name) {
     const char *folder = std::getenv("ARHOST_KEEP_PICTURES");
     if (!folder)
@@ -90,7 +90,6 @@ inline const std::vector<View> every_view = {View{"classes", "tests/plugins/rt_e
                                              View{"vkray-md", "config/scenes/vkray-md.yaml"}};
 inline const auto every_scene = testing::ValuesIn(every_view);
 
-// Some of them, by their names.
 inline auto scenes_named(const std::set<std::string> &names) {
     std::vector<View> views;
     std::copy_if(every_view.begin(), every_view.end(), std::back_inserter(views),

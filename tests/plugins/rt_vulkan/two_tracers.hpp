@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The same image by rt_vulkan and by rt_embree, and how alike the two are.
+// Renders the same image by rt_vulkan and rt_embree, and measures the difference.
 #pragma once
 
 #include "tracer.hpp"
@@ -13,11 +13,11 @@
 
 namespace arhost::test {
 
-// Mesa 25's lavapipe spends half a minute on the best code for a shader of ours, which small pictures don't repay.
+// Mesa 25's lavapipe takes half a minute to optimize one of the shaders, too long for small pictures.
 inline const bool compiles_quickly =
     ::setenv("GALLIVM_PERF", "nopt", 0) == 0 && ::setenv("LP_NATIVE_VECTOR_WIDTH", "128", 0) == 0;
 
-// What rt_vulkan says against making it here, "" where there is a device that has the path.
+// Why rt_vulkan can't be created with `path` on this machine; "" if it can.
 inline std::string no_vulkan(const std::string &path = "auto") {
     PluginUnderTest plugin("rt_vulkan");
     return plugin.create({{"path", path}}) == ARHOST_STATUS_OK ? "" : plugin.log();
@@ -28,17 +28,17 @@ inline std::string no_vulkan(const std::string &path = "auto") {
 
 struct Likeness {
     int pixels = 0, alphas_off = 0;
-    int alphas_off_inside = 0; // where the reference has one alpha class for a pixel round
-    int inside = 0;            // pixels of alpha 255 amid others, which PSNR is of
+    int alphas_off_inside = 0; // where the reference's alpha is uniform within a pixel's distance
+    int inside = 0;            // pixels of alpha 255 with such neighbours, compared by PSNR
     int colours_off = 0;       // of those inside, by more than 2 codes
-    double squares = 0;        // the sum of the differences' of these, channel by channel, in codes
+    double squares = 0;        // sum of their squared differences over all channels, in codes
 
-    // dB; infinite where they are the same.
+    // dB; infinite if equal.
     double psnr() const {
         return squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * inside / squares)
                            : std::numeric_limits<double>::infinity();
     }
-    // Of several pictures as of one.
+    // Merges several pictures.
     Likeness &operator+=(const Likeness &other) {
         pixels += other.pixels;
         alphas_off += other.alphas_off;
@@ -55,7 +55,7 @@ inline std::ostream &operator<<(std::ostream &stream, const Likeness &like) {
                   << like.colours_off << " colours off";
 }
 
-// Nothing is inside at the picture's border.
+// Border pixels are not inside.
 inline Likeness likeness(const Picture &got, const Picture &reference) {
     Likeness like;
     for (std::uint32_t y = 0; y < got.height; ++y)
@@ -66,24 +66,24 @@ inline Likeness likeness(const Picture &got, const Picture &reference) {
                 for (std::uint32_t u = x - 1; is_inside && u <= x + 1; ++u)
                     is_inside = std::abs(reference.alpha(u, v) - b[3]) <= 1;
             ++like.pixels;
-            // A code apart is how means round, not another class.
+            // One code is a rounding difference of means.
             const bool off = std::abs(a[3] - b[3]) > 1;
             like.alphas_off += off;
             like.alphas_off_inside += off && is_inside;
             if (!is_inside || b[3] != 255 || a[3] != 255)
                 continue;
             ++like.inside;
-            int most = 0;
+            int max_difference = 0;
             for (std::size_t i = 0; i < 3; ++i) {
                 like.squares += (a[i] - b[i]) * (a[i] - b[i]);
-                most = std::max(most, std::abs(a[i] - b[i]));
+                max_difference = std::max(max_difference, std::abs(a[i] - b[i]));
             }
-            like.colours_off += most > 2;
+            like.colours_off += max_difference > 2;
         }
     return like;
 }
 
-// Both tracers take these options.
+// `options` must be valid for both plugins.
 inline Picture picture_by(const std::string &plugin, scene::ArenaBuilder scene, const arhost_camera &view,
                           const Options &options = {}) {
     return Tracer(std::move(scene), options, plugin).render(view);
