@@ -21,7 +21,7 @@ namespace {
 struct Family {
     const char *name;
     int dictionary;
-    bool half_turned = false; // OpenCV has AprilTag's families turned by 180° against AprilTag's own library
+    bool rotated_180 = false; // OpenCV's AprilTag dictionaries are rotated by 180° relative to AprilTag's library
 };
 
 constexpr std::array families{
@@ -66,8 +66,8 @@ cv::Mat_<uint8_t> marker_cells(std::string_view name, std::int64_t id) {
     const auto family = std::ranges::find(families, name, [](const Family &f) { return std::string_view(f.name); });
     if (family == families.end())
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "family: there is no '" + std::string(name) +
-                          "'; give tag36h11 or a dictionary of OpenCV, DICT_6X6_250, say");
+                      "family: unknown '" + std::string(name) +
+                          "'; use an AprilTag family (tag36h11) or an OpenCV dictionary (DICT_6X6_250)");
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
     const auto dictionary = cv::aruco::getPredefinedDictionary(family->dictionary);
 #else
@@ -84,7 +84,7 @@ cv::Mat_<uint8_t> marker_cells(std::string_view name, std::int64_t id) {
 #else
     dictionary.drawMarker(static_cast<int>(id), side, cells, 1);
 #endif
-    if (family->half_turned)
+    if (family->rotated_180)
         cv::rotate(cells, cells, cv::ROTATE_180);
     return cells;
 }

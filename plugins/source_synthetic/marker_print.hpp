@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The cells of a printed marker, upright as arhost/tracker.h has it.
+// The cells of a printed marker, upright as defined in arhost/tracker.h.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -10,11 +10,11 @@
 
 namespace arhost::synthetic {
 
-// NULL-terminated, for the option's choices: "tag36h11", "DICT_6X6_250" …
+// NULL-terminated option choices: "tag36h11", "DICT_6X6_250" …
 std::span<const char *const> marker_families();
 
-// 0 where the cell is black; the first row is the print's top; without the white margin. Throws a Failure
-// where the family has no such id.
+// 0 where the cell is black; the first row is the print's top; without the quiet zone. Throws a Failure if the
+// family has no such id.
 cv::Mat_<uint8_t> marker_cells(std::string_view family, std::int64_t id);
 
 } // namespace arhost::synthetic
