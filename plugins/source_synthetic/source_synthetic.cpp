@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_synthetic: a printed marker on a desk, filmed by a moving camera whose poses are known exactly.
-#include "marker_print.hpp"
+#include "marker_cells.hpp"
 #include "path.hpp"
 #include "renderer.hpp"
 

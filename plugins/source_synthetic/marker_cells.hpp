@@ -5,8 +5,9 @@
 
 #include <opencv2/core.hpp>
 
+#include <cstdint>
 #include <span>
-#include <string_view>
+#include <string>
 
 namespace arhost::synthetic {
 
@@ -15,6 +16,6 @@ std::span<const char *const> marker_families();
 
 // 0 where the cell is black; the first row is the print's top; without the quiet zone. Throws a Failure if the
 // family has no such id.
-cv::Mat_<uint8_t> marker_cells(std::string_view family, std::int64_t id);
+cv::Mat_<uint8_t> marker_cells(const std::string &family, std::int64_t id);
 
 } // namespace arhost::synthetic
