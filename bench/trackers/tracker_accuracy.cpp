@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Prints how exact and how quick the trackers are on a real sequence.
+// Prints accuracy and speed of the trackers on a real sequence.
 //   tracker-accuracy [aruco:key=value …] [apriltag:key=value …]     options of the two plugins
 #include <fiducial_common/rbt_sequence.hpp>
 
@@ -12,12 +12,12 @@ namespace {
 
 using namespace arhost::test;
 
-struct Measured {
+struct Measurement {
     RbtSequence::Frames frames;
-    bool met; // 99 % found, corners to 0.3 px, distances to 1 %
+    bool passed; // 99 % found, corners within 0.3 px, distances within 1 %
 };
 
-Measured measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
+Measurement measure(const RbtSequence &sequence, const std::string &plugin, const Options &options) {
     Tracker tracker(plugin, options);
     if (tracker.created() != ARHOST_STATUS_OK)
         throw std::runtime_error(plugin + ": " + tracker.log());
@@ -25,9 +25,9 @@ Measured measure(const RbtSequence &sequence, const std::string &plugin, const O
     const auto frames = sequence.run(tracker, &ms);
     const auto accuracy = sequence.accuracy(frames);
     std::printf("%-18s %6.2f %% (%d of %d) %8.3f %8.3f %10.3f %% %8.2f\n", plugin.c_str(),
-                100 * accuracy.found_share(), accuracy.found, accuracy.listed, mean(accuracy.corner_px),
+                100 * accuracy.found_fraction(), accuracy.found, accuracy.listed, mean(accuracy.corner_px),
                 percentile(accuracy.corner_px, 0.95), 100 * percentile(accuracy.distance, 0.5), percentile(ms, 0.5));
-    return {frames, accuracy.found_share() >= 0.99 && mean(accuracy.corner_px) <= 0.3 &&
+    return {frames, accuracy.found_fraction() >= 0.99 && mean(accuracy.corner_px) <= 0.3 &&
                         percentile(accuracy.distance, 0.5) <= 0.01};
 }
 
@@ -48,7 +48,7 @@ int main(int argc, char **argv) try {
     }
     const auto folder = shared_data("markers/rbt_sequence");
     if (!std::filesystem::exists(folder)) {
-        std::printf("skipped: needs %s, which is not here (see ARHOST_SHARED_DATA)\n", folder.c_str());
+        std::printf("skipped: %s is missing (see ARHOST_SHARED_DATA)\n", folder.c_str());
         return 0;
     }
     const RbtSequence sequence;
@@ -56,9 +56,9 @@ int main(int argc, char **argv) try {
                 "found", "px mean", "px p95", "dist. p50", "ms p50");
     const auto a = measure(sequence, "tracker_aruco", aruco);
     const auto b = measure(sequence, "tracker_apriltag", april_tag);
-    const double apart = percentile(RbtSequence::disagreement_px(a.frames, b.frames), 0.95);
-    std::printf("corners of the two trackers apart: p95 %.3f px\n", apart);
-    return a.met && b.met && apart <= 0.5 ? 0 : 1;
+    const double disagreement = percentile(RbtSequence::disagreement_px(a.frames, b.frames), 0.95);
+    std::printf("corner distance between the two trackers: p95 %.3f px\n", disagreement);
+    return a.passed && b.passed && disagreement <= 0.5 ? 0 : 1;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "tracker-accuracy: %s\n", error.what());
     return 1;

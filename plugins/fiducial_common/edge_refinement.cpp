@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-namespace arhost::planar {
+namespace arhost::fiducial {
 namespace {
 
 struct Line {
@@ -26,18 +26,18 @@ double sample(const cv::Mat &grey, cv::Point2d at) {
     return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
 }
 
-// The edge's place near `at`: the mean of the offsets along the outward normal, weighted by the squared
-// gradient as AprilTag does; nothing where no gradient of that sign stands out from noise.
+// The edge's offset from `at` along the outward normal: the mean weighted by the squared gradient, as in AprilTag.
+// std::nullopt if no gradient of that sign exceeds the noise.
 std::optional<double> edge_offset_px(const cv::Mat &grey, cv::Point2d at, cv::Point2d outward, double sign) {
-    constexpr double step = 0.25, least_rise = 8;                             // px; grey levels
-    constexpr int reach = 9, half_baseline = 3, ends = reach + half_baseline; // steps
+    constexpr double step = 0.25, min_rise = 8;                                 // px; grey levels
+    constexpr int search = 9, half_baseline = 3, ends = search + half_baseline; // steps
     std::array<double, 2 * ends + 1> profile;
     for (int i = -ends; i <= ends; ++i)
         profile[i + ends] = sample(grey, at + i * step * outward);
     double weighted = 0, weights = 0;
-    for (int i = -reach; i <= reach; ++i) {
+    for (int i = -search; i <= search; ++i) {
         const double rise = sign * (profile[i + half_baseline + ends] - profile[i - half_baseline + ends]);
-        if (rise > least_rise) { // not for NaN either
+        if (rise > min_rise) { // false for NaN
             weighted += rise * rise * i;
             weights += rise * rise;
         }
@@ -51,9 +51,9 @@ Line fit_line(const std::vector<cv::Point2f> &points) {
     return {cv::Point2d(line[2], line[3]), cv::Point2d(line[0], line[1])};
 }
 
-// Without the points that something else than the edge gave; nothing where those are the greater part.
+// Rejects outliers; std::nullopt if fewer than half of the `sampled` points are left.
 std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled) {
-    constexpr double always_kept_px = 0.3;
+    constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
         if (points.size() < std::max<std::size_t>(sampled / 2, 2))
             return std::nullopt;
@@ -65,7 +65,7 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
         std::vector<double> sorted = residuals;
         const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
         std::nth_element(sorted.begin(), median, sorted.end());
-        const double bound = std::max(always_kept_px, 2.5 * *median);
+        const double bound = std::max(min_inlier_px, 2.5 * *median);
         std::vector<cv::Point2f> kept;
         for (std::size_t i = 0; i < points.size(); ++i)
             if (residuals[i] <= bound)
@@ -76,27 +76,27 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
     }
 }
 
-// In a plane before the lens that is scaled to about pixels.
+// In undistorted pixels.
 std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d to, const Lens &lens, double sign) {
     const double length = cv::norm(to - from);
-    // Near a corner the search would cross the other edge.
+    // Near a corner the search would hit the other edge.
     const double margin = std::min(3.0, length / 4) / length;
     const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
-    std::vector<cv::Point2d> places;
+    std::vector<cv::Point2d> samples;
     for (std::size_t i = 0; i < count; ++i)
-        places.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
-    places = lens.distort(places);
+        samples.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
+    samples = lens.distort(samples);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < count; ++i) {
-        const cv::Point2d along = places[std::min(i + 1, count - 1)] - places[i > 0 ? i - 1 : 0];
+        const cv::Point2d along = samples[std::min(i + 1, count - 1)] - samples[i > 0 ? i - 1 : 0];
         const cv::Point2d outward = cv::Point2d(along.y, -along.x) / cv::norm(along); // corners go clockwise
-        if (const auto offset = edge_offset_px(grey, places[i], outward, sign))
-            found.push_back(places[i] + *offset * outward);
+        if (const auto offset = edge_offset_px(grey, samples[i], outward, sign))
+            found.push_back(samples[i] + *offset * outward);
     }
     const auto straight = lens.undistort(found);
     if (!straight)
         return std::nullopt;
-    std::vector<cv::Point2f> relative; // to `from`: float is exact enough there
+    std::vector<cv::Point2f> relative; // to `from`, which keeps float precise enough
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
     auto line = fit_line_robustly(std::move(relative), count);
@@ -105,7 +105,7 @@ std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d 
     return line;
 }
 
-// +1: the square is darker than what is around it.
+// +1: the square is darker than its surroundings.
 double contrast_sign(const cv::Mat &grey, const Corners &corners) {
     const cv::Point2d centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
     double sum = 0;
@@ -122,7 +122,7 @@ double contrast_sign(const cv::Mat &grey, const Corners &corners) {
 
 std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens) {
     constexpr int max_passes = 8;
-    constexpr double settled_px = 0.2;
+    constexpr double converged_px = 0.2;
     const double sign = contrast_sign(grey, rough_px);
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
@@ -132,8 +132,8 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
     for (int i = 0; i < 4; ++i)
         shortest = std::min(shortest, cv::norm(corners[(i + 1) % 4] - corners[i]));
 
-    double moved = settled_px;
-    for (int pass = 0; pass < max_passes && moved >= settled_px; ++pass) {
+    double moved = converged_px;
+    for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
         std::array<Line, 4> lines;
         for (int i = 0; i < 4; ++i) {
             const auto line = fit_edge(grey, corners[i], corners[(i + 1) % 4], lens, sign);
@@ -149,12 +149,12 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
                                                             before.direction;
             moved = std::max(moved, cv::norm(crossing - corners[i]));
             corners[i] = crossing;
-            if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // not for NaN either
+            if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // false for NaN
                 return std::nullopt;
         }
     }
-    const std::vector<cv::Point2d> seen = lens.distort(corners);
-    return Corners{seen[0], seen[1], seen[2], seen[3]};
+    const std::vector<cv::Point2d> distorted = lens.distort(corners);
+    return Corners{distorted[0], distorted[1], distorted[2], distorted[3]};
 }
 
-} // namespace arhost::planar
+} // namespace arhost::fiducial

@@ -9,19 +9,19 @@
 #include <optional>
 #include <tuple>
 
-namespace arhost::planar {
+namespace arhost::fiducial {
 namespace {
 
 struct Located {
-    Sighting sighting;
+    Detection detection;
     PlanarPose pose;
 };
 
-// A total order, so that the choice depends on neither the detector's order nor its threads.
+// A total order, so that the result depends on neither the detector's order nor its threads.
 bool is_better(const Located &a, const Located &b) {
     const auto key = [](const Located &l) {
-        const cv::Point2d &corner = l.sighting.corners_px[0];
-        return std::tuple(-l.sighting.quality, l.pose.best.reprojection_px, corner.x, corner.y);
+        const cv::Point2d &corner = l.detection.corners_px[0];
+        return std::tuple(-l.detection.quality, l.pose.best.reprojection_px, corner.x, corner.y);
     };
     return key(a) < key(b);
 }
@@ -33,8 +33,8 @@ arhost_marker record(const Located &located, int id, const std::string &family) 
     family.copy(marker.family, ARHOST_MAX_FAMILY - 1);
     marker.state = ARHOST_MARKER_DETECTED;
     for (int i = 0; i < 4; ++i) {
-        marker.corners_px[i][0] = located.sighting.corners_px[i].x;
-        marker.corners_px[i][1] = located.sighting.corners_px[i].y;
+        marker.corners_px[i][0] = located.detection.corners_px[i].x;
+        marker.corners_px[i][1] = located.detection.corners_px[i].y;
     }
     std::ranges::copy(located.pose.best.mt, marker.mt);
     if (located.pose.alternative)
@@ -61,24 +61,23 @@ MarkerReport::MarkerReport(const arhost_tracker_setup &setup, const std::string 
         if (std::ranges::find(ids_, marker.id) != ids_.end())
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name + " is listed twice");
         if (!(marker.side_mm > 0) || !std::isfinite(marker.side_mm))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name +
-                                                                 " has no usable side_mm; give the side of its black "
-                                                                 "square in millimetres");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name + ": side_mm is invalid; set the side of the black "
+                                                                    "square in millimetres");
         ids_.push_back(marker.id);
         sides_mm_.push_back(marker.side_mm);
     }
 }
 
-void MarkerReport::write(std::span<const Sighting> sightings, arhost_tracker_result &result) const {
+void MarkerReport::write(std::span<const Detection> detections, arhost_tracker_result &result) const {
     std::vector<std::optional<Located>> best(ids_.size());
-    for (const Sighting &sighting : sightings) {
-        const auto pose = planar_pose(sighting.corners_px, lens_, sides_mm_.at(sighting.listed));
+    for (const Detection &detection : detections) {
+        const auto pose = planar_pose(detection.corners_px, lens_, sides_mm_.at(detection.listed));
         if (!pose)
             continue;
-        std::optional<Located> &held = best[sighting.listed];
-        const Located found{sighting, *pose};
-        if (!held || is_better(found, *held))
-            held = found;
+        std::optional<Located> &kept = best[detection.listed];
+        const Located found{detection, *pose};
+        if (!kept || is_better(found, *kept))
+            kept = found;
     }
     result.marker_count = 0;
     for (std::size_t i = 0; i < best.size(); ++i)
@@ -86,4 +85,4 @@ void MarkerReport::write(std::span<const Sighting> sightings, arhost_tracker_res
             result.markers[result.marker_count++] = record(*best[i], ids_[i], family_);
 }
 
-} // namespace arhost::planar
+} // namespace arhost::fiducial

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// From a detector's findings to arhost_tracker_result: what all fiducial trackers do alike.
+// Converts a detector's output to arhost_tracker_result, for all fiducial trackers.
 #pragma once
 
 #include "planar_pose.hpp"
@@ -9,27 +9,26 @@
 #include <string>
 #include <vector>
 
-namespace arhost::planar {
+namespace arhost::fiducial {
 
-// A marker that a detector has found.
-struct Sighting {
-    std::size_t listed; // index into the setup's list
+struct Detection {
+    std::size_t listed; // index into the setup's markers
     Corners corners_px;
-    double quality = 0; // where a marker is seen twice the higher one is kept
+    double quality = 0; // of two detections of one marker the higher one is kept
 };
 
 class MarkerReport {
 public:
-    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) where a listed id is not one of 0 … id_count − 1.
-    // `family` is what the records bear.
+    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if a listed id is not in 0 … id_count − 1. `family` is
+    // written to every record.
     MarkerReport(const arhost_tracker_setup &setup, const std::string &family, std::size_t id_count);
 
     const std::vector<int> &ids() const { return ids_; } // in the setup's order
     const Lens &lens() const { return lens_; }
 
-    // A record for each listed marker that was seen and has a pose, in the setup's order. Of two sightings
-    // of one marker the one with the higher quality counts, then that with the lower reprojection error.
-    void write(std::span<const Sighting> sightings, arhost_tracker_result &result) const;
+    // Writes one record for each listed marker that was detected and has a pose, in the setup's order. Of several
+    // detections of one marker it keeps the one with the highest quality, then with the lowest reprojection error.
+    void write(std::span<const Detection> detections, arhost_tracker_result &result) const;
 
 private:
     Lens lens_;
@@ -38,4 +37,4 @@ private:
     std::vector<double> sides_mm_;
 };
 
-} // namespace arhost::planar
+} // namespace arhost::fiducial

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace arhost::planar {
+namespace arhost::fiducial {
 namespace {
 
 using Square = std::array<cv::Point3d, 4>;
@@ -27,19 +27,19 @@ double rms(const Corners &a, const Corners &b) {
     return std::sqrt(sum / 4);
 }
 
-// Clockwise in the image (y down), as a marker's front is, and each angle clear of 0° and 180°.
+// Convex, with no angle near 0° or 180°, and clockwise in the image (y down), as the front face of a marker is.
 bool is_convex_front(const std::vector<cv::Point2d> &quad) {
-    constexpr double least_sine = 1e-3;
+    constexpr double min_sine = 1e-3;
     for (int i = 0; i < 4; ++i) {
         const cv::Point2d a = quad[(i + 1) % 4] - quad[i], b = quad[(i + 2) % 4] - quad[(i + 1) % 4];
-        if (!(a.cross(b) > least_sine * cv::norm(a) * cv::norm(b)))
+        if (!(a.cross(b) > min_sine * cv::norm(a) * cv::norm(b)))
             return false;
     }
     return true;
 }
 
-// All corners before the camera, and the print's face towards it.
-bool is_in_view(const Motion &motion, const Square &square) {
+// All corners are in front of the camera, and the print's front faces it.
+bool is_visible(const Motion &motion, const Square &square) {
     cv::Matx33d r;
     cv::Rodrigues(motion.rotation, r);
     for (const cv::Point3d &p : square)
@@ -48,8 +48,8 @@ bool is_in_view(const Motion &motion, const Square &square) {
     return r.col(2).dot(motion.translation) < 0;
 }
 
-// Of a square that faces the camera, as undistorted pixels see it.
-Motion facing(const std::vector<cv::Point2d> &quad, const Lens &lens, double side_mm) {
+// The pose of a square parallel to the image plane, from its undistorted pixels.
+Motion frontal_pose(const std::vector<cv::Point2d> &quad, const Lens &lens, double side_mm) {
     const auto on_plane = [&](const cv::Point2d &px) { // z = 1
         return cv::Point2d(px.x / lens.undistorted_matrix()(0, 0), px.y / lens.undistorted_matrix()(1, 1));
     };
@@ -81,7 +81,7 @@ void refine(Motion &motion, const Corners &corners_px, const Lens &lens, const S
         Jacobian next_jacobian;
         const Corners next_projected = lens.project(square, next.rotation, next.translation, &next_jacobian);
         const double gain = rms(corners_px, projected) - rms(corners_px, next_projected);
-        if (gain > 0 && is_in_view(next, square)) {
+        if (gain > 0 && is_visible(next, square)) {
             motion = next;
             projected = next_projected;
             jacobian = next_jacobian;
@@ -96,7 +96,7 @@ void refine(Motion &motion, const Corners &corners_px, const Lens &lens, const S
     }
 }
 
-Pose finish(const Motion &motion, const Corners &corners_px, const Lens &lens, const Square &square) {
+Pose pose_of(const Motion &motion, const Corners &corners_px, const Lens &lens, const Square &square) {
     cv::Matx33d r;
     cv::Rodrigues(motion.rotation, r);
     Pose pose{};
@@ -123,9 +123,10 @@ Lens::Lens(const arhost_intrinsics &intrinsics)
         (intrinsics.distortion == ARHOST_DISTORTION_FISHEYE && count == 4) ||
         (intrinsics.distortion == ARHOST_DISTORTION_BROWN && (count == 4 || count == 5 || count == 8 || count == 12));
     if (!valid || !(intrinsics.fx > 0) || !(intrinsics.fy > 0))
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "the camera's calibration can't be used: fx and fy must be > 0, and the distortion none, brown "
-                      "with 4, 5, 8 or 12 coefficients, or fisheye with 4");
+        throw Failure(
+            ARHOST_STATUS_ERROR_CONFIGURATION,
+            "the camera's calibration is invalid: fx and fy must be > 0, and the distortion none, brown with "
+            "4, 5, 8 or 12 coefficients, or fisheye with 4");
     coefficients_.create(static_cast<int>(count), count ? 1 : 0);
     std::copy_n(intrinsics.coefficients, count, coefficients_.begin());
 }
@@ -147,10 +148,10 @@ std::optional<std::vector<cv::Point2d>> Lens::undistort(const std::vector<cv::Po
         cv::fisheye::undistortPoints(pixels, result, matrix_, coefficients_, cv::noArray(), ideal_matrix_, criteria);
     else
         cv::undistortPoints(pixels, result, matrix_, coefficients_, cv::noArray(), ideal_matrix_, criteria);
-    // Where the model is not one-to-one the iteration ends anywhere.
-    const std::vector<cv::Point2d> again = distort(result);
+    // Where the model is not one-to-one, the iteration may converge to a wrong point.
+    const std::vector<cv::Point2d> check = distort(result);
     for (std::size_t i = 0; i < pixels.size(); ++i)
-        if (!(cv::norm(again[i] - pixels[i]) < 1e-4))
+        if (!(cv::norm(check[i] - pixels[i]) < 1e-4))
             return std::nullopt;
     return result;
 }
@@ -178,7 +179,7 @@ Corners Lens::project(const Square &points_mm, const cv::Vec3d &rotation, const 
     const std::vector<cv::Point3d> points(points_mm.begin(), points_mm.end());
     std::vector<cv::Point2d> projected;
     cv::Mat_<double> derivatives;
-    int first = 0; // of the rotation's three columns; the translation's follow
+    int first = 0; // the rotation's three columns start here; the translation's follow
     if (fisheye_) {
         cv::fisheye::projectPoints(points, projected, rotation, translation, matrix_, coefficients_, 0, derivatives);
         first = 8;
@@ -197,7 +198,7 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
     if (!ideal || !is_convex_front(*ideal))
         return std::nullopt;
     const double h = side_mm / 2;
-    const Square square{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}; // the order that IPPE_SQUARE wants too
+    const Square square{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}; // the order that IPPE_SQUARE requires
     std::vector<cv::Vec3d> rotations, translations;
     cv::solvePnPGeneric(std::vector<cv::Point3d>(square.begin(), square.end()), *ideal, lens.undistorted_matrix(),
                         cv::noArray(), rotations, translations, false, cv::SOLVEPNP_IPPE_SQUARE);
@@ -209,25 +210,22 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
     std::vector<Solution> solutions;
     for (std::size_t i = 0; i < rotations.size(); ++i) {
         const Motion motion{rotations[i], translations[i]};
-        const Pose pose = finish(motion, corners_px, lens, square);
-        if (is_in_view(motion, square) && std::isfinite(pose.reprojection_px))
+        const Pose pose = pose_of(motion, corners_px, lens, square);
+        if (is_visible(motion, square) && std::isfinite(pose.reprojection_px))
             solutions.push_back({motion, pose});
     }
-    // A marker that faces the camera exactly is turned by 180° against OpenCV's axes, for which OpenCV's IPPE gives
-    // 0 or anything.
+    // OpenCV's IPPE fails if the marker is exactly parallel to the image plane, a rotation by 180° in its axes.
     if (solutions.empty())
-        solutions.push_back({facing(*ideal, lens, side_mm), {}});
-    if (solutions.empty())
-        return std::nullopt;
+        solutions.push_back({frontal_pose(*ideal, lens, side_mm), {}});
     if (solutions.size() == 2 && solutions[1].pose.reprojection_px < solutions[0].pose.reprojection_px)
         std::swap(solutions[0], solutions[1]);
-    // Only the better one: near markers have a single minimum, to which the other would move as well.
+    // Refine only the better one: near markers have a single minimum, to which the other would converge as well.
     refine(solutions[0].motion, corners_px, lens, square);
-    const Pose best = finish(solutions[0].motion, corners_px, lens, square);
+    const Pose best = pose_of(solutions[0].motion, corners_px, lens, square);
     if (solutions.size() == 1)
         return PlanarPose{best, std::nullopt, 0};
     const double worse = solutions[1].pose.reprojection_px;
     return PlanarPose{best, solutions[1].pose, worse > 0 ? std::min(best.reprojection_px / worse, 1.0) : 1.0};
 }
 
-} // namespace arhost::planar
+} // namespace arhost::fiducial

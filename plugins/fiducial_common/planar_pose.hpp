@@ -11,25 +11,25 @@
 #include <optional>
 #include <vector>
 
-namespace arhost::planar {
+namespace arhost::fiducial {
 
 // Pixels, centres at integers; top-left, top-right, bottom-right, bottom-left of the upright print.
 using Corners = std::array<cv::Point2d, 4>;
 
-// An arhost_intrinsics in OpenCV's terms.
+// arhost_intrinsics as OpenCV's camera matrix and coefficients.
 class Lens {
 public:
-    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) for a model or coefficient count that there is not.
+    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if the model or coefficient count is unsupported.
     explicit Lens(const arhost_intrinsics &intrinsics);
 
-    // Pixels as a camera of the same focal lengths without distortion, principal point (0, 0), would have
-    // them; nothing where the model can't be inverted.
+    // Undistorted pixels are those of a camera of the same focal lengths without distortion and with the principal
+    // point (0, 0). std::nullopt where the model cannot be inverted.
     std::optional<std::vector<cv::Point2d>> undistort(const std::vector<cv::Point2d> &pixels) const;
     std::vector<cv::Point2d> distort(const std::vector<cv::Point2d> &undistorted_px) const;
 
     const cv::Matx33d &undistorted_matrix() const { return ideal_matrix_; }
 
-    // The pixels of marker points, and where asked for their 8×6 derivative by rotation vector and translation.
+    // Projects marker points; `jacobian` receives the derivatives with respect to rotation vector and translation.
     Corners project(const std::array<cv::Point3d, 4> &points_mm, const cv::Vec3d &rotation,
                     const cv::Vec3d &translation, cv::Matx<double, 8, 6> *jacobian = nullptr) const;
 
@@ -37,7 +37,7 @@ private:
     cv::Point2d principal_point() const { return {matrix_(0, 2), matrix_(1, 2)}; }
 
     bool fisheye_;
-    cv::Matx33d matrix_, ideal_matrix_; // the camera's, and of undistorted pixels
+    cv::Matx33d matrix_, ideal_matrix_; // of distorted and of undistorted pixels
     cv::Mat_<double> coefficients_;
 };
 
@@ -52,10 +52,10 @@ struct PlanarPose {
     double ambiguity; // as in arhost_marker.ambiguity
 };
 
-// Both solutions of the planar pose problem (IPPE: Collins & Bartoli, Infinitesimal Plane-based Pose
-// Estimation, IJCV 2014), the better one refined to the least reprojection error, which takes 3 to 7 % off the
-// error of near markers. Nothing where the corners bound no convex square seen from its front: collinear,
-// NaN, mirrored, behind the camera.
+// Both solutions of the planar pose problem (IPPE: Collins & Bartoli, Infinitesimal Plane-based Pose Estimation, IJCV
+// 2014). The better one is refined to minimal reprojection error, which reduces the error of near markers by 3 to 7
+// %. std::nullopt if the corners are not those of a convex square seen from the front: collinear, NaN, mirrored,
+// behind the camera.
 std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &lens, double side_mm);
 
-} // namespace arhost::planar
+} // namespace arhost::fiducial

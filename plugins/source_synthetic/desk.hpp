@@ -1,39 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The desk by the window: wood, the marker's sheet, and what else lies about. All procedural.
+// The desk by the window, and the postcard that can cover the marker.
 #pragma once
 
+#include "geometry.hpp"
 #include "pyramid.hpp"
-#include "surface.hpp"
 
 #include <opencv2/core.hpp>
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 namespace arhost::synthetic {
 
+// The desk's plane is measured in units of 1/80 of the marker's side: mm for the default marker.
+inline constexpr float marker_side = 80;
+
 struct MarkerSheet {
-    cv::Mat_<uint8_t> cells; // of marker_cells()
+    cv::Mat_<uint8_t> cells; // from marker_cells()
     std::string family;
     int id;
-    double side_mm; // for the caption: the desk is drawn for 80 mm, whatever the size
+    double side_mm; // for the caption
 };
 
-// The side of the black square in the units that the desk is drawn in.
-inline constexpr float drawn_side = 80;
-
-// The light that comes back, and in the fourth channel the gloss.
-PaintRow paint_desk(const MarkerSheet &sheet, std::uint64_t seed);
-
-// A postcard about the origin: in the fourth channel what it and its shadow cover, with which the others are
-// multiplied.
-PaintRow paint_card(std::uint64_t seed);
+// The fourth channel of the desk is the gloss of the varnish, that of the card its coverage of the desk, shadow
+// included.
+struct DeskTextures {
+    Pyramid desk, card;
+};
+DeskTextures make_desk(const MarkerSheet &sheet);
 inline constexpr Point card_half{78, 56};
 
-// The light that the camera sees mirrored at a point of a varnished board, against white in full light.
-// `view`: the direction of sight, of length 1.
-float mirrored_light(Point at, Vec3 view);
+// Light that a varnished board reflects at `at` in the direction of the camera, relative to white in full light.
+// `view`: unit vector from the camera.
+float reflected_light(Point at, Vec3 view);
 
 } // namespace arhost::synthetic

@@ -6,7 +6,7 @@
 
 namespace arhost::synthetic {
 
-// work(first, last) on `threads` even parts of [0, count), one of them on the caller's thread.
+// Calls work(first, last) on `threads` equal parts of [0, count), one of them on the caller's thread.
 template <class Work> void in_parallel(int count, int threads, const Work &work) {
     std::vector<std::jthread> others;
     const auto bound = [&](int part) { return static_cast<int>(static_cast<long long>(count) * part / threads); };

@@ -15,20 +15,20 @@ Vec3 normalized(Vec3 v) {
     return v * (1 / std::sqrt(dot(v, v)));
 }
 
-// A wave with `cycles` in a period, so that the path closes.
-double wave(double turn, int cycles, double phase) {
-    return std::sin(2 * std::numbers::pi * cycles * turn + phase);
+// A sine with a whole number of cycles per period, so that the path closes.
+double wave(double phase, int cycles, double offset) {
+    return std::sin(2 * std::numbers::pi * cycles * phase + offset);
 }
 
-// The unsteadiness of a hand, about −1 to 1: 1 to 4 Hz at the default period of 10 s.
-double tremor(double turn, double phase) {
-    return 0.5 * wave(turn, 11, phase) + 0.3 * wave(turn, 19, 2.1 * phase + 1) +
-           0.2 * wave(turn, 37, 3.7 * phase + 2);
+// Hand tremor, about −1 to 1: 1 to 4 Hz at the default period of 10 s.
+double tremor(double phase, double offset) {
+    return 0.5 * wave(phase, 11, offset) + 0.3 * wave(phase, 19, 2.1 * offset + 1) +
+           0.2 * wave(phase, 37, 3.7 * offset + 2);
 }
 
 } // namespace
 
-Mt pose_on_path(PathKind kind, double turn, double reach, double unit_mm) {
+Mt pose_on_path(PathKind kind, double phase, double distance_scale, double unit_mm) {
     constexpr double degree = std::numbers::pi / 180;
     double azimuth = -112, tilt = 46, distance = 480, roll = -2, hand = 1;
     switch (kind) {
@@ -36,33 +36,33 @@ Mt pose_on_path(PathKind kind, double turn, double reach, double unit_mm) {
         hand = 0;
         break;
     case PathKind::orbit:
-        azimuth += 360 * turn + 8 * wave(turn, 2, 0.4);
-        tilt = 44 + 11 * wave(turn, 1, 0.6) + 3 * wave(turn, 3, 2.0);
-        distance = 480 + 90 * wave(turn, 1, 2.9) + 22 * wave(turn, 3, 0.5);
-        roll += 4 * wave(turn, 2, 1.0) + 2 * wave(turn, 3, 0);
+        azimuth += 360 * phase + 8 * wave(phase, 2, 0.4);
+        tilt = 44 + 11 * wave(phase, 1, 0.6) + 3 * wave(phase, 3, 2.0);
+        distance = 480 + 90 * wave(phase, 1, 2.9) + 22 * wave(phase, 3, 0.5);
+        roll += 4 * wave(phase, 2, 1.0) + 2 * wave(phase, 3, 0);
         break;
     case PathKind::approach: {
-        const double near = 0.5 - 0.5 * wave(turn, 1, std::numbers::pi / 2);
+        const double near = 0.5 - 0.5 * wave(phase, 1, std::numbers::pi / 2);
         azimuth += 14 * near;
         tilt = 58 - 30 * near;
         distance = 680 - 320 * near;
-        roll += 2 * wave(turn, 1, 0);
+        roll += 2 * wave(phase, 1, 0);
         break;
     }
     }
-    azimuth += hand * 0.35 * tremor(turn, 0.3);
-    tilt += hand * 0.30 * tremor(turn, 1.7);
-    distance += hand * 1.5 * tremor(turn, 2.9);
-    roll += hand * 0.35 * tremor(turn, 4.1);
+    azimuth += hand * 0.35 * tremor(phase, 0.3);
+    tilt += hand * 0.30 * tremor(phase, 1.7);
+    distance += hand * 1.5 * tremor(phase, 2.9);
+    roll += hand * 0.35 * tremor(phase, 4.1);
 
     const double a = azimuth * degree, t = tilt * degree;
     const Vec3 back{std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
-    // What it looks at: the marker, and a little above it, where something virtual will stand.
-    Vec3 target{6 * wave(turn, 1, 1.1), 6 * wave(turn, 2, 0.2), 16};
+    // Looks slightly above the marker, where virtual objects will stand.
+    Vec3 target{6 * wave(phase, 1, 1.1), 6 * wave(phase, 2, 0.2), 16};
     if (kind == PathKind::still)
         target = {0, 0, 16};
-    target = target + Vec3{tremor(turn, 5.3), tremor(turn, 0.9), 0} * (hand * 1.2);
-    const Vec3 eye = target + back * (distance * reach);
+    target = target + Vec3{tremor(phase, 5.3), tremor(phase, 0.9), 0} * (hand * 1.2);
+    const Vec3 eye = target + back * (distance * distance_scale);
 
     const Vec3 right_level = normalized(cross({0, 0, 1}, back)), up_level = cross(back, right_level);
     const double c = std::cos(roll * degree), s = std::sin(roll * degree);

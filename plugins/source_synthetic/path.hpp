@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where the camera is: closed paths around the sheet.
+// Closed camera paths around the sheet.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@ enum class PathKind { orbit, still, approach };
 // Marker-to-camera as arhost_marker.mt: column-major, GL eye space.
 using Mt = std::array<double, 16>;
 
-// `turn`: the share of the period that has gone, 0 to 1. `reach`: 1 for the default lens; the camera is so
-// many times as far away. `unit_mm`: scales the whole; 1 for a marker of 80 mm.
-Mt pose_on_path(PathKind kind, double turn, double reach, double unit_mm);
+// `phase`: elapsed fraction of the period, 0 to 1. `distance_scale`: camera distance relative to the default lens.
+// `unit_mm`: scale of the whole scene; 1 for a marker of 80 mm.
+Mt pose_on_path(PathKind kind, double phase, double distance_scale, double unit_mm);
 
 } // namespace arhost::synthetic

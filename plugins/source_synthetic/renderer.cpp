@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
-#include "noise.hpp"
 #include "parallel.hpp"
+#include "random.hpp"
 #include "simd.hpp"
 
 #include <arhost/shading/lens.hpp>
@@ -15,21 +15,20 @@ namespace arhost::synthetic {
 namespace {
 
 constexpr int cell_px = span_px; // of the coarse grid
-constexpr int code_count = 4096; // of srgb_
+constexpr int srgb_table_size = 4096;
 constexpr int grain_side = 256;
-constexpr float grain_unit = 4096;   // of one sigma
-constexpr float least_slope = 0.02f; // sight lines flatter than this see the room, not the desk
-constexpr float sharpness = 0.8f;    // of the texels that a pixel takes: the pyramid is smooth already
-constexpr float aperture = 3.2f;     // diameter of the blur circle in px = aperture·focal_px·|1/depth − 1/focus|
+constexpr float grain_unit = 4096; // one sigma
+constexpr float min_slope = 0.02f; // rays flatter than this are clamped, so that they hit the desk
+constexpr float sharpness = 0.8f;  // texel size relative to the footprint: the pyramid is smooth already
+constexpr float aperture = 3.2f;   // diameter of the blur circle in px = aperture·focal_px·|1/depth − 1/focus|
 
-// Normally distributed (Irwin–Hall of 4), then smeared as by demosaicing: some of it common to the
-// channels, some shared with the neighbours.
+// Normally distributed noise (Irwin–Hall of 4), partly shared between channels and neighbours as after demosaicing.
 std::vector<std::array<int16_t, 4>> make_grain(std::uint64_t seed) {
     constexpr int n = grain_side;
     const auto normal = [&](int x, int y, int channel) {
         float sum = 0;
         for (int i = 0; i < 4; ++i)
-            sum += random_share(seed, (y & (n - 1)) * n + (x & (n - 1)), channel * 4 + i);
+            sum += random_unit(seed, (y & (n - 1)) * n + (x & (n - 1)), channel * 4 + i);
         return (sum - 2) * 1.732f;
     };
     std::vector<float> white(static_cast<std::size_t>(n) * n * 4);
@@ -44,35 +43,35 @@ std::vector<std::array<int16_t, 4>> make_grain(std::uint64_t seed) {
     for (int y = 0; y < n; ++y)
         for (int x = 0; x < n; ++x)
             for (int c = 0; c < 3; ++c) {
-                const float own = 0.5f * at(x, y, c) + 0.25f * (at(x + 1, y, c) + at(x, y + 1, c)) +
-                                  0.15f * at(x + 1, y + 1, c) + 0.2f * (at(x - 1, y, c) + at(x, y - 1, c));
-                const float value = 0.8f * at(x, y, 3) + 0.75f * own;
+                const float channel = 0.5f * at(x, y, c) + 0.25f * (at(x + 1, y, c) + at(x, y + 1, c)) +
+                                      0.15f * at(x + 1, y + 1, c) + 0.2f * (at(x - 1, y, c) + at(x, y - 1, c));
+                const float value = 0.8f * at(x, y, 3) + 0.75f * channel;
                 grain[static_cast<std::size_t>(y) * n + x][c] =
                     static_cast<int16_t>(std::clamp(value * grain_unit, -32767.0f, 32767.0f));
             }
     return grain;
 }
 
-// sRGB's curve back to linear light, to 0.002 (Ian Taylor, "sRGB approximations for HLSL", 2012).
+// sRGB decoding: least-squares fit of a quartic, to 0.2 of 255 codes above code 10.
 inline float decoded(float code) {
-    return code * (code * (code * 0.305306011f + 0.682171111f) + 0.012522878f);
+    return 0.0011388f + code * (0.0265387f + code * (0.5694731f + code * (0.5121703f - code * 0.1099398f)));
 }
 
 } // namespace
 
-// What warp_row needs of a frame.
-struct Renderer::Sweep {
-    const Pyramid *desk, *card;
-    std::optional<Card> card_at;
+// The state of one frame.
+struct Renderer::Frame {
+    std::optional<Card> card;
     std::vector<Plane> planes;
-    std::vector<std::vector<Node>> nodes; // a grid a plane
+    std::vector<std::vector<Node>> nodes; // one grid per plane
     std::uint64_t sequence;
 };
 
-Renderer::Renderer(const arhost_intrinsics &camera, const Sensor &sensor, int threads)
-    : width_(static_cast<int>(camera.width)), height_(static_cast<int>(camera.height)), threads_(threads),
-      padded_((width_ + span_px) / span_px * span_px), grid_width_(padded_ / cell_px + 1),
-      grid_height_(height_ / cell_px + 2), focal_px_(std::sqrt(camera.fx * camera.fy)), seed_(sensor.seed) {
+Renderer::Renderer(DeskTextures textures, const arhost_intrinsics &camera, const Sensor &sensor, int threads)
+    : textures_(std::move(textures)), width_(static_cast<int>(camera.width)),
+      height_(static_cast<int>(camera.height)), threads_(threads), padded_((width_ + span_px) / span_px * span_px),
+      grid_width_(padded_ / cell_px + 1), grid_height_(height_ / cell_px + 2),
+      focal_px_(std::sqrt(camera.fx * camera.fy)), seed_(sensor.seed) {
     const shading::Lens lens(camera);
     lens_columns_ = (grid_width_ - 1) * cell_px / lens_px + 2;
     const int lens_rows = (grid_height_ - 1) * cell_px / lens_px + 2;
@@ -89,7 +88,7 @@ Renderer::Renderer(const arhost_intrinsics &camera, const Sensor &sensor, int th
                 }
     });
 
-    // Red and blue are a little softer than green, as most lenses have them.
+    // Most lenses are a little softer in red and blue than in green.
     const double softness[4] = {1.15, 1.0, 1.22, 1.0};
     const int radius = sensor.blur_px > 0 ? static_cast<int>(std::ceil(2.6 * sensor.blur_px)) : 0;
     kernel_.resize(radius + 1);
@@ -100,35 +99,35 @@ Renderer::Renderer(const arhost_intrinsics &camera, const Sensor &sensor, int th
             weight[i] = std::exp(-0.5 * std::pow(i / (softness[c] * sensor.blur_px), 2));
             sum += 2 * weight[i];
         }
-        int left = 65535;
+        int remainder = 65535;
         for (int i = radius; i > 0; --i) {
             kernel_[i][c] = kernel_[i][c + 4] = static_cast<uint16_t>(std::lround(2 * 65535 * weight[i] / sum));
-            left -= kernel_[i][c];
+            remainder -= kernel_[i][c];
         }
-        kernel_[0][c] = kernel_[0][c + 4] = static_cast<uint16_t>(left);
+        kernel_[0][c] = kernel_[0][c + 4] = static_cast<uint16_t>(remainder);
     }
 
-    // Noise of the photons and of the read-out, in linear light at the sensor, for 1 = white.
-    const double photons = 1.3e-4, read_out = 0.0014, gain = std::exp2(sensor.exposure_ev);
-    const double unit = full_scale * gain, strength = sensor.noise * sensor.noise;
-    shot_ = static_cast<float>(strength * photons / unit);
-    read2_ = static_cast<float>(strength * read_out * read_out / (unit * unit));
-    srgb_.resize(code_count);
-    for (int i = 0; i < code_count; ++i) {
-        const double root = (i + 0.5) / code_count;
+    // Shot noise and read noise, in linear light at the sensor, where 1 is white.
+    const double shot_noise = 1.3e-4, read_noise = 0.0014, gain = std::exp2(sensor.exposure_ev);
+    const double unit = full_scale * gain, scale = sensor.noise * sensor.noise;
+    shot_ = static_cast<float>(scale * shot_noise / unit);
+    read2_ = static_cast<float>(scale * read_noise * read_noise / (unit * unit));
+    srgb_.resize(srgb_table_size);
+    for (int i = 0; i < srgb_table_size; ++i) {
+        const double root = (i + 0.5) / srgb_table_size;
         srgb_[i] = static_cast<uint8_t>(std::lround(255 * shading::srgb_encode(root * root * unit)));
     }
     grain_ = make_grain(hashed(sensor.seed + 11));
 }
 
 Renderer::Plane Renderer::plane_of(const Mt &m) {
-    // Camera axes in the desk's: the rows of the rotation, y and z turned from GL's to OpenCV's.
+    // The camera's axes in desk coordinates: the rows of the rotation, y and z flipped from GL to OpenCV.
     const auto axis = [&](int row, double sign) {
         return shading::Vec3T<double>{sign * m[row], sign * m[4 + row], sign * m[8 + row]};
     };
     const std::array axes{axis(0, 1), axis(1, -1), axis(2, -1)};
     const auto eye = -(axes[0] * m[12] + axes[1] * -m[13] + axes[2] * -m[14]);
-    // A ray d goes in the direction D = Σ d_i axis_i and meets z = 0 at eye − D·eye.z/D.z.
+    // The ray with the camera coordinates d has the direction D = Σ d_i axis_i and hits z = 0 at eye − D·eye.z/D.z.
     Plane plane;
     for (int i = 0; i < 3; ++i) {
         plane.row[0][i] = static_cast<float>(eye.z * axes[i].x - eye.x * axes[i].z);
@@ -140,7 +139,7 @@ Renderer::Plane Renderer::plane_of(const Mt &m) {
     return plane;
 }
 
-std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane, const Pyramid &desk) const {
+std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane) const {
     struct Hit {
         float u, v, depth;
     };
@@ -152,9 +151,10 @@ std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane, const Pyramid
         const auto along = [&](const std::array<float, 3> &row) {
             return row[0] * d.x + row[1] * d.y + row[2] * d.z;
         };
-        const float w = std::max(along(plane.row[2]), least_slope);
+        const float w = std::max(along(plane.row[2]), min_slope);
         return Hit{along(plane.row[0]) / w, along(plane.row[1]) / w, plane.eye.z * d.z / w};
     };
+    const Pyramid &desk = textures_.desk;
     const float focus = std::sqrt(dot(plane.eye, plane.eye));
     std::vector<Node> nodes(static_cast<std::size_t>(grid_width_) * grid_height_);
     for (int j = 0; j < grid_height_; ++j)
@@ -171,24 +171,24 @@ std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane, const Pyramid
             Node &node = nodes[static_cast<std::size_t>(j) * grid_width_ + i];
             node.step_u = 0.25f * circle * du;
             node.step_v = 0.25f * circle * dv;
-            const float reach = std::max(std::abs(at.u), std::abs(at.v)) + 24 * wide;
-            node.lod = std::max({0.0f, std::log2(std::max(footprint, 1e-6f) / desk.texel()), desk.finest_at(reach)});
-            // Falls by the fourth power of the cosine; half of it the camera makes good.
+            const float extent = std::max(std::abs(at.u), std::abs(at.v)) + 24 * wide;
+            node.lod = std::max({0.0f, std::log2(std::max(footprint, 1e-6f) / desk.texel()), desk.finest_at(extent)});
+            // cos⁴ vignetting, about half of it corrected by the camera.
             const float length2 = dot(ray, ray), cos2 = ray.z > 0 ? ray.z * ray.z / length2 : 0;
             node.gain = length2 > 0 ? 0.45f + 0.55f * cos2 * cos2 : 0;
             Vec3 direction = plane.axes[0] * ray.x + plane.axes[1] * ray.y + plane.axes[2] * ray.z;
             const float length = std::sqrt(dot(direction, direction));
             if (length > 0)
-                node.mirror = mirrored_light({at.u, at.v}, direction * (1 / length)) / full_scale;
+                node.reflection = reflected_light({at.u, at.v}, direction * (1 / length)) / full_scale;
         }
     return nodes;
 }
 
-ARHOST_WIDE void Renderer::warp_span(int x, int y, const Sweep &sweep, Paint16 *out) const {
+ARHOST_WIDE void Renderer::warp_span(int x, int y, const Frame &frame, Texel16 *out) const {
     const int upper = y / cell_px;
     const float down = static_cast<float>(y % cell_px) / cell_px;
-    const auto share = static_cast<std::uint32_t>(65536 / sweep.planes.size());
-    Paint16 sum[span_px] = {};
+    const auto weight = static_cast<std::uint32_t>(65536 / frame.planes.size());
+    Texel16 sum[span_px] = {};
     float ray[3][span_px];
     const std::size_t node = static_cast<std::size_t>(y / lens_px) * lens_columns_ + x / lens_px;
     const float below_node = static_cast<float>(y % lens_px) / lens_px;
@@ -199,19 +199,19 @@ ARHOST_WIDE void Renderer::warp_span(int x, int y, const Sweep &sweep, Paint16 *
         for (int i = 0; i < span_px; ++i)
             ray[axis][i] = mix(exact[i / lens_px], exact[i / lens_px + 1], static_cast<float>(i % lens_px) / lens_px);
     }
-    for (std::size_t k = 0; k < sweep.planes.size(); ++k) {
-        const Plane &plane = sweep.planes[k];
+    for (std::size_t k = 0; k < frame.planes.size(); ++k) {
+        const Plane &plane = frame.planes[k];
         Footprints at;
         const auto &[dx, dy, dz] = ray;
         const auto [a, b, c] = plane.row;
         for (int i = 0; i < span_px; ++i) {
             float w = c[0] * dx[i] + c[1] * dy[i] + c[2] * dz[i];
-            w = w > least_slope ? w : least_slope;
+            w = w > min_slope ? w : min_slope;
             const float scale = 1 / w;
             at.u[i] = (a[0] * dx[i] + a[1] * dy[i] + a[2] * dz[i]) * scale;
             at.v[i] = (b[0] * dx[i] + b[1] * dy[i] + b[2] * dz[i]) * scale;
         }
-        const Node *above = &sweep.nodes[k][static_cast<std::size_t>(upper) * grid_width_ + x / cell_px];
+        const Node *above = &frame.nodes[k][static_cast<std::size_t>(upper) * grid_width_ + x / cell_px];
         const Node *below = above + grid_width_;
         const auto pair = [&](float Node::*field) {
             return std::array{mix(above[0].*field, below[0].*field, down),
@@ -220,61 +220,64 @@ ARHOST_WIDE void Renderer::warp_span(int x, int y, const Sweep &sweep, Paint16 *
         at.step_u = pair(&Node::step_u);
         at.step_v = pair(&Node::step_v);
         at.lod = pair(&Node::lod);
-        Paint16 desk[span_px];
-        sweep.desk->sample(at, desk);
+        Texel16 desk[span_px];
+        textures_.desk.sample(at, desk);
 
-        if (sweep.card_at) {
-            const Placement place(sweep.card_at->at, sweep.card_at->degrees);
+        if (const auto &placed = frame.card) {
+            const auto rotated = [&](Point p) {
+                return Point{dot(p, placed->x_axis), dot(p, {-placed->x_axis.y, placed->x_axis.x})};
+            };
             Footprints on_card = at;
             bool near = false;
             for (int i = 0; i < span_px; ++i) {
-                const Point p = place.local({at.u[i], at.v[i]});
+                const Point p = rotated(Point{at.u[i], at.v[i]} - placed->at);
                 on_card.u[i] = p.x;
                 on_card.v[i] = p.y;
                 near |= std::abs(p.x) < card_half.x + 30 && std::abs(p.y) < card_half.y + 30;
             }
             if (near) {
-                const float finer = std::log2(sweep.card->texel() / sweep.desk->texel());
+                const float finer = std::log2(textures_.card.texel() / textures_.desk.texel());
                 for (int end = 0; end < 2; ++end) {
-                    const Point step = place.turned({at.step_u[end], at.step_v[end]});
+                    const Point step = rotated({at.step_u[end], at.step_v[end]});
                     on_card.step_u[end] = step.x;
                     on_card.step_v[end] = step.y;
                     on_card.lod[end] = std::max(0.0f, at.lod[end] - finer);
                 }
-                Paint16 card[span_px];
-                sweep.card->sample(on_card, card);
+                Texel16 card[span_px];
+                textures_.card.sample(on_card, card);
                 for (int i = 0; i < span_px; ++i) {
-                    const std::uint32_t rest = 65536 - card[i][3] * 65536u / static_cast<std::uint32_t>(paint_unit);
+                    const std::uint32_t visible =
+                        65536 - card[i][3] * 65536u / static_cast<std::uint32_t>(texel16_unit);
                     for (int c = 0; c < 4; ++c) {
-                        const std::uint32_t own = c < 3 ? card[i][c] : 0; // a card has no gloss
-                        desk[i][c] = static_cast<uint16_t>(std::min(((desk[i][c] * rest) >> 16) + own, 65535u));
+                        const std::uint32_t colour = c < 3 ? card[i][c] : 0; // the card has no gloss
+                        desk[i][c] = static_cast<uint16_t>(std::min(((desk[i][c] * visible) >> 16) + colour, 65535u));
                     }
                 }
             }
         }
-        if (sweep.planes.size() == 1) {
+        if (frame.planes.size() == 1) {
             std::copy_n(desk, span_px, sum);
         } else {
             for (int i = 0; i < span_px; ++i)
                 for (int c = 0; c < 4; ++c)
-                    sum[i][c] = static_cast<uint16_t>(sum[i][c] + ((desk[i][c] * share) >> 16));
+                    sum[i][c] = static_cast<uint16_t>(sum[i][c] + ((desk[i][c] * weight) >> 16));
         }
     }
     std::copy_n(sum, span_px, out);
 }
 
-// What a thread needs to develop rows.
+// The buffers of one thread of develop_row().
 struct Renderer::Scratch {
-    std::vector<const Paint16 *> window; // the rows from `radius` above to `radius` below
-    std::vector<Paint16> down, across;   // blurred; `down` has `radius` texels more on both sides
+    std::vector<const Texel16 *> window; // the rows from `radius` above to `radius` below
+    std::vector<Texel16> down, across;   // blurred; `down` is padded by `radius` texels on both sides
 };
 
-ARHOST_WIDE void Renderer::develop_row(int y, const Sweep &sweep, Scratch &scratch, uint8_t *bgr) const {
+ARHOST_WIDE void Renderer::develop_row(int y, const Frame &frame, Scratch &scratch, uint8_t *bgr) const {
     const int radius = static_cast<int>(kernel_.size()) - 1;
-    const Paint16 *row = scratch.window[radius];
+    const Texel16 *row = scratch.window[radius];
     if (radius) {
         const auto weight = [&](int i) { return U16x8::load(&kernel_[i]); };
-        Paint16 *down = scratch.down.data() + radius;
+        Texel16 *down = scratch.down.data() + radius;
         for (int x = 0; x < padded_; x += 2) {
             U16x8 sum = times(U16x8::load(row + x), weight(0));
             for (int i = 1; i <= radius; ++i)
@@ -295,35 +298,35 @@ ARHOST_WIDE void Renderer::develop_row(int y, const Sweep &sweep, Scratch &scrat
         }
         row = scratch.across.data();
     }
-    // The grain is laid anew for each frame, and for each band of rows, so that it does not repeat.
-    const std::uint64_t place = hashed(seed_ * 0x9e3779b97f4a7c15ULL + sweep.sequence * 512 + y / 64);
-    const auto *grain = &grain_[static_cast<std::size_t>((place >> 8) + y) % grain_side * grain_side];
+    // Each frame and each band of rows gets its own offset into the noise tile, so that it does not repeat.
+    const std::uint64_t offset = hashed(seed_ * 0x9e3779b97f4a7c15ULL + frame.sequence * 512 + y / 64);
+    const auto *grain = &grain_[static_cast<std::size_t>((offset >> 8) + y) % grain_side * grain_side];
     const float down = static_cast<float>(y % cell_px) / cell_px;
-    const Node *above = &sweep.nodes[sweep.nodes.size() / 2][static_cast<std::size_t>(y / cell_px) * grid_width_];
+    const Node *above = &frame.nodes[frame.nodes.size() / 2][static_cast<std::size_t>(y / cell_px) * grid_width_];
     const Node *below = above + grid_width_;
     for (int left = 0; left < width_; left += cell_px, ++above, ++below) {
-        // What the lens takes away, and what the varnish adds.
+        // Vignetting of the lens and reflection of the varnish.
         const float gain = mix(above[0].gain, below[0].gain, down);
         const float gain_step = (mix(above[1].gain, below[1].gain, down) - gain) / cell_px;
-        const float mirror = mix(above[0].mirror, below[0].mirror, down);
-        const float mirror_step = (mix(above[1].mirror, below[1].mirror, down) - mirror) / cell_px;
-        float gains[4 * cell_px], mirrored[4 * cell_px];
+        const float reflection = mix(above[0].reflection, below[0].reflection, down);
+        const float reflection_step = (mix(above[1].reflection, below[1].reflection, down) - reflection) / cell_px;
+        float gains[4 * cell_px], reflected[4 * cell_px];
         for (int x = 0; x < cell_px; ++x) {
-            const float along = static_cast<float>(x), gloss = row[left + x][3] * (1 / paint_unit);
+            const float along = static_cast<float>(x), gloss = row[left + x][3] * (1 / texel16_unit);
             for (int c = 0; c < 4; ++c) {
                 gains[4 * x + c] = gain + gain_step * along;
-                mirrored[4 * x + c] = (mirror + mirror_step * along) * gloss;
+                reflected[4 * x + c] = (reflection + reflection_step * along) * gloss;
             }
         }
-        const uint16_t *paint = row[left].data();
-        const int16_t *speck = grain[(left + place % grain_side * cell_px) % grain_side].data();
+        const uint16_t *codes = row[left].data();
+        const int16_t *speck = grain[(left + offset % grain_side * cell_px) % grain_side].data();
         std::int32_t index[4 * cell_px];
         for (int i = 0; i < 4 * cell_px; ++i) {
-            const float light = (decoded(paint[i] * (1 / paint_unit)) + mirrored[i]) * gains[i];
+            const float light = (decoded(codes[i] * (1 / texel16_unit)) + reflected[i]) * gains[i];
             float seen = light + std::sqrt(light * shot_ + read2_) * (speck[i] * (1 / grain_unit));
             seen = seen > 0 ? std::sqrt(seen) : 0;
             seen = seen < 1 ? seen : 1;
-            index[i] = static_cast<std::int32_t>(seen * (code_count - 1));
+            index[i] = static_cast<std::int32_t>(seen * (srgb_table_size - 1));
         }
         for (int x = 0; x < std::min(cell_px, width_ - left); ++x)
             for (int c = 0; c < 3; ++c)
@@ -331,21 +334,20 @@ ARHOST_WIDE void Renderer::develop_row(int y, const Sweep &sweep, Scratch &scrat
     }
 }
 
-void Renderer::render(const Pyramid &desk, const Pyramid *card, const Shot &shot, uint8_t *bgr,
-                      std::size_t stride) const {
-    Sweep sweep{&desk, card, card ? shot.card : std::nullopt, {}, {}, shot.sequence};
+void Renderer::render(const Shot &shot, uint8_t *bgr, std::size_t stride) const {
+    Frame frame{shot.card, {}, {}, shot.sequence};
     for (const Mt &pose : shot.poses) {
-        sweep.planes.push_back(plane_of(pose));
-        sweep.nodes.push_back(nodes_of(sweep.planes.back(), desk));
+        frame.planes.push_back(plane_of(pose));
+        frame.nodes.push_back(nodes_of(frame.planes.back()));
     }
-    // Spans are warped in blocks of rows, since neighbours below one another look the same texels up. The
-    // rows that the blur of a block needs are kept in a ring.
+    // Spans are warped in blocks of rows, because vertical neighbours read the same texels. A ring keeps the rows
+    // that the blur of a block needs.
     constexpr int block_rows = 16, block_columns = 8 * span_px;
     const int radius = static_cast<int>(kernel_.size()) - 1, rows_kept = block_rows + 2 * radius;
     in_parallel(height_, threads_, [&](int first, int last) {
-        std::vector<Paint16> ring(static_cast<std::size_t>(rows_kept) * padded_);
-        Scratch scratch{std::vector<const Paint16 *>(2 * radius + 1), std::vector<Paint16>(padded_ + 2 * radius),
-                        std::vector<Paint16>(padded_)};
+        std::vector<Texel16> ring(static_cast<std::size_t>(rows_kept) * padded_);
+        Scratch scratch{std::vector<const Texel16 *>(2 * radius + 1), std::vector<Texel16>(padded_ + 2 * radius),
+                        std::vector<Texel16>(padded_)};
         const auto kept = [&](int y) { return &ring[static_cast<std::size_t>(y % rows_kept) * padded_]; };
         int warped = std::max(0, first - radius);
         for (int block = first; block < last; block += block_rows) {
@@ -353,12 +355,12 @@ void Renderer::render(const Pyramid &desk, const Pyramid *card, const Shot &shot
             for (int left = 0; left < padded_; left += block_columns)
                 for (int y = warped; y < end; ++y)
                     for (int x = left; x < std::min(left + block_columns, padded_); x += span_px)
-                        warp_span(x, y, sweep, kept(y) + x);
+                        warp_span(x, y, frame, kept(y) + x);
             warped = end;
             for (int y = block; y < block_end; ++y) {
                 for (int i = -radius; i <= radius; ++i)
                     scratch.window[i + radius] = kept(std::clamp(y + i, 0, height_ - 1));
-                develop_row(y, sweep, scratch, bgr + stride * static_cast<std::size_t>(y));
+                develop_row(y, frame, scratch, bgr + stride * static_cast<std::size_t>(y));
             }
         }
     });

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// source_synthetic: a printed marker on a desk, seen by a moving camera whose poses are exactly known.
-#include "marker_print.hpp"
+// source_synthetic: a printed marker on a desk, filmed by a moving camera whose poses are known exactly.
+#include "marker_cells.hpp"
+#include "path.hpp"
 #include "renderer.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -10,7 +11,8 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <memory>
+#include <numbers>
+#include <optional>
 #include <thread>
 
 namespace {
@@ -25,25 +27,25 @@ std::int64_t now_ns() {
         .count();
 }
 
-// A small camera with a mild lens, its axis a little beside the middle.
+// A small camera with mild distortion and an off-centre principal point.
 arhost_intrinsics default_camera(std::int64_t width, std::int64_t height) {
     arhost_intrinsics camera{};
     camera.struct_size = sizeof camera;
     camera.width = static_cast<std::uint32_t>(width);
     camera.height = static_cast<std::uint32_t>(height);
     camera.distortion = ARHOST_DISTORTION_BROWN;
-    const double across = static_cast<double>(width) / 1280, down = static_cast<double>(height) / 720;
-    camera.fx = camera.fy = 1020 * across;
-    camera.cx = 645.5 * across - 0.5;
-    camera.cy = 355.5 * down - 0.5;
+    const double x_scale = static_cast<double>(width) / 1280, y_scale = static_cast<double>(height) / 720;
+    camera.fx = camera.fy = 1020 * x_scale;
+    camera.cx = 645.5 * x_scale - 0.5;
+    camera.cy = 355.5 * y_scale - 0.5;
     camera.coefficient_count = 5;
     const double coefficients[] = {-0.094, 0.061, 0.0006, -0.0004, -0.011};
     std::copy(std::begin(coefficients), std::end(coefficients), camera.coefficients);
     return camera;
 }
 
-// How many times as far as the default lens a camera must be to see the marker as large in its image.
-double reach_of(const arhost_intrinsics &camera) {
+// The camera's distance, relative to the default lens, at which the marker appears equally large.
+double distance_scale_of(const arhost_intrinsics &camera) {
     const auto half_view = [](double centre, double size, double focal) {
         const double px = std::max(0.5, std::min(centre + 0.5, size - 0.5 - centre));
         return std::tan(std::min(px / focal, 1.0));
@@ -70,15 +72,15 @@ public:
         sensor_ = {options.real("blur_px"), options.real("noise"), options.real("exposure_ev"),
                    static_cast<std::uint64_t>(options.integer("seed"))};
         if (!(sheet_.side_mm > 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "side_mm: must be more than 0");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "side_mm: must be greater than 0");
         if (!(period_s_ > 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "period: must be more than 0 s");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "period: must be greater than 0 s");
         if (!(fps_ > 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "fps: must be more than 0");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "fps: must be greater than 0");
         if (occlude_from_ >= 0 && occlude_to_ <= occlude_from_)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "occlude_to: must be more than occlude_from; it is the first "
-                          "frame in which the marker is not covered any more");
+                          "occlude_to: must be greater than occlude_from; it is the first frame in which the "
+                          "marker is no longer covered");
         if (threads_ < 1)
             threads_ = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     }
@@ -88,7 +90,7 @@ public:
         if (setup.fps > 0)
             fps_ = setup.fps;
         paced_ = setup.paced != 0;
-        reach_ = reach_of(camera_);
+        distance_scale_ = distance_scale_of(camera_);
 
         properties.has_intrinsics = 1;
         properties.intrinsics = camera_;
@@ -100,28 +102,13 @@ public:
         format.fps = fps_;
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "the camera's image of " + std::to_string(camera_.width) + "×" +
-                              std::to_string(camera_.height) + " px is not 1 to " +
-                              std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px a side");
+                          "the camera's image size of " + std::to_string(camera_.width) + "×" +
+                              std::to_string(camera_.height) + " px is invalid; each side must be 1 to " +
+                              std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px");
         properties.frame_count = frames_;
 
-        host_.progress(0, "lens");
-        renderer_.emplace(camera_, sensor_, threads_);
-        // A pixel of the nearest camera sees about this much of the sheet.
-        const double pixel = 350 * reach_ / std::sqrt(camera_.fx * camera_.fy);
-        const double texel = std::clamp(std::exp2(std::floor(std::log2(pixel))), 0.125, 1.0);
-        const auto report = [&](double done) {
-            host_.progress(0.1 + 0.85 * done, "painting the desk");
-            if (host_.cancelled())
-                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while painting the desk");
-        };
-        const int side = std::min(1024, static_cast<int>(256 / texel)); // the finest level covers the sheet
-        // All cores, once: the rest of a run waits for a source that starts again.
-        const int cores = std::max(threads_, static_cast<int>(std::thread::hardware_concurrency()));
-        desk_.emplace(PyramidSize{side, static_cast<float>(texel), 1024}, cores, paint_desk(sheet_, sensor_.seed),
-                      report);
-        if (occlude_from_ >= 0)
-            card_.emplace(PyramidSize{512, 0.5f, 128}, threads_, paint_card(sensor_.seed), [](double) {});
+        host_.progress(0, "preparing the desk");
+        renderer_.emplace(make_desk(sheet_), camera_, sensor_, threads_);
         host_.progress(1, "ready");
     }
 
@@ -132,14 +119,14 @@ public:
                 return status;
         if (frames_ && frame >= frames_)
             return ARHOST_STATUS_END;
-        const double unit_mm = sheet_.side_mm / drawn_side;
+        const double unit_mm = sheet_.side_mm / marker_side;
         std::vector<Mt> poses;
         const int count = motion_blur_ > 0 ? 5 : 1;
         poses.reserve(count);
         for (int i = 0; i < count; ++i)
             poses.push_back(pose_at(static_cast<double>(frame) + motion_blur_ * (i - (count - 1) / 2.0) / count, 1));
         const Shot shot{poses, card_at(frame), frame};
-        renderer_->render(*desk_, card_ ? &*card_ : nullptr, shot, buffer.plane[0], buffer.format->stride[0]);
+        renderer_->render(shot, buffer.plane[0], buffer.format->stride[0]);
 
         info.clock = ARHOST_CLOCK_MEDIA;
         info.capture_ns = time_ns(frame);
@@ -149,45 +136,43 @@ public:
         return ARHOST_STATUS_OK;
     }
 
-    void stop() {
-        renderer_.reset();
-        desk_.reset();
-        card_.reset();
-    }
+    void stop() { renderer_.reset(); }
 
 private:
     Mt pose_at(double frame, double unit_mm) const {
-        const double turns = frame / (fps_ * period_s_);
-        return pose_on_path(path_, turns - std::floor(turns), reach_, unit_mm);
+        const double periods = frame / (fps_ * period_s_);
+        return pose_on_path(path_, periods - std::floor(periods), distance_scale_, unit_mm);
     }
 
-    // Over the marker from occlude_from to occlude_to; a few frames before and after it slides in and out.
+    // Covers the marker from occlude_from to occlude_to, and slides in and out before and after.
     std::optional<Card> card_at(std::uint64_t sequence) const {
         if (occlude_from_ < 0)
             return {};
-        constexpr double sliding = 10;
+        constexpr double slide_frames = 10;
         const auto frame = static_cast<double>(sequence);
         const double away =
             std::max(static_cast<double>(occlude_from_) - frame, frame - static_cast<double>(occlude_to_ - 1)) /
-            sliding;
+            slide_frames;
         if (away >= 1)
             return {};
-        const double gone = away > 0 ? away * away * (3 - 2 * away) : 0;
-        return Card{{static_cast<float>(1 + 210 * gone), static_cast<float>(-1 - 330 * gone)}, 7 - 25 * gone};
+        const float moved = away > 0 ? smoothstep(0, 1, static_cast<float>(away)) : 0;
+        const float angle = (7 - 25 * moved) * std::numbers::pi_v<float> / 180;
+        return Card{{1 + 210 * moved, -1 - 330 * moved}, {std::cos(angle), std::sin(angle)}};
     }
 
     std::int64_t time_ns(std::uint64_t frame) const { return std::llround(static_cast<double>(frame) * 1e9 / fps_); }
 
-    // Waits until `frame` is due. Where that is past already by a frame or more, goes on to the one due now.
+    // Waits until `frame` is due. If it is late by a frame or more, skips to the frame that is due now.
     arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
         if (!epoch_set_) {
             epoch_ns_ = now_ns() - time_ns(frame);
             epoch_set_ = true;
         }
         const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame);
-        // What does not fit, after a halt of weeks, is left out with the next frame.
-        constexpr double most = std::numeric_limits<std::uint32_t>::max();
-        info.skipped = static_cast<std::uint32_t>(std::clamp(static_cast<double>(late_ns) * fps_ / 1e9, 0.0, most));
+        // After a pause of weeks the count may not fit; the next frame skips the remainder.
+        constexpr double max_skipped = std::numeric_limits<std::uint32_t>::max();
+        info.skipped =
+            static_cast<std::uint32_t>(std::clamp(static_cast<double>(late_ns) * fps_ / 1e9, 0.0, max_skipped));
         frame += info.skipped;
         const std::chrono::steady_clock::time_point due(std::chrono::nanoseconds(epoch_ns_ + time_ns(frame)));
         return host_.wait_until(due) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_CANCELLED;
@@ -205,9 +190,8 @@ private:
     Sensor sensor_;
 
     arhost_intrinsics camera_{};
-    double reach_ = 1;
+    double distance_scale_ = 1;
     std::optional<Renderer> renderer_;
-    std::optional<Pyramid> desk_, card_;
 
     bool paced_ = false, epoch_set_ = false;
     std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
@@ -215,33 +199,31 @@ private:
 
 using arhost::option;
 const arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_TEXT, "family", "tag36h11",
-           "The marker's family: an AprilTag family or a dictionary of OpenCV.", 0, 0, marker_families().data()),
-    option(ARHOST_OPTION_INTEGER, "id", "0", "The marker's id.", 0, 100'000),
+    option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Marker family: an AprilTag family or an OpenCV dictionary.", 0,
+           0, marker_families().data()),
+    option(ARHOST_OPTION_INTEGER, "id", "0", "Marker id.", 0, 100'000),
     option(ARHOST_OPTION_REAL, "side_mm", "80",
            "Outer side of the black square in mm; the whole scene scales with it.", 0.001, 100'000),
     option(ARHOST_OPTION_TEXT, "path", "orbit",
-           "How the camera moves: orbit (once around the sheet), still, or approach (towards it and back).", 0, 0,
-           paths),
-    option(ARHOST_OPTION_REAL, "period", "10", "Seconds until the path closes.", 0.01, 100'000),
-    option(ARHOST_OPTION_INTEGER, "frames", "150", "End after so many frames; 0: endless.", 0, 2'147'483'647),
-    option(ARHOST_OPTION_REAL, "fps", "30", "Frames a second, where the configuration asks for no rate.", 0.001,
-           1000),
+           "Camera path: orbit (once around the sheet), still, or approach (towards it and back).", 0, 0, paths),
+    option(ARHOST_OPTION_REAL, "period", "10", "Duration of the closed path in s.", 0.01, 100'000),
+    option(ARHOST_OPTION_INTEGER, "frames", "150", "Number of frames; 0: endless.", 0, 2'147'483'647),
+    option(ARHOST_OPTION_REAL, "fps", "30", "Frames per second, if the configuration sets no rate.", 0.001, 1000),
     option(ARHOST_OPTION_INTEGER, "width", "1280",
-           "Width in px of the default camera, which is used where the configuration names none.", 1,
+           "Width in px of the default camera, which is used if the configuration names none.", 1,
            ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_INTEGER, "height", "720", "Height in px of the default camera.", 1, ARHOST_MAX_IMAGE_SIDE),
-    option(ARHOST_OPTION_REAL, "noise", "1", "Sensor noise; 1: as of a small camera indoors, 0: none.", 0, 20),
-    option(ARHOST_OPTION_REAL, "blur_px", "0.5", "Softness of the lens, sigma in px; 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "noise", "1", "Sensor noise; 1: a small camera indoors, 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "blur_px", "0.5", "Lens blur, sigma in px; 0: none.", 0, 20),
     option(ARHOST_OPTION_REAL, "motion_blur", "0",
-           "How long the shutter is open, as a share of the frame's time; any but 0 takes five times as long.", 0, 1),
-    option(ARHOST_OPTION_REAL, "exposure_ev", "0", "Exposure in stops: 1 is twice as bright.", -10, 10),
+           "Shutter time as a fraction of the frame period; any value but 0 takes five times as long.", 0, 1),
+    option(ARHOST_OPTION_REAL, "exposure_ev", "0", "Exposure in stops; 1 is twice as bright.", -10, 10),
     option(ARHOST_OPTION_INTEGER, "occlude_from", "-1",
-           "The first frame in which a postcard covers the marker; -1: never.", -1, 2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "occlude_to", "-1", "The first frame in which it covers it no more.", -1,
+           "First frame in which a postcard covers the marker; -1: never.", -1, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "occlude_to", "-1", "First frame in which the postcard no longer covers it.", -1,
            2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "seed", "1", "Chooses the wood's grain and the noise.", 0, 2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads that paint; the frames don't depend on it. 0: all cores.",
+    option(ARHOST_OPTION_INTEGER, "seed", "1", "Selects the noise.", 0, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "threads", "1", "Rendering threads; the frames do not depend on it. 0: all cores.",
            0, 256),
 };
 
@@ -253,7 +235,7 @@ const arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "A printed marker on a desk, seen by a moving camera whose poses are exactly known.",
+    "A printed marker on a desk, filmed by a moving camera whose poses are known exactly.",
     ARHOST_CAPABILITY_SEEK,
     std::size(options),
     options,

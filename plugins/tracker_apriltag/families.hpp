@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The families of AprilTag's library.
+// The tag families of the AprilTag library.
 #pragma once
 
 #include <apriltag.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// AprilTags, found by AprilTag's own library (version 3).
+// tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
 #include "families.hpp"
 
 #include <fiducial_common/edge_refinement.hpp>
@@ -21,8 +21,8 @@ namespace {
 using arhost::Failure;
 using arhost::apriltag::family_types;
 using arhost::apriltag::FamilyType;
-using arhost::planar::MarkerReport;
-using arhost::planar::Sighting;
+using arhost::fiducial::Detection;
+using arhost::fiducial::MarkerReport;
 
 constexpr auto family_names = [] {
     std::array<const char *, family_types.size() + 1> names{};
@@ -35,24 +35,25 @@ constexpr const char *refinements[] = {"edges", "none", nullptr};
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Family of the tags.", 0, 0, family_names.data()),
     arhost::option(ARHOST_OPTION_TEXT, "corner_refinement", "edges",
-                   "How corners are made exact: edges (arhost's own), or none, which leaves them to the library.", 0,
-                   0, refinements),
+                   "Corner refinement: edges (lines fitted by arhost), or none (the library's corners).", 0, 0,
+                   refinements),
     arhost::option(ARHOST_OPTION_REAL, "quad_decimate", "1.5",
-                   "Tags are searched for in an image made smaller by this factor: 1, 1.5 or a whole number; more is "
-                   "quicker, but small tags are lost.",
+                   "Detects tags in an image downscaled by this factor: 1, 1.5 or an integer. Larger is faster, but "
+                   "loses small tags.",
                    1, 8),
     arhost::option(ARHOST_OPTION_REAL, "quad_sigma", "0",
-                   "Standard deviation in px of a blur before the search (0.8 helps in noisy images); negative "
-                   "sharpens.",
+                   "Standard deviation in px of a blur before detection (0.8 helps in noisy images); negative values "
+                   "sharpen.",
                    -4, 4),
     arhost::option(ARHOST_OPTION_BOOL, "refine_edges", "true",
-                   "The library fits the edges again before it reads the bits."),
+                   "The library refines the edges before it decodes the bits."),
     arhost::option(ARHOST_OPTION_REAL, "decode_sharpening", "0.25",
-                   "How much the bits are sharpened before they are read; helps small tags.", 0, 10),
-    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "2", "Wrong bits that are corrected.", 0, 2),
+                   "Sharpening before the bits are decoded; helps small tags.", 0, 10),
+    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "2", "Maximum number of bit errors to correct.", 0, 2),
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
-                   "Contrast of the bits, in grey levels from 0 to 255, below which a tag is ignored.", 0, 255),
-    arhost::option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads of the detector; the result is the same.", 1, 64),
+                   "Ignores tags whose bit contrast, in grey levels from 0 to 255, is lower.", 0, 255),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads of the detector; they do not affect the result.",
+                   1, 64),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -63,7 +64,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Finds AprilTags of one family with AprilTag's own library.",
+    "Detects AprilTags of one family with the AprilTag library.",
     0,
     std::size(options),
     options,
@@ -73,15 +74,15 @@ constexpr arhost_descriptor descriptor = {
 using Detector = std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)>;
 using Detections = std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)>;
 
-// A family that holds the listed tags only: others are not reported, and the decoding table, which takes
-// gigabytes for the larger families, stays small. A detection's id is its index in `ids`.
+// A family of only the listed tags: others are not reported, and the decoding table, which takes gigabytes for the
+// larger families, stays small. A detection's id is its index in `ids`.
 class ListedFamily {
 public:
     ListedFamily(const FamilyType &type, const std::vector<int> &ids)
         : destroy_(type.destroy), family_(type.create()), library_codes_(family_->codes) {
         for (int id : ids)
             codes_.push_back(library_codes_[id]);
-        family_->codes = codes_.data(); // the library's own table is static: not ours to change
+        family_->codes = codes_.data(); // the library's table is static and must not change
         family_->ncodes = static_cast<std::uint32_t>(codes_.size());
     }
     ~ListedFamily() {
@@ -103,7 +104,7 @@ const FamilyType &family_type(const std::string &name) {
     for (const FamilyType &type : family_types)
         if (name == type.name)
             return type;
-    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "family: there is none named '" + name + "'");
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "family: unknown family '" + name + "'");
 }
 
 class AprilTagTracker {
@@ -114,9 +115,9 @@ public:
           refine_edges_(options.boolean("refine_edges")), sharpening_(options.real("decode_sharpening")),
           max_hamming_(static_cast<int>(options.integer("max_hamming"))),
           min_margin_(options.real("min_decision_margin")), threads_(static_cast<int>(options.integer("threads"))) {
-        // The library would decimate by the whole part and scale back by the fraction.
+        // For other fractions, the library decimates by the integer part but scales back by the full factor.
         if (decimate_ != 1.5 && decimate_ != std::floor(decimate_))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or a whole number");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or an integer");
     }
 
     void start(const arhost_tracker_setup &setup) {
@@ -131,32 +132,33 @@ public:
         detector_->decode_sharpening = sharpening_;
         detector_->nthreads = threads_;
         apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
-        // Older releases' threads take work as soon as they run, while the list of it may still grow and move
-        // (AprilRobotics/apriltag, pull request 339). After a first frame with hardly any they wait to be told.
+        // In older releases, new threads take tasks while the task list may still be reallocated
+        // (AprilRobotics/apriltag, pull request 339). After a first frame with few tasks they wait for a signal.
         if (threads_ > 1)
-            detect(cv::Mat::zeros(smallest_side(), smallest_side(), CV_8UC1));
+            detect(cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        std::vector<Sighting> sightings;
-        const Detections detections = detect(grey);
-        for (int i = 0; detections && i < zarray_size(detections.get()); ++i) {
+        std::vector<Detection> detections;
+        const Detections tags = detect(grey);
+        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
             apriltag_detection_t *tag = nullptr;
-            zarray_get(detections.get(), i, &tag);
+            zarray_get(tags.get(), i, &tag);
             if (tag->decision_margin < min_margin_)
                 continue;
-            Sighting sighting{static_cast<std::size_t>(tag->id), {}, tag->decision_margin - 256.0 * tag->hamming};
-            // AprilTag goes round from the bottom left against the clock, with pixel centres at +0.5.
+            Detection detection{static_cast<std::size_t>(tag->id), {}, tag->decision_margin - 256.0 * tag->hamming};
+            // AprilTag's corners start at the bottom left, counter-clockwise, with pixel centres at +0.5.
             for (int corner = 0; corner < 4; ++corner)
-                sighting.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            const auto corners = fit_edges_ ? arhost::planar::refine_edges(grey, sighting.corners_px, report_->lens())
-                                            : sighting.corners_px;
+                detection.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
+            const auto corners = fit_edges_
+                                     ? arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens())
+                                     : detection.corners_px;
             if (corners)
-                sightings.push_back({sighting.listed, *corners, sighting.quality});
+                detections.push_back({detection.listed, *corners, detection.quality});
         }
-        report_->write(sightings, result);
+        report_->write(detections, result);
     }
 
     void stop() {
@@ -165,14 +167,14 @@ public:
     }
 
 private:
-    // The library reads outside images of less than one of its 4×4 px tiles; no tag is that small.
-    int smallest_side() const { return static_cast<int>(8 * decimate_); }
+    // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
+    int min_image_side() const { return static_cast<int>(8 * decimate_); }
 
     Detections detect(const cv::Mat &grey) {
-        if (std::min(grey.cols, grey.rows) < smallest_side())
+        if (std::min(grey.cols, grey.rows) < min_image_side())
             return {nullptr, apriltag_detections_destroy};
         cv::Mat pixels = grey;
-        if (sigma_ != 0 && decimate_ == 1) // then the library blurs in place, and the frame is read-only
+        if (sigma_ != 0 && decimate_ == 1) // the library would blur in place, but the frame is read-only
             pixels = grey.clone();
         image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
         return {apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy};
@@ -189,7 +191,7 @@ private:
 
     std::optional<MarkerReport> report_;
     std::optional<ListedFamily> family_;
-    Detector detector_{nullptr, apriltag_detector_destroy}; // goes before the family that it points to
+    Detector detector_{nullptr, apriltag_detector_destroy}; // declared last: destroyed before the family it uses
 };
 
 } // namespace

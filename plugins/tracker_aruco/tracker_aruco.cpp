@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// ArUco markers and AprilTags, found by OpenCV.
-#include "dictionaries.hpp"
-#include "opencv_aruco.hpp"
-
+// tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
+#include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/marker_report.hpp>
+#include <fiducial_common/opencv_aruco.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -25,8 +24,8 @@ namespace {
 using arhost::Failure;
 using arhost::aruco::dictionary_types;
 using arhost::aruco::DictionaryType;
-using arhost::planar::MarkerReport;
-using arhost::planar::Sighting;
+using arhost::fiducial::Detection;
+using arhost::fiducial::MarkerReport;
 
 constexpr auto dictionary_names = [] {
     std::array<const char *, dictionary_types.size() + 1> names{};
@@ -39,31 +38,34 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "dictionary", "DICT_APRILTAG_36h11", "Predefined dictionary of the markers.",
                    0, 0, dictionary_names.data()),
     arhost::option(ARHOST_OPTION_INPUT_PATH, "dictionary_file", "",
-                   "A dictionary of one's own in OpenCV's YAML format, instead of `dictionary`."),
+                   "Custom dictionary in OpenCV's YAML format, instead of `dictionary`."),
     arhost::option(
         ARHOST_OPTION_TEXT, "corner_refinement", "edges",
-        "How corners are made exact: edges (arhost's own), or OpenCV's none, subpix, contour, or apriltag, "
-        "which finds the squares with AprilTag's method too.",
+        "Corner refinement: edges (lines fitted by arhost), or OpenCV's none, subpix, contour or apriltag, which "
+        "also detects squares with AprilTag's method.",
         0, 0, refinements),
     arhost::option(ARHOST_OPTION_INTEGER, "subpix_window_px", "5",
-                   "Half side in px of the window of the refinement subpix; less than a marker's cell.", 1, 50),
+                   "Half side in px of the window of subpix; smaller than a marker cell.", 1, 50),
     arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_min_px", "3",
-                   "Smallest window of the adaptive threshold (not for the refinement apriltag).", 3, 999),
+                   "Smallest window in px of the adaptive threshold (not with corner_refinement apriltag).", 3, 999),
     arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_max_px", "23",
-                   "Largest window of the adaptive threshold (not for the refinement apriltag).", 3, 999),
+                   "Largest window in px of the adaptive threshold (not with corner_refinement apriltag).", 3, 999),
     arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_step_px", "10",
-                   "Step from the smallest window to the largest (not for the refinement apriltag).", 1, 999),
-    arhost::option(ARHOST_OPTION_REAL, "min_perimeter_rate", "0.03",
-                   "Smallest perimeter of a marker over the image's longer side (not for the refinement apriltag).",
-                   0.001, 4),
-    arhost::option(ARHOST_OPTION_REAL, "min_distance_rate", "0.02",
-                   "Of squares whose corners are nearer than this times their perimeter only the outer one is read; "
-                   "OpenCV's 0.05 loses prints with a narrow white margin.",
-                   0.001, 0.5),
+                   "Step in px from the smallest to the largest window (not with corner_refinement apriltag).", 1,
+                   999),
+    arhost::option(
+        ARHOST_OPTION_REAL, "min_perimeter_rate", "0.03",
+        "Smallest marker perimeter relative to the longer image side (not with corner_refinement apriltag).", 0.001,
+        4),
+    arhost::option(
+        ARHOST_OPTION_REAL, "min_distance_rate", "0.02",
+        "Of squares whose corners are closer than this times their perimeter, only the outer one is decoded; "
+        "OpenCV's 0.05 loses prints with a narrow white margin.",
+        0.001, 0.5),
     arhost::option(ARHOST_OPTION_REAL, "error_correction_rate", "0.6",
-                   "Share of the wrong bits that the dictionary can bear which is corrected.", 0, 1),
-    arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width in cells of the marker's black border.", 1, 8),
-    arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Find white-on-black markers too."),
+                   "Bit errors to correct, as a fraction of what the dictionary can correct.", 0, 1),
+    arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
+    arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detect white-on-black markers."),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -74,7 +76,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Finds ArUco markers and AprilTags of one dictionary with OpenCV.",
+    "Detects ArUco markers and AprilTags of one dictionary with OpenCV.",
     0,
     std::size(options),
     options,
@@ -85,10 +87,10 @@ const DictionaryType &dictionary_type(const std::string &name) {
     for (const DictionaryType &type : dictionary_types)
         if (name == type.option)
             return type;
-    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary: there is none named '" + name + "'");
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary: unknown dictionary '" + name + "'");
 }
 
-// OpenCV reads past the end of strings that are too short.
+// Checked here because OpenCV reads past the end of strings that are too short.
 bool is_dictionary(const cv::FileNode &root) {
     const cv::FileNode count = root["nmarkers"], size = root["markersize"];
     if (!count.isInt() || !size.isInt() || static_cast<int>(count) < 1 || static_cast<int>(size) < 1 ||
@@ -107,12 +109,12 @@ bool is_dictionary(const cv::FileNode &root) {
 }
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {
-    const auto refuse = [&](const std::string &reason) {
+    const auto invalid = [&](const std::string &reason) {
         return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                       "dictionary_file: " + file + " is no dictionary: " + reason);
+                       "dictionary_file: " + file + " is not a dictionary: " + reason);
     };
     if (!std::ifstream(file))
-        throw refuse("it can't be read");
+        throw invalid("cannot read the file");
     try {
         const cv::FileStorage storage(file, cv::FileStorage::READ);
         cv::aruco::Dictionary dictionary;
@@ -121,9 +123,10 @@ cv::aruco::Dictionary read_dictionary(const std::string &file) {
             return dictionary;
         }
     } catch (const cv::Exception &) {
-        // OpenCV's parser says only which of its own lines failed.
+        // OpenCV's message only names a line of its own source.
     }
-    throw refuse("give nmarkers, markersize, and marker_0, marker_1, … each a string of markersize² bits 0 or 1");
+    throw invalid(
+        "it needs nmarkers, markersize, and marker_0, marker_1, …, each a string of markersize² bits 0 or 1");
 }
 
 class ArucoTracker {
@@ -136,9 +139,8 @@ public:
             const DictionaryType &type = dictionary_type(options.text("dictionary"));
             dictionary_ = arhost::aruco::predefined(type.name);
             family_ = type.family;
-            // OpenCV's tables of AprilTag's families are turned by 180° against AprilTag's own.
-            half_turned_ = type.april_tag_bits > 0;
-            if (half_turned_)
+            rotated_180_ = type.is_april_tag();
+            if (rotated_180_)
                 dictionary_.maxCorrectionBits = type.april_tag_bits;
         }
         const std::string refinement = options.text("corner_refinement");
@@ -165,7 +167,7 @@ public:
 
     void start(const arhost_tracker_setup &setup) {
         report_.emplace(setup, family_, static_cast<std::size_t>(dictionary_.bytesList.rows));
-        // Only the listed markers: quicker, and fewer chances to mistake clutter for one.
+        // Only the listed markers: faster, and fewer false positives.
         cv::Mat listed;
         for (int id : report_->ids())
             listed.push_back(dictionary_.bytesList.row(id));
@@ -176,21 +178,21 @@ public:
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        const arhost::aruco::Found found = detector_->detect(grey);
-        std::vector<Sighting> sightings;
+        const arhost::aruco::DetectedMarkers found = detector_->detect(grey);
+        std::vector<Detection> detections;
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
-            Sighting sighting{static_cast<std::size_t>(found.ids[i]), {}};
+            Detection detection{static_cast<std::size_t>(found.ids[i]), {}};
             for (int corner = 0; corner < 4; ++corner) {
-                const cv::Point2d px = found.corners[i][half_turned_ ? (corner + 2) % 4 : corner];
-                sighting.corners_px[corner] = px - cv::Point2d(centre_shift_px_, centre_shift_px_);
+                const cv::Point2d px = found.corners[i][rotated_180_ ? (corner + 2) % 4 : corner];
+                detection.corners_px[corner] = px - cv::Point2d(centre_shift_px_, centre_shift_px_);
             }
             const auto corners = refine_edges_
-                                     ? arhost::planar::refine_edges(grey, sighting.corners_px, report_->lens())
-                                     : sighting.corners_px;
+                                     ? arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens())
+                                     : detection.corners_px;
             if (corners)
-                sightings.push_back({sighting.listed, *corners});
+                detections.push_back({detection.listed, *corners});
         }
-        report_->write(sightings, result);
+        report_->write(detections, result);
     }
 
     void stop() { detector_.reset(); }
@@ -198,9 +200,9 @@ public:
 private:
     cv::aruco::Dictionary dictionary_;
     std::string family_;
-    bool half_turned_ = false, refine_edges_ = false;
+    bool rotated_180_ = false, refine_edges_ = false;
     cv::aruco::DetectorParameters parameters_;
-    double centre_shift_px_ = 0; // CORNER_REFINE_APRILTAG has pixel centres at +0.5
+    double centre_shift_px_ = 0; // CORNER_REFINE_APRILTAG places pixel centres at +0.5
 
     std::optional<MarkerReport> report_;
     std::optional<arhost::aruco::Detector> detector_;

@@ -10,13 +10,13 @@
 namespace {
 
 using namespace arhost::test;
-using arhost::planar::Corners;
-using arhost::planar::refine_edges;
+using arhost::fiducial::Corners;
+using arhost::fiducial::refine_edges;
 
 const arhost_intrinsics camera = intrinsics_of({320, 240}, 300, 300, 159.5, 119.5);
-const arhost::planar::Lens lens(camera);
+const arhost::fiducial::Lens lens(camera);
 
-// Corners of a picture of one tag before and after refinement, against where projection has them.
+// Corner errors of one tag before and after refinement, against the projected corners.
 struct Errors {
     double before_px = 0, after_px = 0;
     cv::Point2d bias_px;
@@ -48,17 +48,17 @@ Errors errors(bool inverted) {
     return {sum.before_px / count, sum.after_px / count, sum.bias_px / count};
 }
 
-TEST(EdgeRefinement, PutsRoughCornersWhereProjectionHasThem) {
+TEST(EdgeRefinement, MovesRoughCornersToTheProjectedOnes) {
     for (const bool inverted : {false, true}) {
         const Errors e = errors(inverted);
         EXPECT_GT(e.before_px, 0.7);
         EXPECT_LT(e.after_px, 0.05);
-        // Pixel centres at integers: half a pixel off would show here.
+        // Would show an offset of half a pixel: pixel centres are at integers.
         EXPECT_LT(cv::norm(e.bias_px), 0.02);
     }
 }
 
-TEST(EdgeRefinement, FindsACornerThatIsHidden) {
+TEST(EdgeRefinement, FindsAHiddenCorner) {
     const Mt mt = pose_of(5, -3, 300, 20, 15, 25);
     const auto truth = corners_of(mt, camera, 100);
     for (const int grey : {20, 128, 230}) {
@@ -73,9 +73,10 @@ TEST(EdgeRefinement, FindsACornerThatIsHidden) {
     }
 }
 
-TEST(EdgeRefinement, ReportsNoneWhereThereAreNoEdges) {
+TEST(EdgeRefinement, ReturnsNothingWithoutEdges) {
     const Corners corners{{{100, 80}, {160, 80}, {160, 140}, {100, 140}}};
-    for (const cv::Size size : {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // half or all of it outside
+    for (const cv::Size size :
+         {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // square partly or entirely outside
         EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens));
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const cv::Mat plain(240, 320, CV_8U, cv::Scalar(90));

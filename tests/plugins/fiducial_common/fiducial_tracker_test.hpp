@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What every fiducial tracker must do, on tag36h11. A tracker's test includes this and instantiates the
-// suite FiducialTracker with the ways in which it is to be tested.
+// Tests for every fiducial tracker, with tag36h11. A tracker's test includes this and instantiates the suite
+// FiducialTracker with its configurations.
 #pragma once
 
 #include "prints.hpp"
@@ -17,7 +17,7 @@ namespace arhost::test {
 struct TrackerCase {
     const char *name, *plugin;
     Options options;
-    Options on_more_threads; // the same detector on several threads
+    Options multithreaded; // added to `options` for several threads
 };
 
 inline const arhost_intrinsics test_camera = intrinsics_of({480, 360}, 450, 455, 243.2, 176.9);
@@ -83,7 +83,7 @@ TEST_P(FiducialTracker, RecoversTheRenderedPose) {
             bias += cv::Point2d(found.corners_px[k][0], found.corners_px[k][1]) - corners[k];
         }
     }
-    // Pixel centres at integers: half a pixel off would show here.
+    // Would show an offset of half a pixel: pixel centres are at integers.
     EXPECT_LT(cv::norm(bias) / (4.0 * static_cast<double>(poses.size())), 0.03);
 }
 
@@ -104,7 +104,7 @@ TEST_P(FiducialTracker, FacingTagHasXRightYUpAndZTowardsTheViewer) {
     }
 }
 
-TEST_P(FiducialTracker, SeesThroughADistortedLens) {
+TEST_P(FiducialTracker, CorrectsLensDistortion) {
     // The lens moves the corners by up to 10 px and bends the edges by up to a pixel.
     arhost_intrinsics lens = test_camera;
     lens.distortion = ARHOST_DISTORTION_BROWN;
@@ -135,7 +135,7 @@ TEST_P(FiducialTracker, SeesThroughADistortedLens) {
         EXPECT_NEAR(markers[0].mt[i], truth[i], 0.002 * 450);
 }
 
-TEST_P(FiducialTracker, ReportsTheListedMarkersOnlyInTheSetupsOrder) {
+TEST_P(FiducialTracker, ReportsOnlyListedMarkersInTheirListedOrder) {
     const cv::Mat picture = picture_of({{tag(5), 60, pose_of(-100, 60, 500)},
                                         {tag(2), 80, pose_of(100, 60, 500)},
                                         {tag(586), 70, pose_of(0, -60, 500)}});
@@ -152,7 +152,7 @@ TEST_P(FiducialTracker, ReportsTheListedMarkersOnlyInTheSetupsOrder) {
         EXPECT_NEAR(marker.mt[14], -500, 2); // each with its own side
 }
 
-TEST_P(FiducialTracker, GivesOneRecordForAMarkerSeenTwice) {
+TEST_P(FiducialTracker, ReportsAMarkerOnceIfItIsSeenTwice) {
     const cv::Mat picture = picture_of({{tag(5), 80, pose_of(-90, 20, 500)}, {tag(5), 80, pose_of(90, -20, 500)}});
     const auto first = track(picture, {{5, 80}});
     ASSERT_EQ(first.size(), 1u);
@@ -170,7 +170,7 @@ TEST_P(FiducialTracker, RejectsAMirroredPrint) {
     EXPECT_TRUE(track(picture_of({{tag(3).mirrored(), 100, pose_of(0, 0, 400)}}), all).empty());
 }
 
-TEST_P(FiducialTracker, FindsNothingInEmptyPictures) {
+TEST_P(FiducialTracker, FindsNothingInEmptyImages) {
     std::vector<Listed> all;
     for (int id = 0; id < 64; ++id)
         all.push_back({id});
@@ -180,17 +180,17 @@ TEST_P(FiducialTracker, FindsNothingInEmptyPictures) {
             cv::Mat picture(size, CV_8U, cv::Scalar(grey));
             EXPECT_TRUE(track(picture, all).empty()) << size << " grey " << grey;
             add_noise(picture, 60, 4);
-            EXPECT_TRUE(track(picture, all).empty()) << size << " noise about " << grey;
+            EXPECT_TRUE(track(picture, all).empty()) << size << " with noise, grey " << grey;
         }
 }
 
-TEST_P(FiducialTracker, RefusesAnIdThatIsNotInTheFamily) {
+TEST_P(FiducialTracker, RejectsAnIdThatIsNotInTheFamily) {
     EXPECT_EQ(tracker_.start(test_camera, {{0}, {587}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker_.log(), testing::HasSubstr("marker id 587 is not in tag36h11, whose ids are 0 to 586"));
     EXPECT_EQ(tracker_.start(test_camera, {{0}, {586}}), ARHOST_STATUS_OK);
 }
 
-TEST_P(FiducialTracker, GivesNoFalsePoseWhereACornerIsHidden) {
+TEST_P(FiducialTracker, ReportsNoWrongPoseWithAHiddenCorner) {
     const Mt truth = pose_of(10, 5, 450, 25, -20, 30);
     const cv::Mat whole = picture_of({{tag(17), 100, truth}});
     const auto corners = corners_of(truth, test_camera, 100);
@@ -208,7 +208,7 @@ TEST_P(FiducialTracker, GivesNoFalsePoseWhereACornerIsHidden) {
             }
 }
 
-TEST_P(FiducialTracker, GivesTheSameResultOnAnyNumberOfThreads) {
+TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {
     std::vector<Placed> placed;
     std::vector<Listed> listed;
     for (int id = 0; id < 12; ++id) {
@@ -219,22 +219,22 @@ TEST_P(FiducialTracker, GivesTheSameResultOnAnyNumberOfThreads) {
     const cv::Mat picture = picture_of(placed);
     const int threads = cv::getNumThreads();
     cv::setNumThreads(1);
-    const auto alone = track(picture, listed);
+    const auto single = track(picture, listed);
     cv::setNumThreads(2);
     Options options = GetParam().options;
-    options.insert(GetParam().on_more_threads.begin(), GetParam().on_more_threads.end());
-    Tracker wide(GetParam().plugin, options);
-    ASSERT_EQ(wide.start(test_camera, listed), ARHOST_STATUS_OK);
+    options.insert(GetParam().multithreaded.begin(), GetParam().multithreaded.end());
+    Tracker multithreaded(GetParam().plugin, options);
+    ASSERT_EQ(multithreaded.start(test_camera, listed), ARHOST_STATUS_OK);
     for (int repetition = 0; repetition < 5; ++repetition) {
-        const auto together = wide.track(GreyFrame(picture));
-        ASSERT_EQ(together.size(), alone.size());
-        EXPECT_EQ(std::memcmp(together.data(), alone.data(), alone.size() * sizeof(arhost_marker)), 0);
+        const auto several = multithreaded.track(GreyFrame(picture));
+        ASSERT_EQ(several.size(), single.size());
+        EXPECT_EQ(std::memcmp(several.data(), single.data(), single.size() * sizeof(arhost_marker)), 0);
     }
-    EXPECT_EQ(alone.size(), 12u);
+    EXPECT_EQ(single.size(), 12u);
     cv::setNumThreads(threads);
 }
 
-TEST_P(FiducialTracker, LeavesTheFrameAsItWas) {
+TEST_P(FiducialTracker, DoesNotModifyTheFrame) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());
     ASSERT_EQ(tracker_.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);

@@ -10,8 +10,8 @@
 namespace {
 
 using namespace arhost::test;
-using arhost::planar::MarkerReport;
-using arhost::planar::Sighting;
+using arhost::fiducial::Detection;
+using arhost::fiducial::MarkerReport;
 
 const arhost_intrinsics camera = intrinsics_of({640, 480}, 600, 600, 319.5, 239.5);
 
@@ -24,7 +24,7 @@ MarkerReport report_of(const std::vector<Listed> &listed, std::size_t id_count =
     return MarkerReport(setup, "tag16h5", id_count);
 }
 
-std::string refusal(const std::vector<Listed> &listed) {
+std::string rejection(const std::vector<Listed> &listed) {
     try {
         report_of(listed);
     } catch (const arhost::Failure &failure) {
@@ -34,32 +34,32 @@ std::string refusal(const std::vector<Listed> &listed) {
     return "";
 }
 
-std::vector<arhost_marker> write(const MarkerReport &report, const std::vector<Sighting> &sightings) {
+std::vector<arhost_marker> write(const MarkerReport &report, const std::vector<Detection> &detections) {
     auto result = std::make_unique<arhost_tracker_result>();
-    report.write(sightings, *result);
+    report.write(detections, *result);
     return {result->markers, result->markers + result->marker_count};
 }
 
-Sighting seen(std::size_t listed, double x_mm, double quality = 0) {
+Detection detection(std::size_t listed, double x_mm, double quality = 0) {
     return {listed, corners_of(pose_of(x_mm, 0, 600, 20, 10, 5), camera, 100), quality};
 }
 
-TEST(MarkerReport, NamesAnIdThatIsNotInTheDictionaryAndTheValidRange) {
-    EXPECT_EQ(refusal({{0}, {10}}), "marker id 10 is not in tag16h5, whose ids are 0 to 9");
-    EXPECT_EQ(refusal({{-1}}), "marker id -1 is not in tag16h5, whose ids are 0 to 9");
-    EXPECT_EQ(refusal({{0}, {9}}), "");
+TEST(MarkerReport, NamesAnUnknownIdAndTheValidRange) {
+    EXPECT_EQ(rejection({{0}, {10}}), "marker id 10 is not in tag16h5, whose ids are 0 to 9");
+    EXPECT_EQ(rejection({{-1}}), "marker id -1 is not in tag16h5, whose ids are 0 to 9");
+    EXPECT_EQ(rejection({{0}, {9}}), "");
 }
 
-TEST(MarkerReport, RefusesListsThatCannotBeTracked) {
-    EXPECT_EQ(refusal({{3}, {3}}), "marker id 3 is listed twice");
-    EXPECT_THAT(refusal({{3, 0}}), testing::HasSubstr("side_mm"));
-    EXPECT_THAT(refusal({{3, -5}}), testing::HasSubstr("side_mm"));
-    EXPECT_EQ(refusal({}), "0 markers are listed; list 1 to 64");
-    EXPECT_THAT(refusal(std::vector<Listed>(65)), testing::StartsWith("65 markers are listed"));
+TEST(MarkerReport, RejectsInvalidLists) {
+    EXPECT_EQ(rejection({{3}, {3}}), "marker id 3 is listed twice");
+    EXPECT_THAT(rejection({{3, 0}}), testing::HasSubstr("side_mm"));
+    EXPECT_THAT(rejection({{3, -5}}), testing::HasSubstr("side_mm"));
+    EXPECT_EQ(rejection({}), "0 markers are listed; list 1 to 64");
+    EXPECT_THAT(rejection(std::vector<Listed>(65)), testing::StartsWith("65 markers are listed"));
 }
 
-TEST(MarkerReport, RecordsAreWholeAndInTheSetupsOrder) {
-    const auto markers = write(report_of({{7, 100}, {2, 100}, {5, 100}}), {seen(1, 50), seen(0, -50)});
+TEST(MarkerReport, WritesCompleteRecordsInTheListedOrder) {
+    const auto markers = write(report_of({{7, 100}, {2, 100}, {5, 100}}), {detection(1, 50), detection(0, -50)});
     ASSERT_EQ(markers.size(), 2u);
     EXPECT_EQ(markers[0].id, 7);
     EXPECT_EQ(markers[1].id, 2);
@@ -74,11 +74,12 @@ TEST(MarkerReport, RecordsAreWholeAndInTheSetupsOrder) {
     }
 }
 
-TEST(MarkerReport, OfTwoSightingsTheBetterCountsWhateverTheirOrder) {
+TEST(MarkerReport, KeepsTheBetterOfTwoDetectionsInAnyOrder) {
     const MarkerReport report = report_of({{4, 100}});
-    Sighting crooked = seen(0, 80);
-    crooked.corners_px[1].x += 2;
-    for (const auto &[good, bad] : {std::pair{seen(0, -80), crooked}, std::pair{seen(0, -80, 2), seen(0, 80, 1)}})
+    Detection distorted = detection(0, 80);
+    distorted.corners_px[1].x += 2;
+    for (const auto &[good, bad] :
+         {std::pair{detection(0, -80), distorted}, std::pair{detection(0, -80, 2), detection(0, 80, 1)}})
         for (const auto &both : {std::vector{good, bad}, std::vector{bad, good}}) {
             const auto markers = write(report, both);
             ASSERT_EQ(markers.size(), 1u);
@@ -86,17 +87,17 @@ TEST(MarkerReport, OfTwoSightingsTheBetterCountsWhateverTheirOrder) {
         }
 }
 
-TEST(MarkerReport, LeavesOutWhatHasNoPose) {
-    const Sighting flat{0, {{{10, 10}, {20, 20}, {30, 30}, {40, 40}}}, 9};
+TEST(MarkerReport, OmitsDetectionsWithoutAPose) {
+    const Detection flat{0, {{{10, 10}, {20, 20}, {30, 30}, {40, 40}}}, 9};
     EXPECT_TRUE(write(report_of({{4}}), {flat}).empty());
-    EXPECT_EQ(write(report_of({{4}}), {flat, seen(0, 0)}).size(), 1u);
+    EXPECT_EQ(write(report_of({{4}}), {flat, detection(0, 0)}).size(), 1u);
 }
 
-TEST(MarkerReport, CutsALongFamilyName) {
+TEST(MarkerReport, TruncatesALongFamilyName) {
     const arhost_marker_config marker{sizeof marker, 0, 50};
     const arhost_tracker_setup setup{sizeof setup, 1, nullptr, &camera, &marker};
     const MarkerReport report(setup, std::string(40, 'x'), 1);
-    EXPECT_EQ(std::string(write(report, {seen(0, 0)}).at(0).family), std::string(ARHOST_MAX_FAMILY - 1, 'x'));
+    EXPECT_EQ(std::string(write(report, {detection(0, 0)}).at(0).family), std::string(ARHOST_MAX_FAMILY - 1, 'x'));
 }
 
 } // namespace

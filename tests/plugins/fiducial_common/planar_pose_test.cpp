@@ -14,9 +14,9 @@
 namespace {
 
 using namespace arhost::test;
-using arhost::planar::Corners;
-using arhost::planar::Lens;
-using arhost::planar::planar_pose;
+using arhost::fiducial::Corners;
+using arhost::fiducial::Lens;
+using arhost::fiducial::planar_pose;
 using testing::DoubleNear;
 using testing::Pointwise;
 
@@ -86,7 +86,7 @@ TEST(PlanarPose, FacingMarkerHasXRightYUpAndZTowardsTheViewer) {
     EXPECT_THAT(found->best.mt, Pointwise(DoubleNear(1e-3), expected));
 }
 
-TEST(PlanarPose, SquareAboutTheAxisFacesTheCamera) {
+TEST(PlanarPose, SquareCentredOnTheAxisFacesTheCamera) {
     const auto camera = intrinsics_of({320, 256}, 300, 300, 159.5, 127.5);
     const double left = 112, right = 207, top = 80, bottom = 175, distance = 300 * side_mm / 95;
     Corners corners = {{{left, top}, {right, top}, {right, bottom}, {left, bottom}}};
@@ -102,7 +102,7 @@ TEST(PlanarPose, SquareAboutTheAxisFacesTheCamera) {
     }
 }
 
-TEST(PlanarPose, SquareAsideOfTheAxisFacesTheCamera) {
+TEST(PlanarPose, OffAxisSquareFacesTheCamera) {
     const auto camera = intrinsics_of({320, 256}, 300, 300, 159.5, 127.5);
     for (int left = 52; left <= 172; ++left) {
         const double top = 80, side = 95, scale = side_mm / side;
@@ -115,7 +115,7 @@ TEST(PlanarPose, SquareAsideOfTheAxisFacesTheCamera) {
     }
 }
 
-TEST(PlanarPose, ReprojectionErrorIsTheRmsOverTheCornersInDistortedPixels) {
+TEST(PlanarPose, ReprojectionErrorIsTheRmsInDistortedPixels) {
     const auto &camera = lenses[5].camera;
     const Lens lens(camera);
     auto corners = corners_of(pose_of(180, 90, 500, 30, 20, 5), camera, side_mm);
@@ -133,7 +133,7 @@ TEST(PlanarPose, ReprojectionErrorIsTheRmsOverTheCornersInDistortedPixels) {
     EXPECT_NEAR(found->ambiguity, found->best.reprojection_px / found->alternative->reprojection_px, 1e-12);
 }
 
-TEST(PlanarPose, FarMarkerIsAmbiguousAndItsAlternativeIsTiltedTheOtherWay) {
+TEST(PlanarPose, FarMarkerIsAmbiguousWithAnAlternativeTiltedTheOtherWay) {
     const auto camera = intrinsics_of({640, 480}, 600, 600, 319.5, 239.5);
     auto corners = corners_of(pose_of(0, 0, 4000, 30), camera, side_mm);
     corners[0] += cv::Point2d(0.1, -0.05);
@@ -148,31 +148,31 @@ TEST(PlanarPose, FarMarkerIsAmbiguousAndItsAlternativeIsTiltedTheOtherWay) {
     EXPECT_LT(planar_pose(near_corners, Lens(camera), side_mm)->ambiguity, 0.05);
 }
 
-TEST(PlanarPose, ReportsNoneForDegenerateCorners) {
+TEST(PlanarPose, ReturnsNothingForDegenerateCorners) {
     const Lens lens(intrinsics_of({640, 480}, 600, 600, 319.5, 239.5));
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
     const Corners degenerate[] = {
         {{{10, 10}, {20, 20}, {30, 30}, {40, 40}}},       // collinear
         {{{10, 10}, {50, 10}, {30, 10}, {10, 50}}},       // three of them collinear
         {{{10, 10}, {10, 10}, {10, 10}, {10, 10}}},       // one point
-        {{{10, 10}, {50, 50}, {50, 10}, {10, 50}}},       // crossed
+        {{{10, 10}, {50, 50}, {50, 10}, {10, 50}}},       // self-intersecting
         {{{10, 10}, {50, 10}, {20, 20}, {10, 50}}},       // not convex
         {{{nan, 10}, {50, 10}, {50, 50}, {10, 50}}},      //
         {{{10, 10}, {50, infinite}, {50, 50}, {10, 50}}}, //
-        {{{50, 10}, {10, 10}, {10, 50}, {50, 50}}},       // mirrored: its back
+        {{{50, 10}, {10, 10}, {10, 50}, {50, 50}}},       // mirrored: the back face
     };
     for (const Corners &corners : degenerate)
         EXPECT_FALSE(planar_pose(corners, lens, side_mm));
 }
 
-TEST(PlanarPose, ReportsNoneWhereTheDistortionModelCannotBeInverted) {
-    // r·(1 − 0.5 r²) is largest, 0.544, at r = 0.816: no ray meets a pixel further out.
+TEST(PlanarPose, ReturnsNothingWhereTheDistortionCannotBeInverted) {
+    // r·(1 − 0.5 r²) has its maximum 0.544 at r = 0.816: no ray reaches a pixel further out.
     const auto camera = intrinsics_of({640, 480}, 300, 300, 319.5, 239.5, ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0});
     EXPECT_TRUE(planar_pose({{{300, 220}, {340, 220}, {340, 260}, {300, 260}}}, Lens(camera), side_mm));
     EXPECT_FALSE(planar_pose({{{580, 220}, {620, 220}, {620, 260}, {580, 260}}}, Lens(camera), side_mm));
 }
 
-TEST(PlanarPose, AnyQuadrilateralGivesASoundPoseOrNone) {
+TEST(PlanarPose, AnyQuadrilateralGivesAValidPoseOrNone) {
     const auto camera = intrinsics_of({640, 480}, 600, 600, 319.5, 239.5);
     const Lens lens(camera);
     std::mt19937 generator(7);
@@ -189,9 +189,9 @@ TEST(PlanarPose, AnyQuadrilateralGivesASoundPoseOrNone) {
         EXPECT_TRUE(found->ambiguity >= 0 && found->ambiguity <= 1);
         for (const auto &pose : {found->best, found->alternative.value_or(found->best)}) {
             expect_orthonormal(pose.mt);
-            EXPECT_LT(pose.mt[14], 0); // before the camera
+            EXPECT_LT(pose.mt[14], 0); // in front of the camera
             const double facing = pose.mt[8] * pose.mt[12] + pose.mt[9] * pose.mt[13] + pose.mt[10] * pose.mt[14];
-            EXPECT_LT(facing, 0); // and seen from its front
+            EXPECT_LT(facing, 0); // and its front faces the camera
             EXPECT_LE(found->best.reprojection_px, pose.reprojection_px);
         }
         const auto again = planar_pose(corners, lens, side_mm);
@@ -200,7 +200,7 @@ TEST(PlanarPose, AnyQuadrilateralGivesASoundPoseOrNone) {
     EXPECT_GT(poses, 200);
 }
 
-TEST(Lens, RefusesACalibrationThatThereIsNot) {
+TEST(Lens, RejectsAnInvalidCalibration) {
     auto three_coefficients = camera_of(ARHOST_DISTORTION_BROWN, {0.1, 0.1, 0.1});
     auto fisheye_of_five = camera_of(ARHOST_DISTORTION_FISHEYE, {0, 0, 0, 0, 0});
     auto unknown_model = camera_of(99, {});

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Markers as their own libraries draw them.
+// Markers as drawn by AprilTag's and OpenCV's libraries.
 #pragma once
 
 #include "rendered_marker.hpp"
 
+#include <fiducial_common/aruco_dictionaries.hpp>
 #include <tracker_apriltag/families.hpp>
-#include <tracker_aruco/dictionaries.hpp>
 
 #include <string_view>
 
@@ -16,7 +16,7 @@ inline const apriltag::FamilyType &family_type(std::string_view name) {
     for (const auto &type : apriltag::family_types)
         if (type.name == name)
             return type;
-    throw std::runtime_error("no such family");
+    throw std::runtime_error("unknown family");
 }
 
 inline Print april_tag(std::string_view family_name, int id) {
@@ -39,7 +39,7 @@ inline Print aruco_marker(std::string_view dictionary, int id, int border_bits =
             aruco::draw(table, id, cells, drawn, border_bits);
             return Print{drawn, cells}.with_margin(1);
         }
-    throw std::runtime_error("no such dictionary");
+    throw std::runtime_error("unknown dictionary");
 }
 
 } // namespace arhost::test

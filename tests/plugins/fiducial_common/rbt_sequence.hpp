@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How exact a tracker is on a real sequence with known poses (../shared/data/markers/rbt_sequence).
+// A tracker's accuracy on a real sequence with known poses (../shared/data/markers/rbt_sequence).
 #pragma once
 
 #include "tracker_support.hpp"
@@ -16,10 +16,10 @@
 
 namespace arhost::test {
 
-inline double percentile(std::vector<double> values, double share) {
+inline double percentile(std::vector<double> values, double fraction) {
     if (values.empty())
         throw std::runtime_error("no values");
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), nth, values.end());
     return *nth;
 }
@@ -30,7 +30,7 @@ inline double mean(const std::vector<double> &values) {
 
 class RbtSequence {
 public:
-    using Frames = std::vector<std::map<int, arhost_marker>>; // a tracker's answer, by frame and id
+    using Frames = std::vector<std::map<int, arhost_marker>>; // a tracker's results, by frame and id
 
     RbtSequence() {
         const auto folder = shared_data("markers/rbt_sequence");
@@ -46,7 +46,7 @@ public:
         ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
     }
 
-    // Milliseconds of each frame go to `ms`.
+    // `ms` receives the time of each frame in milliseconds.
     Frames run(Tracker &tracker, std::vector<double> *ms = nullptr) const {
         std::vector<Listed> listed;
         for (int id : ids_)
@@ -71,10 +71,10 @@ public:
     }
 
     struct Accuracy {
-        int listed = 0, found = 0;     // detections of the reference, and those that the tracker has too
-        std::vector<double> corner_px; // distance of each corner from the reference's
+        int listed = 0, found = 0;     // detections in the reference, and those found by the tracker
+        std::vector<double> corner_px; // distance of each corner from the reference
         std::vector<double> distance;  // relative error of each tag's distance
-        double found_share() const { return static_cast<double>(found) / listed; }
+        double found_fraction() const { return static_cast<double>(found) / listed; }
     };
     Accuracy accuracy(const Frames &frames) const {
         Accuracy result;
@@ -86,7 +86,7 @@ public:
                 if (marker == frames[k].end())
                     continue;
                 ++result.found;
-                // Rows and columns with pixel centres at +0.5, from the bottom left against the clock.
+                // Row and column, pixel centres at +0.5, counter-clockwise from the bottom left.
                 for (int corner = 0; corner < 4; ++corner) {
                     const auto &at = reference["tag_corners"][3 - corner];
                     result.corner_px.push_back(corner_distance_px(
@@ -99,7 +99,7 @@ public:
         return result;
     }
 
-    // Distances in px between corners that both trackers have found.
+    // Distances in px between the corners that both trackers found.
     static std::vector<double> disagreement_px(const Frames &a, const Frames &b) {
         std::vector<double> distances;
         for (std::size_t k = 0; k < a.size(); ++k)
@@ -115,7 +115,7 @@ public:
 private:
     static constexpr double side_mm = 95.5;
 
-    // The layout of ../shared/data/README.md.
+    // The board layout is described in ../shared/data/README.md.
     static double distance_mm(const nlohmann::json &camera_from_board, int id) {
         const double x = 47.75 + 120.0 * (id / 4), y = 47.75 + 120.0 * (id % 4);
         std::array<double, 3> centre;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Photos of ../shared/data/markers with known tags of the family tag36h11.
+// Photos from ../shared/data/markers with known tag36h11 tags.
 #pragma once
 
 #include "tracker_support.hpp"
@@ -32,14 +32,14 @@ inline std::vector<Listed> ids_to(int count) {
     return listed;
 }
 
-// Where the diagonals cross: the centre of the print.
+// The intersection of the diagonals: the centre of the print.
 inline cv::Point2d centre_px(const arhost_marker &marker) {
     const auto corner = [&](int i) { return cv::Point2d(marker.corners_px[i][0], marker.corners_px[i][1]); };
     const cv::Point2d a = corner(2) - corner(0), b = corner(3) - corner(1);
     return corner(0) + (corner(1) - corner(0)).cross(b) / a.cross(b) * a;
 }
 
-// Twelve tags of 53 mm (apriltag_photo): their corners within ViSP's own tolerance of 0.5 px, and their poses.
+// Twelve tags of 53 mm (apriltag_photo): their poses, and their corners within ViSP's tolerance of 0.5 px.
 inline void expect_april_tag_photo(Tracker &tracker) {
     const auto folder = shared_data("markers/apriltag_photo");
     const auto photo = read_grey(folder / "AprilTag.png");
@@ -56,29 +56,29 @@ inline void expect_april_tag_photo(Tracker &tracker) {
         std::string title;
         std::getline(corners >> std::ws, title);
         ASSERT_EQ(title, "36h11_id:_" + std::to_string(marker.id));
-        for (int k = 3; k >= 0; --k) { // from the bottom left against the clock; centres at +0.5
+        for (int k = 3; k >= 0; --k) { // counter-clockwise from the bottom left; pixel centres at +0.5
             double row = 0, column = 0;
             corners >> row >> column;
             EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}), 0.5);
         }
         std::getline(poses >> std::ws, title);
-        double t[3], u[3]; // metres, and angle times axis, in OpenCV's camera axes
+        double t[3], u[3]; // translation in metres, rotation vector; OpenCV's camera axes
         poses >> t[0] >> t[1] >> t[2] >> u[0] >> u[1] >> u[2];
         const double sign[3] = {1, -1, -1};
-        cv::Matx33d truth, ours;
+        cv::Matx33d truth, measured;
         cv::Rodrigues(cv::Vec3d(u), truth);
         for (int row = 0; row < 3; ++row) {
             EXPECT_NEAR(sign[row] * marker.mt[12 + row], 1000 * t[row], 5);
             for (int column = 0; column < 3; ++column)
-                ours(row, column) = sign[row] * marker.mt[4 * column + row];
+                measured(row, column) = sign[row] * marker.mt[4 * column + row];
         }
         cv::Vec3d difference;
-        cv::Rodrigues(truth.t() * ours, difference);
+        cv::Rodrigues(truth.t() * measured, difference);
         EXPECT_LT(cv::norm(difference), 0.03); // rad
     }
 }
 
-// A clipboard of 30 tags, 320×240, in which a tag is about 25 px, and five views of a hallway.
+// A clipboard with 30 tags of about 25 px, 320×240, and five views of a hallway.
 inline void expect_swatbotics_photos(Tracker &tracker) {
     const auto folder = shared_data("markers/swatbotics");
     for (const char *name : {"clipboard02.png", "clipboard04.png", "clipboard05.png", "clipboard06.png"})
@@ -92,7 +92,7 @@ inline void expect_swatbotics_photos(Tracker &tracker) {
     }
 }
 
-// The centres of AprilTags.jl, which has pixel centres at +0.5.
+// Tag centres from AprilTags.jl, with pixel centres at +0.5.
 inline void expect_julia_photo(Tracker &tracker) {
     std::vector<cv::Point2d> expected{{176.1, 404.5}, {216.1, 134.0}, {130.1, 412.0}};
     const auto found = markers_in(tracker, shared_data("markers/julia/tagtest.jpg"), ids_to(30));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Pictures of printed markers at exactly known poses: each pixel is the mean of rays through it, so that
-// nothing is resampled and edges lie where projection puts them.
+// Renders printed markers at known poses. Each pixel is the mean of several rays, without resampling, so that edges
+// lie exactly at their projection.
 #pragma once
 
 #include "tracker_support.hpp"
@@ -18,9 +18,9 @@ namespace arhost::test {
 // A square sheet of cells, 255 white and 0 black, the first row at its top.
 struct Print {
     cv::Mat_<uint8_t> cells;
-    int corner_cells; // side, in cells, of the centred square that the corners bound
+    int corner_cells; // side of the centred square between the corners, in cells
 
-    // With a quiet zone of `cells_wide` around it.
+    // With a quiet zone `cells_wide` wide.
     Print with_margin(int cells_wide) const {
         Print wider{{}, corner_cells};
         cv::copyMakeBorder(cells, wider.cells, cells_wide, cells_wide, cells_wide, cells_wide, cv::BORDER_CONSTANT,
@@ -37,18 +37,18 @@ struct Print {
 // A marker's pose as arhost_marker.mt has it: GL eye space, column-major, mm.
 using Mt = std::array<double, 16>;
 
-// Turned about x, then y, then z of the camera (degrees), its centre at (x, y, −distance). All 0: it faces
-// the camera upright.
+// Centre at (x, y, −distance), rotated about the camera's x, then y, then z axis (degrees). All 0: upright, facing
+// the camera.
 inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x = 0, double about_y = 0,
                   double about_z = 0) {
-    const auto turn = [](int axis, double degrees) {
+    const auto rotation_about = [](int axis, double degrees) {
         cv::Vec3d rotation{};
         rotation[axis] = degrees * std::numbers::pi / 180;
         cv::Matx33d r;
         cv::Rodrigues(rotation, r);
         return r;
     };
-    const cv::Matx33d r = turn(2, about_z) * turn(1, about_y) * turn(0, about_x);
+    const cv::Matx33d r = rotation_about(2, about_z) * rotation_about(1, about_y) * rotation_about(0, about_x);
     Mt mt{};
     for (int column = 0; column < 3; ++column)
         for (int row = 0; row < 3; ++row)
@@ -60,7 +60,7 @@ inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x =
     return mt;
 }
 
-// The pixel of a marker's point (x right, y up, mm), by arhost/camera.h.
+// The pixel of a point on the marker (x right, y up, mm), as defined in arhost/camera.h.
 inline cv::Point2d pixel_of(const Mt &mt, const arhost_intrinsics &camera, double x_mm, double y_mm) {
     const auto eye = [&](int row) { return mt[row] * x_mm + mt[4 + row] * y_mm + mt[12 + row]; };
     const double x = eye(0) / -eye(2), y = -eye(1) / -eye(2);
@@ -94,8 +94,8 @@ struct Placed {
     Mt mt;
 };
 
-// Paper white 220, ink 30, and a grey 140 where there is no print. Undistorted cameras only.
-inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed> &markers, int rays_a_side = 6) {
+// Paper is 220, ink 30, and the background 140. Undistorted cameras only.
+inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed> &markers, int rays_per_side = 6) {
     std::vector<cv::Matx33d> marker_from_pixel;
     for (const Placed &placed : markers) {
         const Mt &m = placed.mt;
@@ -103,7 +103,7 @@ inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed>
         const cv::Matx33d pixel_from_eye(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
         marker_from_pixel.push_back((pixel_from_eye * eye_from_marker).inv());
     }
-    const auto seen = [&](double u, double v) {
+    const auto grey_at = [&](double u, double v) {
         for (std::size_t i = 0; i < markers.size(); ++i) {
             const Print &print = markers[i].print;
             const cv::Vec3d at = marker_from_pixel[i] * cv::Vec3d(u, v, 1);
@@ -118,19 +118,19 @@ inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed>
         return 140;
     };
     cv::Mat_<uint8_t> picture(static_cast<int>(camera.height), static_cast<int>(camera.width));
-    const double n = rays_a_side;
+    const double n = rays_per_side;
     for (int y = 0; y < picture.rows; ++y)
         for (int x = 0; x < picture.cols; ++x) {
             int sum = 0;
-            for (int j = 0; j < rays_a_side; ++j)
-                for (int i = 0; i < rays_a_side; ++i)
-                    sum += seen(x + (i + 0.5) / n - 0.5, y + (j + 0.5) / n - 0.5);
+            for (int j = 0; j < rays_per_side; ++j)
+                for (int i = 0; i < rays_per_side; ++i)
+                    sum += grey_at(x + (i + 0.5) / n - 0.5, y + (j + 0.5) / n - 0.5);
             picture(y, x) = static_cast<uint8_t>(std::lround(sum / (n * n)));
         }
     return picture;
 }
 
-// Noise of a camera, the same for the same seed.
+// Normally distributed noise, reproducible by its seed.
 inline void add_noise(cv::Mat &picture, double sigma, uint64_t seed) {
     cv::Mat noise(picture.size(), CV_16S);
     cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0, sigma);

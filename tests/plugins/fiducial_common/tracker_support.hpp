@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the tests and benchmarks of trackers share: frames, cameras, and the loaded plugin.
+// Frames, cameras and the loaded plugin for tests and benchmarks of trackers.
 #pragma once
 
 #include <plugin_under_test.hpp>
@@ -33,7 +33,7 @@ inline arhost_intrinsics intrinsics_of(cv::Size size, double fx, double fy, doub
     return camera;
 }
 
-// An undistorted camera, for pictures whose corners alone are looked at.
+// An undistorted camera, for tests that check only corners.
 inline arhost_intrinsics plain_camera(cv::Size size) {
     return intrinsics_of(size, size.width, size.width, (size.width - 1) / 2.0, (size.height - 1) / 2.0);
 }
@@ -41,11 +41,11 @@ inline arhost_intrinsics plain_camera(cv::Size size) {
 inline cv::Mat read_grey(const std::filesystem::path &file) {
     cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
     if (grey.empty())
-        throw std::runtime_error("can't read " + file.string());
+        throw std::runtime_error("cannot read " + file.string());
     return grey;
 }
 
-// A picture as a tracker gets it: rows padded, and what lies past their pixels is noise.
+// A frame as a tracker receives it, with padded rows.
 class GreyFrame {
 public:
     explicit GreyFrame(const cv::Mat &picture) : format_(layout(picture.size())), slot_(format_.byte_size) {
@@ -71,7 +71,7 @@ private:
         format.width = static_cast<uint32_t>(size.width);
         format.height = static_cast<uint32_t>(size.height);
         if (!arhost_frame_layout(&format))
-            throw std::runtime_error("no such frame");
+            throw std::runtime_error("invalid frame size");
         return format;
     }
     arhost_frame_format format_;
@@ -85,7 +85,7 @@ struct Listed {
 
 using Options = std::map<std::string, std::string>;
 
-// A tracker from create to destroy.
+// A tracker plugin instance, from create to destroy.
 class Tracker {
 public:
     explicit Tracker(const std::string &plugin, const Options &options = {}) : plugin_(plugin) {

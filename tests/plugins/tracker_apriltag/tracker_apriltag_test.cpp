@@ -24,7 +24,7 @@ INSTANTIATE_TEST_SUITE_P(Families, AprilTagFamily,
                                          "tagCircle49h12", "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"),
                          [](const auto &info) { return info.param; });
 
-TEST_P(AprilTagFamily, TagIsFoundUprightWithTheSquareThatItsCornersBound) {
+TEST_P(AprilTagFamily, FindsTheTagUprightWithTheSideBetweenItsCorners) {
     Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 160)}) {
         ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {20, 80}}), ARHOST_STATUS_OK) << tracker.log();
@@ -40,16 +40,16 @@ TEST_P(AprilTagFamily, TagIsFoundUprightWithTheSquareThatItsCornersBound) {
     }
 }
 
-TEST_P(AprilTagFamily, NamesTheValidRangeOfIds) {
+TEST_P(AprilTagFamily, NamesTheValidIdRange) {
     Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
     EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 100000 is not in " + GetParam() + ", whose ids are 0"));
 }
 
-TEST(AprilTagTracker, RefusesADecimationThatTheLibraryGetsWrong) {
+TEST(AprilTagTracker, RejectsADecimationThatTheLibraryMishandles) {
     Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate must be 1, 1.5 or a whole number"));
+    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate must be 1, 1.5 or an integer"));
 }
 
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
@@ -61,7 +61,7 @@ TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
     }
 }
 
-TEST(AprilTagTracker, CorrectsAsManyWrongBitsAsConfigured) {
+TEST(AprilTagTracker, CorrectsTheConfiguredNumberOfWrongBits) {
     Print damaged = april_tag("tag36h11", 3);
     damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
     damaged.cells(5, 6) = 255 - damaged.cells(5, 6);
@@ -73,7 +73,7 @@ TEST(AprilTagTracker, CorrectsAsManyWrongBitsAsConfigured) {
     }
 }
 
-TEST(AprilTagTracker, TheLibrarysOwnCornersHaveTheSameCentres) {
+TEST(AprilTagTracker, LibraryCornersUseTheSamePixelCentres) {
     Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}});
     ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
     cv::Point2d bias;

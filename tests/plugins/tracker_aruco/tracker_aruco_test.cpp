@@ -12,7 +12,7 @@ using testing::HasSubstr;
 const std::vector<TrackerCase> cases{{"Defaults", "tracker_aruco", {}, {}}};
 INSTANTIATE_TEST_SUITE_P(Aruco, FiducialTracker, testing::ValuesIn(cases), case_name);
 
-// Whether `name`'s print is one of AprilTag's, and its family there.
+// AprilTag's name of the family; empty for other dictionaries.
 std::string april_tag_family(const std::string &dictionary) {
     const std::string prefix = "DICT_APRILTAG_";
     return dictionary.starts_with(prefix) ? "tag" + dictionary.substr(prefix.size()) : "";
@@ -29,11 +29,11 @@ class ArucoDictionary : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictionary_names()),
                          [](const auto &info) { return info.param; });
 
-TEST_P(ArucoDictionary, MarkerIsFoundUpright) {
+TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
     Tracker tracker("tracker_aruco", {{"dictionary", dictionary}});
     ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_STATUS_OK) << tracker.log();
-    // AprilTags as AprilTag's own library draws them, the others as OpenCV does.
+    // AprilTags are drawn by AprilTag's library, the others by OpenCV.
     const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
         const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Refinements, ArucoRefinement,
                                          Refinement{"apriltag", 0.2, 0.12}),
                          [](const auto &info) { return std::string(info.param.name); });
 
-TEST_P(ArucoRefinement, HasPixelCentresAtIntegers) {
+TEST_P(ArucoRefinement, PlacesPixelCentresAtIntegers) {
     Tracker tracker("tracker_aruco", {{"corner_refinement", GetParam().name}});
     ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
     cv::Point2d bias;
@@ -102,37 +102,37 @@ TEST(ArucoTracker, ReadsADictionaryFile) {
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 2 is not in mine, whose ids are 0 to 1"));
 }
 
-TEST(ArucoTracker, RefusesAFileThatIsNoDictionary) {
+TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
     const ScratchFolder scratch;
-    const auto refused = [&](const std::string &text) {
+    const auto expect_rejected = [&](const std::string &text) {
         const auto file = scratch.path() / "bad.yml";
         std::ofstream(file) << text;
         Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
         EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << text;
-        EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: " + file.string() + " is no dictionary")) << text;
+        EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: " + file.string() + " is not a dictionary")) << text;
     };
-    refused("");
-    refused("not yaml at all {");
-    refused("%YAML:1.0\nnmarkers: 2\n");
-    refused("%YAML:1.0\nnmarkers: 0\nmarkersize: 4\n");
-    refused("%YAML:1.0\nnmarkers: 2\nmarkersize: 4\nmarker_0: \"1011010011100010\"\n");
-    refused("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101\"\n");
-    refused("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101101001110001x\"\n");
-    refused("%YAML:1.0\nnmarkers: -1\nmarkersize: -4\nmarker_0: \"1\"\n");
-    refused("%YAML:1.0\nnmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n");
+    expect_rejected("");
+    expect_rejected("not yaml at all {");
+    expect_rejected("%YAML:1.0\nnmarkers: 2\n");
+    expect_rejected("%YAML:1.0\nnmarkers: 0\nmarkersize: 4\n");
+    expect_rejected("%YAML:1.0\nnmarkers: 2\nmarkersize: 4\nmarker_0: \"1011010011100010\"\n");
+    expect_rejected("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101\"\n");
+    expect_rejected("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101101001110001x\"\n");
+    expect_rejected("%YAML:1.0\nnmarkers: -1\nmarkersize: -4\nmarker_0: \"1\"\n");
+    expect_rejected("%YAML:1.0\nnmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n");
 
     Tracker absent("tracker_aruco", {{"dictionary_file", (scratch.path() / "absent.yml").string()}});
     EXPECT_EQ(absent.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(absent.log(), HasSubstr("absent.yml is no dictionary: it can't be read"));
+    EXPECT_THAT(absent.log(), HasSubstr("absent.yml is not a dictionary: cannot read the file"));
 }
 
-TEST(ArucoTracker, RefusesThresholdWindowsThatContradict) {
+TEST(ArucoTracker, RejectsContradictoryThresholdWindows) {
     Tracker tracker("tracker_aruco", {{"threshold_window_min_px", "31"}, {"threshold_window_max_px", "23"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("threshold_window_max_px must not be less than threshold_window_min_px"));
 }
 
-TEST(ArucoTracker, FindsInvertedMarkersWhereAskedTo) {
+TEST(ArucoTracker, FindsInvertedMarkersOnlyIfEnabled) {
     const GreyFrame frame(255 -
                           picture_of({{aruco_marker("DICT_5X5_50", 9).with_margin(2), 80, pose_of(0, 0, 400)}}));
     for (const auto &[inverted, count] : {std::pair{"false", 0u}, std::pair{"true", 1u}}) {
@@ -185,7 +185,7 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     EXPECT_NEAR(markers[0].mt[14], -700, 35); // "d7": 70 cm
 }
 
-// OpenCV's own expectations, which are whole pixels of unrefined corners.
+// OpenCV's reference corners, which are unrefined and in whole pixels.
 void expect_opencv_corners(const std::string &photo, Options dictionary, const std::string &refinement,
                            double tolerance_px) {
     dictionary["corner_refinement"] = refinement;
@@ -217,7 +217,7 @@ TEST(ArucoTracker, FindsTheMarkersOfOpenCvsDocumentation) {
     }
 
     Tracker tracker("tracker_aruco", {{"dictionary_file", file}});
-    std::vector<int> ids; // several of them are seen more than once
+    std::vector<int> ids; // several occur more than once
     for (const auto &[id, marker] :
          markers_in(tracker, shared_data("markers/opencv_doc/diamondmarkers.png"), ids_to(35)))
         ids.push_back(id);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The dictionaries of OpenCV, under the names that the options and the records use.
+// The predefined dictionaries of OpenCV, with the names used in options and tracker results.
 #pragma once
 
 #include "opencv_aruco.hpp"
@@ -12,9 +12,11 @@ namespace arhost::aruco {
 struct DictionaryType {
     const char *option;
     PredefinedDictionary name;
-    const char *family;     // of the records: AprilTag's own name where it has one
-    int april_tag_bits = 0; // AprilTag's families: the wrong bits that their minimum distance can bear,
-                            // which OpenCV leaves at 0
+    const char *family;     // AprilTag's name for its families, else the option's
+    int april_tag_bits = 0; // bits that an AprilTag family can correct; OpenCV's tables have 0
+
+    // OpenCV's AprilTag dictionaries are rotated by 180° relative to AprilTag's own library.
+    constexpr bool is_april_tag() const { return april_tag_bits > 0; }
 };
 
 inline constexpr std::array dictionary_types{

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// OpenCV's ArUco detector under one interface: the contrib module up to 4.6, objdetect from 4.7 on.
+// One interface for OpenCV's ArUco detector: the contrib module up to 4.6, objdetect from 4.7.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -21,7 +21,7 @@ using PredefinedDictionary = cv::aruco::PredefinedDictionaryType;
 using PredefinedDictionary = cv::aruco::PREDEFINED_DICTIONARY_NAME;
 #endif
 
-struct Found {
+struct DetectedMarkers {
     std::vector<int> ids;
     std::vector<std::vector<cv::Point2f>> corners;
 };
@@ -34,7 +34,7 @@ inline cv::aruco::Dictionary predefined(PredefinedDictionary name) {
 #endif
 }
 
-// One pixel a cell where `side_px` is markerSize + 2·border_bits.
+// One pixel per cell if `side_px` is markerSize + 2·border_bits.
 inline void draw(const cv::aruco::Dictionary &dictionary, int id, int side_px, cv::Mat &image, int border_bits) {
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
     dictionary.generateImageMarker(id, side_px, image, border_bits);
@@ -48,8 +48,8 @@ public:
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
     Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
         : detector_(dictionary, parameters) {}
-    Found detect(const cv::Mat &grey) const {
-        Found found;
+    DetectedMarkers detect(const cv::Mat &grey) const {
+        DetectedMarkers found;
         detector_.detectMarkers(grey, found.corners, found.ids);
         return found;
     }
@@ -60,8 +60,8 @@ private:
     Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
         : dictionary_(cv::makePtr<cv::aruco::Dictionary>(dictionary)),
           parameters_(cv::makePtr<cv::aruco::DetectorParameters>(parameters)) {}
-    Found detect(const cv::Mat &grey) const {
-        Found found;
+    DetectedMarkers detect(const cv::Mat &grey) const {
+        DetectedMarkers found;
         cv::aruco::detectMarkers(grey, dictionary_, found.corners, found.ids, parameters_);
         return found;
     }
