@@ -133,7 +133,7 @@ scene::ArenaBuilder ball_over_catcher(const arhost_material &ball) {
 scene::ArenaBuilder still_life(const glm::mat4 &moved) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
-    builder.settings.backgphi = {0.5f, 0.6f, 0.7f};
+    builder.settings.background = {0.5f, 0.6f, 0.7f};
     const auto at = [&](float x, float y, float z) { return glm::mat4x3(glm::translate(moved, glm::vec3(x, y, z))); };
     const std::uint32_t grey = builder.add_material(diffuse(glm::vec3(0.7f)));
     const std::uint32_t red = builder.add_material(diffuse({0.8f, 0.2f, 0.1f}));

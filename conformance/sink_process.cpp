@@ -28,7 +28,7 @@ void work(Context &context) {
     run.start(0, work.size);
     std::deque<SealedOutput> frames; // prepared, so that the next write starts right after a frame's byte
     for (std::uint64_t n = 0; n < work.frames; ++n)
-        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = work.size});
+        frames.emplace_back(SealedOutput::Content{.sequence = n, .size = work.size});
     for (const SealedOutput &frame : frames) {
         run.write(frame);
         if (::write(result_fd, ".", 1) != 1)
