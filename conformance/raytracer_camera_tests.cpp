@@ -188,8 +188,7 @@ void moving_object(Context &context) {
                        builder.add_material(glowing(glm::vec3(0.5f))), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), motion);
     Tracer tracer(context, std::move(builder));
     for (const double mm : {0.0, 15.0, 30.0})
-        for (const glm::dvec3 &to :
-             {glm::dvec3(mm, mm / 2, 0), glm::dvec3(-mm, -mm / 2, 0)}) {
+        for (const glm::dvec3 &to : {glm::dvec3(mm, mm / 2, 0), glm::dvec3(-mm, -mm / 2, 0)}) {
             arhost_moved_object moved{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
             for (int i = 0; i < 3; ++i)
                 moved.world_from_object[9 + i] = static_cast<float>(to[i]);

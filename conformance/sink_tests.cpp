@@ -21,13 +21,14 @@
 namespace arhost::conformance {
 namespace {
 
-// What can only be seen in files needs some.
+// Skips tests of files if there is no output path.
 void require_files(Context &context) {
     const Settings &settings = context.library.settings();
     for (const arhost_option_descriptor *option : options_of(context.library.descriptor())) {
         const auto set = settings.find(option->key);
         const char *const path = set != settings.end() ? set->second.c_str() : option->default_value;
-        if (option->type == ARHOST_OPTION_OUTPUT_PATH && (!path || *path)) // without any, create tells what to set
+        if (option->type == ARHOST_OPTION_OUTPUT_PATH &&
+            (!path || *path)) // with neither, create reports the missing option
             return;
     }
     throw Skip("it has no output path, so its output can't be checked");
@@ -96,7 +97,7 @@ void start_again(Context &context) {
     SinkRun run(context, "a"), fresh(context, "b");
     run.run(3);
     expect_same(run.run(3), fresh.run(3), "in the second run with the same frames");
-    run.start(0, {90, 70}); // whatever becomes of the files: it works
+    run.start(0, {90, 70}); // must succeed; the files are not checked
     run.write(0, 2);
     run.stop();
 }
@@ -165,7 +166,7 @@ void sizes(Context &context) {
 
 void stride(Context &context) {
     const auto run = [&](const char *folder, std::uint32_t padding, std::uint8_t in_padding) {
-        constexpr Size size{50, 20}; // not even as the host has them do rows follow each other
+        constexpr Size size{50, 20}; // the host's stride has padding at this width, too
         SinkRun sink(context, folder);
         sink.start(0, size);
         for (std::uint64_t n = 0; n < 3; ++n)
@@ -245,7 +246,7 @@ void files(Context &context) {
     const Files again = run.run(4);
     try {
         expect_same(again, once, "given the same frames again");
-    } catch (const Failure &difference) { // a date, say
+    } catch (const Failure &difference) { // for example a date
         throw Skip(std::string("its runs can't be compared: ") + difference.what());
     }
 }
@@ -267,9 +268,9 @@ void every_frame(Context &context) {
                             n));
 }
 
-using Number = std::pair<std::size_t, std::string>; // of so many digits: "10" comes behind "9"
+using Number = std::pair<std::size_t, std::string>; // number of digits first, so that "10" sorts after "9"
 
-// Each number in a file's name, under the path without it.
+// The numbers in a file's name, by the path with '#' in place of the number.
 std::map<std::string, Number> numbers_in(const std::string &path) {
     constexpr const char *digits = "0123456789";
     std::map<std::string, Number> numbers;
@@ -281,8 +282,8 @@ std::map<std::string, Number> numbers_in(const std::string &path) {
     return numbers;
 }
 
-// With another frame of one number its files change where that frame is; without knowing more of them, only those
-// tell that are as long whatever is in them, or one for each frame, with names that differ in a number.
+// Replaces one frame at a time and finds where the files change. This works for files of constant size, and for one
+// file per frame with numbered names.
 void order(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 6;
@@ -316,14 +317,14 @@ void order(Context &context) {
         std::uint64_t frame;
         std::string name;
     };
-    std::map<std::string, std::map<Number, File>> families; // files of a frame each
+    std::map<std::string, std::map<Number, File>> families; // files that hold one frame
     for (const auto &[name, of_file] : changes) {
         if (of_file.size() == 1)
             for (const auto &[family, number] : numbers_in(name))
                 families[family][number] = {of_file[0].frame, name};
         for (std::size_t i = 1; i < of_file.size() && !resized.contains(name); ++i) {
             reported =
-                reported || of_file[i].byte > of_file[i - 1].byte; // the same byte may be a checksum's, ahead of all
+                reported || of_file[i].byte > of_file[i - 1].byte; // equal: may be a checksum at the file's start
             if (of_file[i].byte < of_file[i - 1].byte)
                 throw Failure(
                     fmt::format("in '{}', frame {} begins at byte {}, before frame {}, which begins at byte {}", name,
@@ -334,7 +335,7 @@ void order(Context &context) {
         std::set<std::uint64_t> in_files;
         for (const auto &[number, file] : files)
             in_files.insert(file.frame);
-        if (in_files.size() != frames) // what the number counts is not the frames
+        if (in_files.size() != frames) // the number is not the frame's
             continue;
         reported = true;
         const File *before = nullptr;
@@ -365,7 +366,7 @@ void last_frame(Context &context) {
 
 void earlier_files(Context &context) {
     const Files should = history_of(context, 3).end;
-    SinkRun run(context, "uninterrupted"); // there
+    SinkRun run(context, "uninterrupted"); // which has an earlier run's files
     run.start();
     expect_same(run.files(), should, "started anew, and no frame has come");
     run.stop();
@@ -387,7 +388,7 @@ void no_place(Context &context) {
 
 // ---- Kills -----------------------------------------------------------------------------------------
 
-// The shortest of some: the others waited for a disk or a processor.
+// The minimum, which is the least affected by waiting.
 std::chrono::steady_clock::duration time_of_a_write(Context &context, const Size &size) {
     auto shortest = std::chrono::steady_clock::duration::max();
     SinkRun run(context, "timed");
@@ -439,7 +440,7 @@ void restart(Context &context) {
         const auto found = is.find(name);
         if (found == is.end())
             throw Failure(fmt::format("killed, and started again at frame {}: '{}' is missing", first, name));
-        // What is encoded anew is not the same, but has as many frames.
+        // Encoded again, the file differs but has as many frames.
         const double ratio = static_cast<double>(found->second.size()) / static_cast<double>(bytes.size());
         if (constexpr double least = 0.8; ratio < least || ratio > 1 / least)
             throw Failure(fmt::format("killed after {} frames, and started again at frame {}: '{}' has {} bytes, and "
@@ -453,7 +454,7 @@ void restart(Context &context) {
 
 // ---- A full disk -----------------------------------------------------------------------------------
 
-// As on a full disk, no file of this process can grow beyond `bytes`. The error is another.
+// Simulates a full disk: no file of this process can grow beyond `bytes`. The errno differs (EFBIG).
 class FullDisk {
 public:
     explicit FullDisk(std::uint64_t bytes) {
@@ -514,7 +515,7 @@ void slow_disk(Context &context) {
             disk.delay_next_write();
             run.write(n, n + 1);
             Files after = run.files();
-            has_delayed = has_delayed || disk.has_delayed(); // at a frame that it drops there is nothing to hold up
+            has_delayed = has_delayed || disk.has_delayed(); // a dropped frame has no write to delay
             if (!has_delayed)
                 throw Skip("its writes can't be delayed: memory maps, io_uring or another process");
             if (after == before)
@@ -532,7 +533,7 @@ void speed(Context &context) {
     constexpr Size size{640, 480};
     SinkRun run(context, "out");
     run.start(0, size);
-    std::deque<SealedOutput> frames; // made before, since noise takes its time
+    std::deque<SealedOutput> frames; // prepared, because generating noise is slow
     for (std::uint64_t n = 0; n < 8; ++n)
         frames.emplace_back(SealedOutput::Content{.sequence = n, .size = size});
     std::uint64_t next = 0;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char *is_live = "it is live: its frames are not reproducible";
 
-// The two are the same frame: pixels and time.
+// Same pixels and capture time.
 void expect_same(const SourceRun &run, const Frame &is, const Frame &should, const std::string &what) {
     if (is.pixels.size() != should.pixels.size())
         throw Failure(
@@ -52,7 +52,7 @@ bool is_refusal(arhost_status status) {
     return status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION;
 }
 
-// At this rate, or at its own where it refuses that.
+// Starts at this rate, or at the source's own if it rejects it.
 void start_at(SourceRun &run, double fps, bool paced, std::uint64_t first = 0) {
     const arhost_status status = run.try_start({first, fps, paced, nullptr});
     run.accept(is_refusal(status) ? run.try_start({first, 0, paced, nullptr}) : status);
@@ -104,7 +104,7 @@ void leaks(Context &context) {
 // ---- Memory ----------------------------------------------------------------------------------------
 
 void writes_every_pixel(Context &context) {
-    // A byte is as it was before by chance once in 256 times, so in all of these hardly ever.
+    // A byte keeps its value by chance with probability 1/256 per attempt.
     constexpr int attempts = 6;
     SourceRun run(context);
     run.start();
@@ -115,7 +115,7 @@ void writes_every_pixel(Context &context) {
         std::generate_n(slot.data(), slot.size(), [&] { return static_cast<std::uint8_t>(context.random() >> 24); });
         const std::vector<std::uint8_t> before = run.frame().pixels, all(slot.data(), slot.data() + slot.size());
         std::optional<Frame> frame = run.read(true);
-        if (!frame && i > 0) { // it is short: from its start again
+        if (!frame && i > 0) { // a short source: restart
             run.start();
             --i;
             continue;
@@ -163,7 +163,7 @@ void grey(Context &context) {
         planes[i] = run.slot().data() + format.offset[i];
     std::vector<std::uint8_t> should(std::size_t{format.grey_stride} * format.height);
     fill_grey_reference(format, planes, should.data());
-    constexpr int tolerance = 3; // other roundings
+    constexpr int tolerance = 3; // for rounding
     for (std::uint32_t y = 0; y < format.height; ++y)
         for (std::uint32_t x = 0; x < format.width; ++x) {
             const std::size_t at = std::size_t{format.grey_stride} * y + x;
@@ -190,7 +190,7 @@ void times(Context &context) {
         if (i > 0 && info.capture_ns < frames[i - 1].info.capture_ns)
             throw Failure(fmt::format("frame {} has a capture time of {} ns, less than the previous frame's {} ns", i,
                                       info.capture_ns, frames[i - 1].info.capture_ns));
-        // A camera's exposure may have been long ago where frames wait in buffers.
+        // Buffered frames may have been exposed long ago.
         constexpr std::int64_t buffered_ns = 10'000'000'000;
         if (info.clock == ARHOST_CLOCK_MONOTONIC &&
             (info.capture_ns < begin_ns - buffered_ns || info.capture_ns > end_ns))
@@ -201,12 +201,12 @@ void times(Context &context) {
     }
     if (frames.size() < 2 || run.is_live() || run.format().fps == 0)
         return;
-    double periods = 0; // those of skipped frames too
+    double periods = 0; // including skipped frames
     for (std::size_t i = 1; i < frames.size(); ++i)
         periods += 1.0 + frames[i].info.skipped;
     const double period_ns =
         static_cast<double>(frames.back().info.capture_ns - frames.front().info.capture_ns) / periods;
-    // A film's frames need not be evenly spaced.
+    // A video's frames need not be evenly spaced.
     constexpr double factor = 4;
     if (const double nominal_ns = 1e9 / run.format().fps;
         period_ns > factor * nominal_ns || period_ns < nominal_ns / factor)
@@ -234,7 +234,7 @@ void rate(Context &context) {
         const std::vector<Frame> frames = run.read_up_to(4);
         for (std::size_t i = 1; i < frames.size(); ++i) {
             const double ms = static_cast<double>(frames[i].info.capture_ns - frames[i - 1].info.capture_ns) / 1e6;
-            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of the files' clocks
+            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of file time stamps
                 throw Failure(fmt::format("with {} frames/s requested, frame {} is {:.3f} ms after the previous one",
                                           fps, i, ms));
         }
@@ -258,7 +258,7 @@ void late_reader(Context &context) {
     std::vector<Frame> late = run.read_up_to(count);
     std::move(late.begin(), late.end(), std::back_inserter(frames));
     const std::size_t without_restart = frames.size();
-    if (run.can_seek() && late.size() == count) { // as after a death; not at its end
+    if (run.can_seek() && late.size() == count) { // as after a worker's crash
         start_at(run, fps, true, run.next());
         if (std::optional<Frame> frame = run.read())
             frames.push_back(std::move(*frame));
@@ -395,7 +395,7 @@ void intrinsics(Context &context) {
                                   format.width, format.height));
     if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
         throw Failure(fmt::format("its focal lengths are {} and {} px", camera.fx, camera.fy));
-    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // outside of the frames is fine: they may be a part
+    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // may be outside the frame, as in a crop
         throw Failure(fmt::format("its principal point is ({}, {})", camera.cx, camera.cy));
     const std::uint32_t n = camera.coefficient_count;
     const bool fits = (camera.distortion == ARHOST_DISTORTION_NONE && n == 0) ||
@@ -439,7 +439,7 @@ void truth(Context &context) {
 void speed(Context &context) {
     SourceRun run(context);
     run.start();
-    const std::uint64_t count = run.properties().frame_count; // its end is no frame
+    const std::uint64_t count = run.properties().frame_count; // does not measure the END call
     std::uint64_t next = 0;
     const std::vector<double> ms =
         frame_times_ms([&] { return (count == 0 || next++ < count) && run.try_read() == ARHOST_STATUS_OK; });

@@ -22,7 +22,7 @@ std::vector<Listed> listed(std::span<const Print> prints, double side = side_mm)
     return all;
 }
 
-// What a sensor adds, normally distributed by Box and Muller's method.
+// Adds normally distributed sensor noise (Box–Muller).
 Grey noisy(const Grey &image, double sigma, Context &context) {
     return filled(image.width, image.height, [&](auto x, auto y) {
         const double radius = std::sqrt(-2 * std::log(1 - context.uniform(0, 1)));
@@ -33,7 +33,7 @@ Grey noisy(const Grey &image, double sigma, Context &context) {
 
 // ---- Bad frames ------------------------------------------------------------------------------------
 
-// The first print at several poses, its image made worse by `change`: found, and where it is.
+// Expects the first print at several poses in images degraded by `change`.
 template <class Change> void expect_found_in(Context &context, const std::string &where, Change &&change) {
     const Print print = prints_of(context.prints).front();
     Tracker tracker(context);
@@ -125,7 +125,7 @@ void recall(Context &context) {
 
 // ---- Several markers -------------------------------------------------------------------------------
 
-// Each print in a quarter of the image, with sides of their own.
+// Each print in a quarter of the image, with different sides.
 struct Group {
     explicit Group(Context &context) {
         std::vector<Print> prints = prints_of(context.prints);

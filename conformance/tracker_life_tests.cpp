@@ -22,7 +22,7 @@ Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25,
     return {prints_of(context.prints).front(), side_mm, at};
 }
 
-// A tracker that has been started with that print alone.
+// A tracker started with only that print.
 struct Started {
     explicit Started(Context &context, Settings overrides = {})
         : marker(first_print(context)), tracker(context, std::move(overrides)) {
@@ -34,7 +34,7 @@ struct Started {
     Tracker tracker;
 };
 
-// Where a new instance that has seen nothing else finds it.
+// The pose from a new instance.
 Pose found_by_new(Context &context, const arhost_intrinsics &camera, const Placed &marker, const Grey &image) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, marker.side_mm}});
@@ -241,7 +241,7 @@ void settles(Context &context) {
     const std::string when = fmt::format("standing still for {} frames", still);
     const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
     if (is.state == ARHOST_MARKER_DETECTED)
-        return; // of this frame alone
+        return; // not smoothed: covered by other tests
     expect_pose(is, pose_of(detect_with_new(context, started, image)), roughly, when, image);
 }
 

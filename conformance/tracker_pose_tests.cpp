@@ -169,7 +169,7 @@ void principal_point(Context &context) {
     camera.cy -= 45;
     Studio(context, camera)
         .expect_found(tilted({-40, -20, -250}, 30, 70), {2, 0.01}, "with cx = 229.5 and cy = 82.5");
-    // A part of an image is the image of a camera with that part.
+    // A crop of an image equals the image of a camera for that crop.
     constexpr std::uint32_t x0 = 90, y0 = 60;
     arhost_intrinsics part = wide_camera();
     part.width = 192;
@@ -215,7 +215,7 @@ void fisheye(Context &context) {
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
-// Where these fail, all poses are wrong for the same reason.
+// If these fail, all poses are wrong for the same reason.
 constexpr const char *gate = "tracker.track", *axes_gate = "tracker.axes", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
     {"tracker.axes",
