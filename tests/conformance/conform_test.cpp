@@ -348,7 +348,7 @@ TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
 TEST(Conform, FailsInvalidDescriptors) {
     const std::array<std::array<std::string, 3>, 4> wrong = {
         {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes, and 4096 are the most"},
-         {"many_options", "abi.load", "bytes as JSON, and 130048 are the most: fewer options"},
+         {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
          {"option_without_key", "abi.load", "its option 1 has no key"},
          {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
     for (const auto &[defect, test, why] : wrong) {
