@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What plugins of every kind promise.
+// Requirements on plugins of every kind.
 #include "conformance/process_usage.hpp"
 #include "conformance/test.hpp"
 #include "ipc/json_abi.hpp"
@@ -22,15 +21,15 @@ using ipc::Call;
 
 void load(Context &context) {
     try {
-        const ipc::Json told = ipc::to_json(context.library.descriptor());
-        ipc::description_from_json(told);
-        const std::size_t size = told.dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
+        const ipc::Json described = ipc::to_json(context.library.descriptor());
+        ipc::description_from_json(described);
+        const std::size_t size = described.dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
         if (size > ipc::max_descriptor_size)
-            throw std::runtime_error(fmt::format("its descriptor has {} bytes as JSON, and {} are the most: fewer "
-                                                 "options, or shorter texts",
-                                                 size, ipc::max_descriptor_size));
-        context.facts = told;
-    } catch (const std::exception &error) { // what arhost-worker or the host would say
+            throw std::runtime_error(fmt::format(
+                "its descriptor takes {} bytes as JSON; the limit is {}: declare fewer options, or shorten texts",
+                size, ipc::max_descriptor_size));
+        context.facts = described;
+    } catch (const std::exception &error) { // as arhost-worker or the host would report it
         throw Failure(error.what());
     }
 }
@@ -68,16 +67,16 @@ std::vector<std::string> exported_symbols(const std::filesystem::path &file) {
 }
 
 void exports(Context &context) {
-    // These belong to every shared object of older linkers.
-    const std::set<std::string> customary = {"arhost_entry", "_init", "_fini", "__bss_start", "_edata", "_end"};
+    // Older linkers export these from every shared object.
+    const std::set<std::string> linker_symbols = {"arhost_entry", "_init", "_fini", "__bss_start", "_edata", "_end"};
     for (const std::string &symbol : exported_symbols(context.library.file()))
-        if (!customary.contains(symbol))
-            throw Failure(fmt::format("it exports '{}' besides arhost_entry", symbol));
+        if (!linker_symbols.contains(symbol))
+            throw Failure(fmt::format("it exports '{}'; arhost_entry must be the only export", symbol));
 }
 
 // ---- Negotiation -----------------------------------------------------------------------------------
 
-// An offer and an answer with bytes behind them that no reader may know, and no writer may touch.
+// Offers and answers followed by garbage that the plugin must neither interpret nor overwrite.
 class Exchange {
 public:
     Exchange(Context &context, const arhost_offer &offer, std::uint32_t answer_size) {
@@ -88,7 +87,7 @@ public:
         const arhost_entry_point &entry = context.library.entry();
         status = in_call(context.library.calls(), Call::negotiate,
                          [&] { return entry.negotiate(&memory_.offer, &memory_.answer); });
-        // What lies behind the answer that the plugin was told of.
+        // The bytes beyond the answer's struct_size.
         const auto *bytes = reinterpret_cast<const std::uint8_t *>(&memory_.answer);
         const std::size_t end = sizeof memory_ - offsetof(Memory, answer);
         for (std::size_t i = std::min<std::size_t>(answer_size, sizeof(arhost_answer)); i < end; ++i)
@@ -103,46 +102,46 @@ private:
     static constexpr std::uint8_t garbage = 0xa5;
     struct Memory {
         arhost_offer offer;
-        std::uint8_t behind_offer[64];
+        std::uint8_t after_offer[64];
         arhost_answer answer;
-        std::uint8_t behind_answer[64];
+        std::uint8_t after_answer[64];
     } memory_;
 };
 
 void negotiation(Context &context) {
-    constexpr std::uint32_t spoken = ARHOST_ABI_VERSION, longer = 32;
+    constexpr std::uint32_t version = ARHOST_ABI_VERSION, longer = 32;
     constexpr auto offer_size = static_cast<std::uint32_t>(sizeof(arhost_offer)),
                    answer_size = static_cast<std::uint32_t>(sizeof(arhost_answer));
     const auto expect_accepted = [&](const Exchange &exchange, const char *offer) {
-        if (exchange.status != ARHOST_STATUS_OK || exchange.answer().abi_version != spoken ||
+        if (exchange.status != ARHOST_STATUS_OK || exchange.answer().abi_version != version ||
             !exchange.answer().plugin)
             throw Failure(fmt::format("offered {}, negotiate returned {} and version {}; it must be OK and {}", offer,
-                                      status_name(exchange.status), exchange.answer().abi_version, spoken));
+                                      status_name(exchange.status), exchange.answer().abi_version, version));
     };
-    expect_accepted(Exchange(context, {offer_size, spoken, spoken}, answer_size), "its version");
-    expect_accepted(Exchange(context, {offer_size, spoken, spoken + 7}, answer_size), "its version and newer ones");
-    expect_accepted(Exchange(context, {offer_size + longer, spoken, spoken}, answer_size + longer),
-                    "structs longer than it knows");
+    expect_accepted(Exchange(context, {offer_size, version, version}, answer_size), "its version");
+    expect_accepted(Exchange(context, {offer_size, version, version + 7}, answer_size),
+                    "its version and newer versions");
+    expect_accepted(Exchange(context, {offer_size + longer, version, version}, answer_size + longer),
+                    "longer structs");
 
-    const Exchange newer(context, {offer_size, spoken + 1, spoken + 7}, answer_size);
+    const Exchange newer(context, {offer_size, version + 1, version + 7}, answer_size);
     if (newer.status != ARHOST_STATUS_ERROR_UNSUPPORTED)
         throw Failure(fmt::format("offered versions {} to {}, negotiate returned {}; it must be UNSUPPORTED",
-                                  spoken + 1, spoken + 7, status_name(newer.status)));
+                                  version + 1, version + 7, status_name(newer.status)));
 
     constexpr auto short_offer = static_cast<std::uint32_t>(offsetof(arhost_offer, newest_abi_version));
-    const Exchange half_offered(context, {short_offer, spoken, spoken}, answer_size);
-    if (half_offered.status >= 0)
-        throw Failure(fmt::format("given an offer of {} bytes, without the newest version, negotiate returned {}; it "
-                                  "must refuse",
-                                  short_offer, status_name(half_offered.status)));
+    const Exchange short_offered(context, {short_offer, version, version}, answer_size);
+    if (short_offered.status >= 0)
+        throw Failure(fmt::format("with an offer of {} bytes, which lacks newest_abi_version, negotiate returned {}; "
+                                  "it must return an error",
+                                  short_offer, status_name(short_offered.status)));
 
     constexpr auto short_answer = static_cast<std::uint32_t>(offsetof(arhost_answer, plugin));
-    const Exchange shorter(context, {offer_size, spoken, spoken}, short_answer);
+    const Exchange shorter(context, {offer_size, version, version}, short_answer);
     if (shorter.status >= 0)
-        throw Failure(
-            fmt::format("given an answer of {} bytes, without a place for the plugin, negotiate returned {}; "
-                        "it must refuse",
-                        short_answer, status_name(shorter.status)));
+        throw Failure(fmt::format(
+            "with an answer of {} bytes, which lacks plugin, negotiate returned {}; it must return an error",
+            short_answer, status_name(shorter.status)));
 }
 
 // ---- Descriptor ------------------------------------------------------------------------------------
@@ -160,11 +159,11 @@ void descriptor(Context &context) {
     constexpr std::uint32_t capabilities_of_kind[] = {0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, 0,
                                                       ARHOST_CAPABILITY_LENS_DISTORTION,
                                                       ARHOST_CAPABILITY_REALTIME_SINK};
-    if (const std::uint32_t others = d.capabilities & ~capabilities_of_kind[d.kind])
-        throw Failure(
-            fmt::format("the descriptor's capabilities have the bits {:#x}, which its kind has not", others));
-    const ipc::Json told = ipc::to_json(d);
-    for (const auto &[field, value] : told.items()) {
+    if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
+        throw Failure(fmt::format(
+            "the descriptor's capabilities have the bits {:#x}, which are not defined for its kind", invalid));
+    const ipc::Json described = ipc::to_json(d);
+    for (const auto &[field, value] : described.items()) {
         const std::string text = value.dump(-1, ' ', false, ipc::Json::error_handler_t::replace);
         try {
             value.dump();
@@ -181,18 +180,18 @@ void descriptor(Context &context) {
         if (!option->help || !*option->help)
             throw Failure(fmt::format("the option '{}' has no help", option->key));
         if (option->minimum > option->maximum)
-            throw Failure(fmt::format("the option '{}' has a minimum of {} above its maximum of {}", option->key,
+            throw Failure(fmt::format("the option '{}' has a minimum of {}, above its maximum of {}", option->key,
                                       option->minimum, option->maximum));
         try {
             if (option->default_value)
                 parse_option(*option, option->default_value);
         } catch (const std::runtime_error &error) {
-            throw Failure(fmt::format("a default can't be: {}", error.what()));
+            throw Failure(fmt::format("invalid default: {}", error.what()));
         }
     }
 }
 
-// A capability that is withdrawn, say, once the host has reckoned with it.
+// For example, a capability must not disappear once the host relies on it.
 void same_answer(Context &context) {
     const arhost_plugin &plugin = context.library.plugin();
     const ipc::Json descriptor = ipc::to_json(*plugin.descriptor);
@@ -201,25 +200,25 @@ void same_answer(Context &context) {
         const Exchange again(context, {sizeof(arhost_offer), ARHOST_ABI_VERSION, ARHOST_ABI_VERSION}, size);
         if (again.status != ARHOST_STATUS_OK || again.answer().plugin != &plugin)
             throw Failure(
-                fmt::format("{}, negotiate returned {} and another plugin", when, status_name(again.status)));
+                fmt::format("{}, negotiate returned {} and a different plugin", when, status_name(again.status)));
         const ipc::Json now = ipc::to_json(*plugin.descriptor);
         for (const auto &[key, value] : descriptor.items())
             if (now[key] != value)
-                throw Failure(fmt::format("{}, the descriptor's {} is {} and was {}", when, key, now[key].dump(),
+                throw Failure(fmt::format("{}, the descriptor's {} is {}; it was {}", when, key, now[key].dump(),
                                           value.dump()));
     };
-    expect_same("asked again");
+    expect_same("called again");
     {
         Instance instance(context.library);
         instance.create_or_fail();
-        expect_same("asked with an instance");
+        expect_same("called while an instance exists");
     }
-    expect_same("asked after an instance");
+    expect_same("called after an instance was destroyed");
 }
 
 void unknown_extension(Context &context) {
     if (context.library.plugin().get_extension("arhost.conform.no-such-extension/1"))
-        throw Failure("get_extension gave a pointer for an id that nobody has; it must be NULL");
+        throw Failure("get_extension returned a pointer for an unknown id; it must return NULL");
 }
 
 // ---- Instances -------------------------------------------------------------------------------------
@@ -233,7 +232,7 @@ void longer_options(Context &context) {
     if (context.library.descriptor().option_count < 2)
         throw Skip("it has fewer than two options");
     Instance instance(context.library);
-    instance.create_or_fail({.bytes = 16, .option = false}); // who steps too short takes garbage for a key
+    instance.create_or_fail({.bytes = 16, .option = false}); // a plugin that steps too short reads garbage as a key
 }
 
 void unknown_option(Context &context) {
@@ -246,16 +245,16 @@ void two_instances(Context &context) {
     first.create_or_fail();
     second.create_or_fail();
     if (first.get() == second.get())
-        throw Failure("two instances that live at a time are the same pointer");
+        throw Failure("two instances that exist at the same time have the same pointer");
     first.destroy();
     Instance third(context.library);
     third.create_or_fail();
 }
 
-void create_again_and_again(Context &context) {
+void create_repeatedly(Context &context) {
     using Clock = std::chrono::steady_clock;
-    constexpr int warm_up = 20, least = 100, most = 1000;
-    constexpr auto enough = 20s; // for who takes long over each
+    constexpr int warm_up = 20, min_count = 100, max_count = 1000;
+    constexpr auto time_limit = 20s; // once min_count is reached
     constexpr long allowed_kib = 4096;
     const auto create_and_destroy = [&] {
         Instance instance(context.library);
@@ -267,15 +266,15 @@ void create_again_and_again(Context &context) {
     const auto work = [&] {
         const ProcessUsage before = ProcessUsage::now();
         const auto begin = Clock::now();
-        for (count = 0; count < most && (count < least || Clock::now() - begin < enough); ++count) {
-            // Before descriptors or memory run out.
-            if (count > 0 && count % least == 0 && !growth(before, ProcessUsage::now(), allowed_kib).empty())
+        for (count = 0; count < max_count && (count < min_count || Clock::now() - begin < time_limit); ++count) {
+            // Stop before descriptors or memory run out.
+            if (count > 0 && count % min_count == 0 && !growth(before, ProcessUsage::now(), allowed_kib).empty())
                 return;
             create_and_destroy();
         }
     };
     if (const std::string grown = growth_by(work, allowed_kib); !grown.empty())
-        throw Failure(fmt::format("{} times create and destroy led {}", count, grown));
+        throw Failure(fmt::format("after {} create and destroy, the process grew {}", count, grown));
     context.note = fmt::format("{} times", count);
 }
 
@@ -284,38 +283,36 @@ void cancelled(Context &context) {
     instance.host().cancel();
     const arhost_status status = instance.create();
     if (status != ARHOST_STATUS_OK && status != ARHOST_STATUS_ERROR_CANCELLED)
-        instance.expect_ok("create, cancelled before,", status);
+        instance.expect_ok("create, after cancellation,", status);
     if ((status == ARHOST_STATUS_OK) != (instance.get() != nullptr))
         throw Failure(fmt::format("create returned {} and the instance is{} NULL", status_name(status),
                                   instance.get() ? " not" : ""));
 }
 
 constexpr Test tests[] = {
-    {"abi.load",
-     "arhost-worker takes it: it opens, agrees on the version, and describes itself under its file's name.", 0, "",
-     10s, load},
-    {"abi.exports", "Its one exported symbol is arhost_entry.", 0, "abi.load", 10s, exports},
-    {"abi.negotiation",
-     "It answers offers of every range, and structs longer or shorter than it knows, as the ABI says.", 0, "abi.load",
-     10s, negotiation},
+    {"abi.load", "arhost-worker accepts it: it loads, agrees on the ABI version, and its id is its file's name.", 0,
+     "", 10s, load},
+    {"abi.exports", "It exports no symbol but arhost_entry.", 0, "abi.load", 10s, exports},
+    {"abi.negotiation", "It answers any version range, and longer or shorter structs, as the ABI specifies.", 0,
+     "abi.load", 10s, negotiation},
     {"abi.descriptor",
-     "Its texts are there, its capabilities are its kind's, its options and their defaults make sense.", 0,
+     "Its texts are set, its capabilities are defined for its kind, and its options and defaults are valid.", 0,
      "abi.load", 10s, descriptor},
-    {"abi.unknown-extension", "It has no pointer for an extension that it can't know.", 0, "abi.load", 10s,
+    {"abi.unknown-extension", "get_extension returns NULL for an unknown extension.", 0, "abi.load", 10s,
      unknown_extension},
-    {"abi.create", "An instance is made with the default options and destroyed without a start.", 0, "abi.load", 20s,
-     create},
-    {"abi.same-answer", "Asked again, it gives the same plugin with the same descriptor.", 0, "abi.create", 20s,
+    {"abi.create", "An instance can be created with the default options and destroyed without a start.", 0,
+     "abi.load", 20s, create},
+    {"abi.same-answer", "Each negotiate returns the same plugin with the same descriptor.", 0, "abi.create", 20s,
      same_answer},
     {"abi.longer-options", "It steps through the options by their struct_size.", 0, "abi.create", 10s,
      longer_options},
-    {"abi.unknown-option", "It passes over an option whose key it does not know.", 0, "abi.create", 10s,
-     unknown_option},
-    {"abi.two-instances", "Two instances live at a time, and end in any order.", 0, "abi.create", 20s, two_instances},
+    {"abi.unknown-option", "It ignores options with unknown keys.", 0, "abi.create", 10s, unknown_option},
+    {"abi.two-instances", "Two instances can exist at the same time and be destroyed in any order.", 0, "abi.create",
+     20s, two_instances},
     {"abi.create-1000-times",
-     "Created and destroyed 1,000 times, or 20 s long, it keeps no descriptor, no thread and no memory.", 0,
-     "abi.create", 240s, create_again_and_again},
-    {"abi.cancelled-create", "Cancelled before, create returns soon, OK or CANCELLED.", 0, "abi.create", 10s,
+     "After 1,000 create and destroy, or 20 s of them, no descriptor, thread or memory has leaked.", 0, "abi.create",
+     240s, create_repeatedly},
+    {"abi.cancelled-create", "After cancellation, create returns soon, with OK or CANCELLED.", 0, "abi.create", 10s,
      cancelled},
 };
 

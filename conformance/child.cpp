@@ -28,46 +28,46 @@ CallPage map_call_page() {
     return CallPage(ipc::Mapping(static_cast<std::byte *>(address), sizeof(ipc::Call)));
 }
 
-// As arhost-worker does before it opens a plugin. What a sink writes goes to the scratch folder.
+// As arhost-worker does before it opens a plugin. A sink writes to the scratch folder.
 sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     sandbox::Policy policy = subject.policy;
     policy.writable.push_back(subject.scratch);
     if (test.forks) {
         policy.allow.insert("processes");
-        policy.readable.push_back(std::filesystem::read_symlink("/proc/self/exe")); // it becomes this anew
+        policy.readable.push_back(std::filesystem::read_symlink("/proc/self/exe")); // to execute this program again
     }
     return sandbox::enter_for(subject.plugin, policy);
 }
 
-constexpr off_t room_mib = 16;
+constexpr off_t min_space_mib = 16;
 
-// 0: the folder has room for so much; otherwise the error.
-int look_for_room(const std::filesystem::path &folder) {
-    const std::filesystem::path file = folder / "room";
+// 0 if the folder's file system has min_space_mib free; otherwise an errno.
+int check_space(const std::filesystem::path &folder) {
+    const std::filesystem::path file = folder / "space";
     const base::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
-    const int error = fd ? ::posix_fallocate(fd.get(), 0, room_mib << 20) : errno;
+    const int error = fd ? ::posix_fallocate(fd.get(), 0, min_space_mib << 20) : errno;
     std::error_code ignored;
     std::filesystem::remove(file, ignored);
     return error;
 }
-std::runtime_error no_room(const std::filesystem::path &folder, int error) {
-    return std::runtime_error(fmt::format("the test's folder {} has no room for {} MiB: {}; free some, or set "
-                                          "TMPDIR to another place",
-                                          folder.string(), room_mib, std::strerror(error)));
+std::runtime_error no_space(const std::filesystem::path &folder, int error) {
+    return std::runtime_error(
+        fmt::format("the test's folder {} has no space for {} MiB: {}; free some, or set TMPDIR to another folder",
+                    folder.string(), min_space_mib, std::strerror(error)));
 }
 
 void run_in_sandbox(const Test &test, Context &context) {
     if (test.kind != ARHOST_KIND_SINK)
         return test.run(context);
     const std::filesystem::path &folder = context.library.scratch();
-    if (const int error = look_for_room(folder); error != 0)
-        throw no_room(folder, error);
+    if (const int error = check_space(folder); error != 0)
+        throw no_space(folder, error);
     try {
         test.run(context);
     } catch (const Failure &) {
-        // Others write too, and for a full disk no sink is to blame; for other errors it may be.
-        if (const int error = look_for_room(folder); error == ENOSPC || error == EDQUOT)
-            throw no_room(folder, error);
+        // Another program may have filled the disk; other errors may be the sink's fault.
+        if (const int error = check_space(folder); error == ENOSPC || error == EDQUOT)
+            throw no_space(folder, error);
         throw;
     }
 }
@@ -96,9 +96,10 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message = warning.what();
     } catch (const std::exception &error) {
         const auto *system = dynamic_cast<const std::system_error *>(&error);
-        const bool none_left = system && system->code() == std::errc::too_many_files_open; // the suite keeps few
+        const bool none_left =
+            system && system->code() == std::errc::too_many_files_open; // the suite itself uses few
         result.verdict = none_left ? Verdict::fail : Verdict::error;
-        result.message = none_left ? "it keeps descriptors until there is none left" : error.what();
+        result.message = none_left ? "it leaks descriptors until none is left" : error.what();
     }
     return result;
 }
@@ -154,7 +155,7 @@ int run_child(const std::string &name, const Subject &subject) {
         std::FILE *pipe = ::fdopen(result_fd, "w");
         std::fwrite(line.data(), 1, line.size(), pipe);
         std::fclose(pipe);
-        return EXIT_SUCCESS; // the plugin's static destructors are part of the test
+        return EXIT_SUCCESS; // the test includes the plugin's static destructors
     }
     return EXIT_FAILURE;
 }
@@ -177,12 +178,12 @@ Result result_from_json(const ipc::Json &json) {
     const auto verdict =
         std::find(verdict_texts.begin() + 1, verdict_texts.end(), json.at("verdict").get<std::string>());
     if (verdict == verdict_texts.end())
-        throw std::runtime_error("a verdict that is none");
+        throw std::runtime_error("unknown verdict");
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
     result.message = json.at("message").get<std::string>();
     result.facts = json.at("facts");
     if (result.facts != ipc::Json::object())
-        ipc::description_from_json(result.facts); // throws unless it is one
+        ipc::description_from_json(result.facts); // throws if invalid
     for (const ipc::Json &image : json.at("images"))
         result.exhibits.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
                                    image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The process of one test: this program, executed anew by runner.cpp.
+// The process of one test: runner.cpp executes this program again.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -18,22 +17,22 @@
 
 namespace arhost::conformance {
 
-// What every test of a run is told.
+// The plugin under test and its settings, passed to every test.
 struct Subject {
     std::filesystem::path plugin, reference;
     Settings settings;
     std::uint64_t seed = 1;
-    double timeout_factor = 1;       // times each deadline
-    std::filesystem::path scratch{}; // of one test; gone after it
+    double timeout_factor = 1;       // multiplies each deadline
+    std::filesystem::path scratch{}; // of one test; deleted after it
     PrintFiles prints{};
-    sandbox::Policy policy{};                  // but for the scratch folder
-    std::vector<std::string> policy_options{}; // which it came of, as on the command line
+    sandbox::Policy policy{};                  // without the scratch folder
+    std::vector<std::string> policy_options{}; // the policy's command line options
 };
 
-// The ray tracer that is compared with unless another is named.
+// The ray tracer that images are compared with by default.
 std::filesystem::path default_reference();
 
-// The descriptors that a child finds.
+// Descriptors of a test's process.
 inline constexpr int result_fd = 3, call_page_fd = 4;
 
 struct Pipe {

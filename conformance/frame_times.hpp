@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// How long a plugin takes for a frame, for the tests of speed.
+// Times of a plugin's per-frame call, for the tests of speed.
 #pragma once
 
 #include "conformance/test.hpp"
@@ -13,14 +12,14 @@
 
 namespace arhost::conformance {
 
-// Sorted, in ms, of 100 calls of `frame`, or of as many as take 1 s, but of 11 at least; and until it returns false.
+// Sorted times in ms of up to 100 calls of `frame`: stops after 1 s and at least 11 calls, or when it returns false.
 template <class Frame> std::vector<double> frame_times_ms(Frame &&frame) {
     using Clock = std::chrono::steady_clock;
-    constexpr std::size_t least = 11, most = 100;
-    constexpr auto enough = 1s;
+    constexpr std::size_t min_count = 11, max_count = 100;
+    constexpr auto time_limit = 1s;
     std::vector<double> ms;
     const auto first = Clock::now();
-    while (ms.size() < most && (ms.size() < least || Clock::now() - first < enough)) {
+    while (ms.size() < max_count && (ms.size() < min_count || Clock::now() - first < time_limit)) {
         const auto begin = Clock::now();
         if (!frame())
             break;
@@ -30,20 +29,20 @@ template <class Frame> std::vector<double> frame_times_ms(Frame &&frame) {
     return ms;
 }
 
-// By the nearest rank.
+// Nearest-rank method.
 inline double percentile(const std::vector<double> &sorted, double percent) {
     const double rank = std::ceil(percent / 100 * static_cast<double>(sorted.size()));
     return sorted.at(static_cast<std::size_t>(std::max(rank, 1.0)) - 1);
 }
 
-// Notes p50 and p99 in the report, and warns where p50 is above `bound_ms`.
-inline void judge_speed(Context &context, std::uint32_t width, std::uint32_t height,
+// Reports p50 and p99; warns if p50 exceeds `bound_ms`.
+inline void check_speed(Context &context, std::uint32_t width, std::uint32_t height,
                         const std::vector<double> &sorted_ms, double bound_ms) {
     const double p50 = percentile(sorted_ms, 50);
     context.note = fmt::format("{}×{}: p50 {:.3g} ms, p99 {:.3g} ms, of {} frames", width, height, p50,
                                percentile(sorted_ms, 99), sorted_ms.size());
     if (p50 > bound_ms)
-        throw Warning(fmt::format("{}; more than {} ms", context.note, bound_ms));
+        throw Warning(fmt::format("{}; p50 must be at most {} ms", context.note, bound_ms));
 }
 
 } // namespace arhost::conformance

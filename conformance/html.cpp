@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The report as one page that needs no other file.
+// The report as a self-contained HTML page.
 #include "conformance/report.hpp"
 
 #include <fmt/format.h>
@@ -41,7 +40,7 @@ std::string as_html(const Report &report) {
     std::string rows;
     for (const Result &result : report.results) {
         rows += fmt::format("<tr><td class=\"{0}\">{0}</td><td><p><b>{1}</b> {2}</p>", to_text(result.verdict),
-                            result.test, escaped(report.test_of(result).promise));
+                            result.test, escaped(report.test_of(result).requirement));
         if (!result.message.empty())
             rows += fmt::format("<p class=\"{}\">{}</p>", to_text(result.verdict), escaped(result.message));
         if (result.verdict != Verdict::pass && result.verdict != Verdict::skip)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-conform: tries whether a plugin keeps the ABI's promises (docs/conformance.md).
+// arhost-conform: tests whether a plugin meets the requirements of the ABI (docs/conformance.md).
 #include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
@@ -36,16 +36,16 @@ template <class Number> bool parse_number(std::string_view text, Number &number)
     return error == std::errc() && end == text.data() + text.size();
 }
 
-// For base::Option::check: what is wrong with a text, or "".
-std::string wrong_with_name(const std::string &text) {
+// Validators for base::Option::check: return an error message, or "".
+std::string invalid_name(const std::string &text) {
     return text.empty() ? "the name is empty" : "";
 }
-std::string wrong_with_variable(const std::string &text) {
+std::string invalid_variable(const std::string &text) {
     return sandbox::is_variable_name(text)
                ? ""
-               : "'" + text + "' must be a variable's name alone; its value is the one that arhost is started with";
+               : "'" + text + "' must be only a variable's name; its value is taken from arhost's environment";
 }
-std::string wrong_with_seed(const std::string &text) {
+std::string invalid_seed(const std::string &text) {
     std::uint64_t seed = 0;
     return parse_number(text, seed) ? "" : fmt::format("'{}' must be a whole number from 0 to {}", text, UINT64_MAX);
 }
@@ -72,13 +72,13 @@ PrintFiles parse_prints(const std::vector<std::string> &texts) {
         const std::size_t equals = text.find('=');
         int id = 0;
         if (equals == std::string::npos || !parse_number(text.substr(0, equals), id) || equals + 1 == text.size())
-            throw std::runtime_error("--print " + text + ": must be ID=FILE, a marker's id and its picture");
+            throw std::runtime_error("--print " + text + ": must be ID=FILE: a marker's id and its picture");
         prints[id] = fs::absolute(text.substr(equals + 1));
     }
     return prints;
 }
 
-// What the configuration's keys of the same names would say.
+// Options with the names and meanings of the configuration's keys.
 struct PolicyOptions {
     std::vector<std::string> allow, reads, environment;
     std::string sandbox{sandbox::modes.front()};
@@ -88,17 +88,17 @@ struct PolicyOptions {
             return app.option(name, values, what).one_value_each();
         };
         const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
-        add("--allow", allow, "What the sandbox gives it, as a configuration's 'allow' (docs/security.md)")
+        add("--allow", allow, "What the sandbox allows, as 'allow' in the configuration (docs/security.md)")
             .type_name("WHAT")
             .separator(',')
             .one_of(known);
-        add("--reads", reads, "A further file or folder that it may read (again for more)")
+        add("--reads", reads, "Another file or folder that the plugin may read (repeatable)")
             .type_name("PATH")
             .existing_path();
-        add("--environment", environment, "A further variable that it gets (again for more)")
+        add("--environment", environment, "Another environment variable that the plugin gets (repeatable)")
             .type_name("NAME")
-            .check(wrong_with_variable);
-        app.option("--sandbox", sandbox, "permissive, strict or none, as the configuration's 'sandbox'")
+            .check(invalid_variable);
+        app.option("--sandbox", sandbox, "permissive, strict or none, as 'sandbox' in the configuration")
             .type_name("MODE")
             .one_of(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end()));
     }
@@ -112,7 +112,7 @@ struct PolicyOptions {
             all.insert(all.end(), {"--sandbox", sandbox});
         return all;
     }
-    // With the files that the suite itself, or the plugin by its options, is told to read.
+    // Grants read access to files named by the suite's options and by the plugin's options.
     sandbox::Policy policy(const Subject &subject) const {
         sandbox::Policy policy;
         policy.mode = sandbox::mode_of(sandbox);
@@ -141,49 +141,50 @@ std::string list(const std::vector<std::string> &patterns) {
     std::string text;
     for (const Test &test : all_tests())
         if (matches(patterns, test.name))
-            text += fmt::format("{:<34} {}\n", test.name, test.promise);
+            text += fmt::format("{:<34} {}\n", test.name, test.requirement);
     return text;
 }
 
-// What the plugin needs and is not given: without it the host would make no instance.
-std::string lacking(const Result &loaded, const sandbox::Policy &policy) {
+// Describes a need of the plugin that the policy does not allow; without it the host creates no instance. Empty if
+// all are allowed.
+std::string missing_need(const Result &loaded, const sandbox::Policy &policy) {
     if (policy.mode != sandbox::Mode::none)
         for (const std::string &need : loaded.facts.value("needs", std::vector<std::string>()))
             if (!policy.allows(need))
-                return fmt::format("it needs '{0}', which the sandbox keeps from it: give --allow {0}", need);
+                return fmt::format("it needs '{0}', which the sandbox does not allow: give --allow {0}", need);
     return {};
 }
 
-bool makes_instances(std::span<const Test> tests, std::string_view name) {
+bool creates_instances(std::span<const Test> tests, std::string_view name) {
     if (name == "abi.create")
         return true;
     const auto test = std::find_if(tests.begin(), tests.end(), [&](const Test &t) { return name == t.name; });
-    return test != tests.end() && makes_instances(tests, test->needs);
+    return test != tests.end() && creates_instances(tests, test->needs);
 }
 
-// Why nothing can be compared with the reference: that is no plugin's fault. "": it can.
-std::string wrong_with_reference(std::span<const Test> tests, const RunSettings &settings) {
+// Explains why images can't be compared with the reference, which is not the plugin's fault; empty if they can.
+std::string reference_problem(std::span<const Test> tests, const RunSettings &settings) {
     const fs::path &file = settings.subject.reference;
     if (!fs::is_regular_file(file))
-        return fmt::format("the reference '{}' is not there; give --reference FILE", file.string());
-    RunSettings of_reference = settings;
-    of_reference.subject.plugin = file;
-    of_reference.subject.settings.clear();
+        return fmt::format("the reference '{}' does not exist; give --reference FILE", file.string());
+    RunSettings reference_settings = settings;
+    reference_settings.subject.plugin = file;
+    reference_settings.subject.settings.clear();
     for (const Test &test : tests)
         if (test.name == std::string_view("abi.load") || test.name == std::string_view("raytracer.render")) {
-            const Result result = run_alone(test, of_reference);
+            const Result result = run_alone(test, reference_settings);
             if (result.verdict != Verdict::pass)
-                return fmt::format("the reference '{}' can't be used, by {}: {}", file.string(), test.name,
+                return fmt::format("the reference '{}' can't be used: {} failed: {}", file.string(), test.name,
                                    result.message);
             if (const arhost_kind kind = result.facts.value("kind", arhost_kind{ARHOST_KIND_RAYTRACER});
                 kind != ARHOST_KIND_RAYTRACER)
-                return fmt::format("the reference '{}' is a {} and must be a ray tracer; give --reference FILE",
+                return fmt::format("the reference '{}' is a {} but must be a ray tracer; give --reference FILE",
                                    file.string(), arhost::ipc::to_text(kind));
         }
     return {};
 }
 
-// At once, for whoever reads along. A full disk, and a reader who has gone, end the run.
+// Unbuffered. A full disk or a closed pipe ends the run.
 void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);
@@ -198,16 +199,16 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
     const auto is_fine = [](const Result &result) {
         return result.verdict == Verdict::pass || result.verdict == Verdict::skip;
     };
-    const auto tell = [&](const Result &result) {
+    const auto print_result = [&](const Result &result) {
         if (!is_fine(result) || (wanted(result.test.c_str()) && !quiet))
             print(as_line(report, result), settings.signals);
     };
-    const auto give = [&](const Test &test, Verdict verdict, const std::string &why) {
+    const auto set_result = [&](const Test &test, Verdict verdict, const std::string &why) {
         report.results.push_back({test.name, verdict, why});
-        tell(report.results.back());
+        print_result(report.results.back());
     };
-    // Always first: it tells the plugin's kind.
-    run_all({report.tests.data(), 1}, settings, report.results, tell);
+    // Always first: abi.load reports the plugin's kind.
+    run_all({report.tests.data(), 1}, settings, report.results, print_result);
     report.plugin = report.results.front().facts;
     const arhost_kind kind = report.plugin.value("kind", 0);
     std::vector<Test> selected;
@@ -218,15 +219,15 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
             needed.insert(test.needs);
         }
     });
-    const std::string lacks = lacking(report.results.front(), settings.subject.policy);
+    const std::string missing = missing_need(report.results.front(), settings.subject.policy);
     for (const Test &test : selected)
-        if (!lacks.empty() && makes_instances(report.tests, test.name))
-            give(test, Verdict::skip, lacks);
+        if (!missing.empty() && creates_instances(report.tests, test.name))
+            set_result(test, Verdict::skip, missing);
         else if (test.name == std::string_view("raytracer.reference"))
-            if (const std::string wrong = wrong_with_reference(report.tests, settings); !wrong.empty())
-                give(test, Verdict::error, wrong);
-    run_all(selected, settings, report.results, tell);
-    // What others need and nobody has asked for goes without saying.
+            if (const std::string problem = reference_problem(report.tests, settings); !problem.empty())
+                set_result(test, Verdict::error, problem);
+    run_all(selected, settings, report.results, print_result);
+    // Report tests that run only because others need them only if they fail.
     std::erase_if(report.results,
                   [&](const Result &result) { return is_fine(result) && !wanted(result.test.c_str()); });
     std::sort(report.results.begin(), report.results.end(),
@@ -234,7 +235,7 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
     return report;
 }
 
-// Where there are fewer, a plugin would be blamed for it.
+// With fewer, a test would fail without the plugin's fault.
 void expect_descriptors(unsigned jobs) {
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
@@ -245,24 +246,24 @@ void expect_descriptors(unsigned jobs) {
     }
     if (limit.rlim_cur < needed)
         throw std::runtime_error(
-            fmt::format("{} files may be open at once, and {} are needed; raise it: ulimit -n {}", limit.rlim_cur,
+            fmt::format("the limit of open files is {}, but {} are needed; raise it: ulimit -n {}", limit.rlim_cur,
                         needed, needed));
 }
 
-// Plugins get paths as UTF-8: those that their options have, and of the folder for what they write.
+// Plugins get paths as UTF-8: those of their options and of the scratch folder.
 void expect_utf8(const std::vector<std::string> &settings) {
-    std::error_code none; // is told where it is missed
+    std::error_code none; // reported when a scratch folder is created
     std::vector<std::string> texts = settings;
     texts.push_back(fs::temp_directory_path(none));
     for (const std::string &text : texts)
         if (!base::is_utf8(text))
-            throw std::runtime_error("'" + text + "' is no UTF-8, as what a plugin is given must be; rename it");
+            throw std::runtime_error("'" + text + "' is not UTF-8, as text for a plugin must be; rename it");
 }
 
-// A report replaces what is there, unless that is a pipe or a device.
-void expect_files_of_their_own(const std::vector<std::string> &reports, const Subject &subject) {
+// Reports must not replace files that the run reads, nor each other. Pipes and devices are exempt.
+void check_report_files(const std::vector<std::string> &reports, const Subject &subject) {
     using base::identity_of;
-    std::set<std::string> read, written; // paths, and nodes: a file may have several names
+    std::set<std::string> read, written; // paths and inodes: a file may have several names
     const auto add = [](std::set<std::string> &files, const fs::path &file) {
         const auto [path, node] = identity_of(file);
         files.insert({path, node});
@@ -287,8 +288,7 @@ void expect_files_of_their_own(const std::vector<std::string> &reports, const Su
     }
 }
 
-// Those that end a program, but for what whoever started this one wants ignored (nohup): taken from here on by who
-// reads the descriptor.
+// A signalfd for SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup).
 base::UniqueFd take_signals() {
     sigset_t taken;
     ::sigemptyset(&taken);
@@ -301,14 +301,14 @@ base::UniqueFd take_signals() {
     return base::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
 }
 
-// The last line; whoever does not read it ends this by another signal.
-void say(const std::string &line, int signals) noexcept {
+// Prints the last line. If nobody reads it, another signal ends the program.
+void print_last_line(const std::string &line, int signals) noexcept {
     try {
         base::write_all(STDERR_FILENO, line + "\n", signals);
-    } catch (const std::exception &) { // nobody is told
+    } catch (const std::exception &) { // cannot be reported
     }
 }
-bool is_read(int fd) {
+bool is_writable(int fd) {
     pollfd ready{fd, POLLOUT, 0};
     return ::poll(&ready, 1, 0) > 0;
 }
@@ -316,13 +316,13 @@ bool is_read(int fd) {
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // as where a plugin runs: a full disk, and who reads no more, are errors
+    std::signal(SIGPIPE, SIG_IGN); // as in arhost-worker: a closed pipe or a full disk is an error, not a signal
     std::signal(SIGXFSZ, SIG_IGN);
-    std::signal(SIGCHLD, SIG_DFL); // whoever started this may ignore it, and then no child can be waited for
+    std::signal(SIGCHLD, SIG_DFL); // if the parent process ignores it, waitpid fails
     base::CommandLine app(
-        "Tries whether a plugin keeps the promises of arhost's ABI (docs/conformance.md).\n"
-        "Exit status: 0 all well; 1 a test failed, crashed or timed out; 2 the suite could not tell;\n"
-        "128 and a signal's number: interrupted.",
+        "Tests whether a plugin meets the requirements of arhost's ABI (docs/conformance.md).\n"
+        "Exit status: 0 success; 1 a test failed, crashed or timed out; 2 the suite itself failed;\n"
+        "128 plus a signal's number: interrupted.",
         "arhost conform");
     RunSettings settings;
     std::vector<std::string> option_texts, print_texts, patterns = {"*"};
@@ -331,38 +331,34 @@ int main(int argc, char **argv) {
     bool only_list = false, quiet = false;
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
     app.option("PLUGIN", plugin, "The plugin's shared object");
-    app.flag("--list", only_list, "Print the tests' names and what each promises");
-    app.option("--only", patterns, "Only tests whose name matches, as 'raytracer.*' (again for more)")
+    app.flag("--list", only_list, "Print the tests' names and requirements");
+    app.option("--only", patterns, "Only tests whose name matches, as 'raytracer.*' (repeatable)")
         .type_name("PATTERN")
         .separator(',')
         .one_value_each();
-    app.option("--set", option_texts, "An option of the plugin (again for more)")
-        .type_name("KEY=VALUE")
-        .one_value_each();
+    app.option("--set", option_texts, "An option of the plugin (repeatable)").type_name("KEY=VALUE").one_value_each();
     app.option("--print", print_texts,
-               "The PNG of a marker that the tracker finds (again for more), instead of tag36h11's")
+               "A PNG of a marker that the tracker detects (repeatable), instead of tag36h11 tags")
         .type_name("ID=FILE")
         .one_value_each();
     PolicyOptions policy_options;
     policy_options.add_to(app);
-    app.option("--seed", settings.subject.seed, "Of whatever is chosen at random (1)")
-        .type_name("N")
-        .check(wrong_with_seed);
-    app.option("--jobs", settings.jobs, "Tests at a time").type_name("N").range(1, 256);
-    app.option("--timeout-factor", settings.subject.timeout_factor, "Times each deadline, on slow machines (1)")
+    app.option("--seed", settings.subject.seed, "Seed of random choices (1)").type_name("N").check(invalid_seed);
+    app.option("--jobs", settings.jobs, "Number of tests to run in parallel").type_name("N").range(1, 256);
+    app.option("--timeout-factor", settings.subject.timeout_factor, "Multiplies each deadline, for slow machines (1)")
         .type_name("FACTOR")
         .check(invalid_timeout_factor);
     app.option("--reference", reference, "The ray tracer that images are compared with")
         .type_name("FILE")
-        .check(wrong_with_name);
-    app.flag("-q,--quiet", quiet, "Print neither what passes nor what is skipped");
+        .check(invalid_name);
+    app.flag("-q,--quiet", quiet, "Do not print passed and skipped tests");
     const auto add_file = [&](const char *name, std::string &file, const char *what) {
-        app.option(name, file, what).type_name("FILE").check(wrong_with_name);
+        app.option(name, file, what).type_name("FILE").check(invalid_name);
     };
     add_file("--json", json, "Write the results as JSON");
-    add_file("--junit", junit, "Write them as JUnit XML");
-    add_file("--html", html, "Write them as one page, with images");
-    app.option("--run", child_test, "").hidden(); // for this program itself: be the process of that test
+    add_file("--junit", junit, "Write the results as JUnit XML");
+    add_file("--html", html, "Write the results as an HTML page with images");
+    app.option("--run", child_test, "").hidden(); // internal: run that test in this process
     app.option("--scratch", settings.subject.scratch, "").hidden();
     if (const auto status = app.parse(argc, argv))
         return base::flush_stdout() ? *status : usage_or_suite_failed;
@@ -373,7 +369,7 @@ int main(int argc, char **argv) {
             return 0;
         }
         if (!fs::is_regular_file(plugin))
-            throw std::runtime_error(plugin.empty() ? "which plugin? arhost conform PLUGIN.so"
+            throw std::runtime_error(plugin.empty() ? "the plugin is missing: arhost conform PLUGIN.so"
                                                     : "there is no plugin '" + plugin + "'");
         settings.subject.plugin = fs::absolute(plugin);
         settings.subject.reference = fs::absolute(reference);
@@ -385,8 +381,8 @@ int main(int argc, char **argv) {
             return run_child(child_test, settings.subject);
         expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
-        expect_files_of_their_own({json, junit, html}, settings.subject);
-        signals = take_signals(); // not where a test is run, which is ended as any program
+        check_report_files({json, junit, html}, settings.subject);
+        signals = take_signals(); // not in a test's process, which signals end as usual
         settings.signals = signals.get();
         base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
@@ -400,11 +396,11 @@ int main(int argc, char **argv) {
         html_file.write(as_html(report));
         return report.exit_status();
     } catch (const base::Interrupted &interrupted) {
-        if (is_read(STDERR_FILENO))
-            say(interrupted.what(), settings.signals);
+        if (is_writable(STDERR_FILENO))
+            print_last_line(interrupted.what(), settings.signals);
         return 128 + interrupted.signal;
     } catch (const std::exception &error) {
-        say("error: " + base::printable(error.what()), settings.signals);
+        print_last_line("error: " + base::printable(error.what()), settings.signals);
         return usage_or_suite_failed;
     }
 }

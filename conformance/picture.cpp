@@ -62,8 +62,8 @@ std::string Picture::damage() const {
     for (std::uint32_t y = 0; y < height_; ++y)
         if (const auto at = first_in(row(y) + std::size_t{4} * width_,
                                      y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Page)))
-            return y + 1 < height_ ? fmt::format("in row {}, {} bytes behind its last pixel", y, *at)
-                                   : fmt::format("{} bytes behind the image's last pixel", *at);
+            return y + 1 < height_ ? fmt::format("in row {}, {} bytes after its last pixel", y, *at)
+                                   : fmt::format("{} bytes after the image's last pixel", *at);
     return {};
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// An RGBA8 image in memory of its own, with guard bytes before, behind and between its rows.
+// An RGBA8 image with guard bytes before it, after it and between its rows.
 #pragma once
 
 #include <arhost/raytracer.h>
@@ -17,30 +16,30 @@ using Pixel = std::array<int, 4>; // R, G, B, A
 
 class Picture {
 public:
-    // Every pixel's bytes are `fill` at first.
+    // Initializes every byte of the pixels to `fill`.
     Picture(std::uint32_t width, std::uint32_t height, std::uint8_t fill = 0);
 
-    arhost_image image(); // to be written
+    arhost_image image(); // for a ray tracer to write to
     std::uint32_t width() const { return width_; }
     std::uint32_t height() const { return height_; }
     Pixel at(std::uint32_t x, std::uint32_t y) const;
     int alpha(std::uint32_t x, std::uint32_t y) const { return at(x, y)[3]; }
     void set(std::uint32_t x, std::uint32_t y, const Pixel &pixel);
 
-    // What was written beside the pixels, as the end of a sentence; empty: nothing.
+    // Describes overwritten guard bytes, as the end of a sentence; empty if there are none.
     std::string damage() const;
 
-    // The pixels around have the same alpha and nearly the same colour: no edge is near, nor an edge's reflection.
+    // The neighbouring pixels have the same alpha and nearly the same colour: no edge or reflected edge is near.
     bool is_smooth(std::uint32_t x, std::uint32_t y) const;
 
     std::string png_base64() const;
 
 private:
-    struct alignas(4096) Page { // which an image begins
+    struct alignas(4096) Page { // images are page-aligned
         std::uint8_t bytes[4096];
     };
     static constexpr std::uint8_t guard = 0xa5;
-    static constexpr std::size_t guard_size = sizeof(Page); // before and behind
+    static constexpr std::size_t guard_size = sizeof(Page); // before and after the image
 
     std::uint8_t *bytes() { return memory_.front().bytes; }
     const std::uint8_t *bytes() const { return memory_.front().bytes; }
@@ -50,11 +49,11 @@ private:
     std::vector<Page> memory_;
 };
 
-// By more than `tolerance` codes; colours count where both are visible.
+// By more than `tolerance` codes. Colours are compared only where both alphas are nonzero.
 bool differs(const Pixel &a, const Pixel &b, int tolerance);
 std::optional<std::array<unsigned, 2>> first_difference(const Picture &a, const Picture &b, int tolerance);
 
-// Opaque, with the difference of two pictures five times as large.
+// The difference of two pictures, multiplied by 5, opaque.
 Picture difference(const Picture &a, const Picture &b);
 
 } // namespace arhost::conformance

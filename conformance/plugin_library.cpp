@@ -72,12 +72,12 @@ arhost_option parse_option(const arhost_option_descriptor &option, const std::st
         case ARHOST_OPTION_OUTPUT_PATH:
             break;
         default:
-            refuse("is of a type that is none");
+            refuse("has an unknown type");
         }
         if (used != text.size())
-            refuse("is no number");
+            refuse("is not a number");
     } catch (const std::logic_error &) { // of stoll and stod
-        refuse("is no number");
+        refuse("is not a number");
     }
     return value;
 }
@@ -116,7 +116,7 @@ Instance::Instance(PluginLibrary &library, Settings overrides, std::filesystem::
 
 arhost_status Instance::create(Newer newer) {
     const arhost_plugin &plugin = library_.plugin();
-    std::vector<std::string> texts; // which the values point to
+    std::vector<std::string> texts; // referenced by the values
     std::vector<arhost_option> values;
     const auto declared = options_of(*plugin.descriptor);
     texts.reserve(declared.size());
@@ -136,7 +136,7 @@ arhost_status Instance::create(Newer newer) {
         } catch (const std::runtime_error &error) {
             if (set != settings_.end())
                 throw;
-            throw Failure(std::string("a default can't be: ") + error.what());
+            throw Failure(std::string("invalid default: ") + error.what());
         }
     }
     for (const auto &[key, value] : settings_)
@@ -159,7 +159,7 @@ arhost_status Instance::create(Newer newer) {
 void Instance::create_or_fail(Newer newer) {
     expect_ok("create", create(newer));
     if (!instance_)
-        throw Failure("create returned OK and left the instance NULL");
+        throw Failure("create returned OK but left the instance NULL");
 }
 
 void Instance::destroy() {
@@ -171,10 +171,10 @@ void Instance::destroy() {
 void Instance::expect_ok(const char *call, arhost_status status) const {
     if (status == ARHOST_STATUS_OK)
         return;
-    throw Failure(told(call, status, host_));
+    throw Failure(call_result(call, status, host_));
 }
 
-std::string told(const char *call, arhost_status status, const Host &host) {
+std::string call_result(const char *call, arhost_status status, const Host &host) {
     const std::string reason = host.last_error();
     return fmt::format("{} returned {}{}", call, status_name(status), reason.empty() ? "" : ": " + reason);
 }
@@ -204,7 +204,7 @@ std::string status_name(arhost_status status) {
     case ARHOST_STATUS_ERROR_INTERNAL:
         return "INTERNAL";
     default:
-        return fmt::format("{}, which is no status", status);
+        return fmt::format("{}, which is not a status", status);
     }
 }
 

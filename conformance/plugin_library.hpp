@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The plugin in the process of a test: opened as arhost-worker opens it, instances made of it, and the host
-// that they speak with.
+// The plugin in a test's process: opened as arhost-worker opens it, its instances, and their host.
 #pragma once
 
 #include "ipc/json_abi.hpp"
@@ -19,7 +17,7 @@
 
 namespace arhost::conformance {
 
-// The call that the plugin is in, in memory that the parent reads once this process is dead.
+// The plugin's current call, in memory that the parent reads after this process has ended.
 class CallPage {
 public:
     explicit CallPage(ipc::Mapping mapping) : mapping_(std::move(mapping)) {}
@@ -32,7 +30,7 @@ private:
     ipc::Mapping mapping_;
 };
 
-// Calls a function of the plugin under its name.
+// Calls a function of the plugin and marks the call on the page.
 template <class Function> auto in_call(const CallPage &calls, ipc::Call call, Function &&function) {
     struct Mark {
         const CallPage &calls;
@@ -43,20 +41,20 @@ template <class Function> auto in_call(const CallPage &calls, ipc::Call call, Fu
     return function();
 }
 
-using Settings = std::map<std::string, std::string>; // option values as they would stand in the YAML
+using Settings = std::map<std::string, std::string>; // option values as text, as in the YAML
 
 class PluginLibrary {
 public:
-    // `settings`: the user's, in place of defaults. `scratch`: the folder that outputs go to. Opens nothing yet.
+    // `settings`: the user's option values. `scratch`: the folder for outputs. Does not open the plugin yet.
     PluginLibrary(std::filesystem::path file, Settings settings, const CallPage &calls,
                   std::filesystem::path scratch = {})
         : file_(std::move(file)), settings_(std::move(settings)), calls_(calls), scratch_(std::move(scratch)) {}
 
-    // Opened at the first call; throws std::runtime_error where arhost-worker would refuse it.
+    // The first call opens the plugin; throws std::runtime_error if arhost-worker would reject it.
     const arhost_entry_point &entry();
     const arhost_plugin &plugin();
     const arhost_descriptor &descriptor() { return *plugin().descriptor; }
-    const arhost_option_descriptor *option(const std::string &key); // nullptr: not declared
+    const arhost_option_descriptor *option(const std::string &key); // nullptr if not declared
 
     const std::filesystem::path &file() const { return file_; }
     const Settings &settings() const { return settings_; }
@@ -74,7 +72,7 @@ private:
 
 using ipc::options_of;
 
-// The value that a text is for an option, or why it is none.
+// Parses an option's value. Throws std::runtime_error if it is invalid.
 arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text);
 
 class Host {
@@ -87,12 +85,12 @@ public:
     void cancel() { cancelled_ = true; }
     bool is_cancelled() const { return cancelled_; }
     std::vector<std::string> log() const;
-    std::string last_error() const; // "": there was none
+    std::string last_error() const; // empty if there was none
 
 private:
     static Host &self(const arhost_host *host) { return *static_cast<Host *>(host->context); }
     arhost_host host_;
-    mutable std::mutex mutex_; // plugins log on threads of their own
+    mutable std::mutex mutex_; // plugins may log from any thread
     std::vector<std::string> log_;
     std::string last_error_;
     std::atomic<bool> cancelled_{false};
@@ -101,20 +99,20 @@ private:
 // From create to destroy.
 class Instance {
 public:
-    // `overrides` stand above the user's settings. An output path keeps its name and lies in `folder` of the
-    // scratch folder.
+    // `overrides` take precedence over the user's settings. An output path keeps its file name but is placed in
+    // `folder` of the scratch folder.
     explicit Instance(PluginLibrary &library, Settings overrides = {}, std::filesystem::path folder = {});
     ~Instance() { destroy(); }
     Instance(const Instance &) = delete;
     Instance &operator=(const Instance &) = delete;
 
-    // What the host of a newer ABI passes besides.
+    // What the host of a newer ABI adds.
     struct Newer {
-        std::size_t bytes = 0; // behind each option; garbage here
-        bool option = false;   // behind the declared ones
+        std::size_t bytes = 0; // of garbage after each option
+        bool option = false;   // an unknown one after the declared ones
     };
     void create_or_fail(Newer newer);  // throws Failure
-    arhost_status create(Newer newer); // as it comes
+    arhost_status create(Newer newer); // any status
     void create_or_fail() { create_or_fail({}); }
     arhost_status create() { return create({}); }
     void destroy();
@@ -123,7 +121,7 @@ public:
     Host &host() { return host_; }
     PluginLibrary &library() const { return library_; }
 
-    // Throws Failure unless `status` is ARHOST_STATUS_OK, with what the plugin said.
+    // Throws Failure with the plugin's last error unless `status` is ARHOST_STATUS_OK.
     void expect_ok(const char *call, arhost_status status) const;
 
 private:
@@ -134,10 +132,10 @@ private:
     arhost_instance *instance_ = nullptr;
 };
 
-// "OK", "INVALID_ARGUMENT", …; "0, which is no status".
+// "OK", "INVALID_ARGUMENT", …; "0, which is not a status".
 std::string status_name(arhost_status status);
 
-// What a plugin's function returned: "read returned IO: the camera is gone".
-std::string told(const char *call, arhost_status status, const Host &host);
+// For example "read returned IO: the camera was unplugged".
+std::string call_result(const char *call, arhost_status status, const Host &host);
 
 } // namespace arhost::conformance

@@ -17,9 +17,9 @@
 namespace arhost::conformance {
 namespace {
 
-constexpr double margin = 1.0 / 8; // of paper, over the marker's side
+constexpr double margin = 1.0 / 8; // width of the paper's margin relative to the marker's side
 
-// '#' is ink. Upright as AprilTag's own library draws them.
+// '#' is ink. Same orientation as in the AprilTag library.
 struct Tag {
     int id;
     std::array<std::string_view, 8> rows;
@@ -49,7 +49,7 @@ Print read_print(int id, const std::filesystem::path &file) {
         throw refuse(png.message);
     if (png.width != png.height) {
         png_image_free(&png);
-        throw refuse("the picture must be square: the part of the print that the corners bound");
+        throw refuse("the picture must be square: the part of the print between the corners");
     }
     png.format = PNG_FORMAT_GRAY;
     Print print{id, png.width, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(png))};
@@ -60,7 +60,7 @@ Print read_print(int id, const std::filesystem::path &file) {
 }
 
 constexpr std::uint32_t rays = 32;
-using Offsets = std::array<glm::dvec2, rays>; // in the pixel's square, from (0, 0) to (1, 1)
+using Offsets = std::array<glm::dvec2, rays>; // within a pixel, from (0, 0) to (1, 1)
 
 Offsets hammersley() {
     Offsets offsets;
@@ -78,21 +78,21 @@ glm::dvec3 ray_at(const shading::Lens &lens, double x, double y) {
     return ray ? glm::dvec3(ray->x, ray->y, ray->z) : glm::dvec3(0, 0, -1);
 }
 
-// From rays (OpenCV's axes) to a marker's plane.
+// Intersects rays (OpenCV's axes) with a marker's plane.
 struct View {
     const Placed &marker;
     glm::dmat3 marker_from_ray;
-    std::uint32_t left, top, right, bottom; // of the pixels where it may be seen; right and bottom are outside
+    std::uint32_t left, top, right, bottom; // pixels that may show it; right and bottom are exclusive
 
     View(const arhost_intrinsics &camera, const Placed &placed) : marker(placed) {
         const Pose &m = placed.camera_from_marker;
         const glm::dmat3 cv_from_gl(1, 0, 0, 0, -1, 0, 0, 0, -1);
         marker_from_ray = glm::inverse(cv_from_gl * glm::dmat3(m[0], m[1], m[3]));
-        const double reach = placed.side_mm * (0.5 + margin);
+        const double half = placed.side_mm * (0.5 + margin);
         glm::dvec2 low(1e9), high(-1e9);
-        for (int i = 0; i < 32; ++i) { // a lens bends the edges outwards
-            const double along = reach * ((i % 8) / 3.5 - 1);
-            const glm::dvec2 edge[] = {{along, -reach}, {along, reach}, {-reach, along}, {reach, along}};
+        for (int i = 0; i < 32; ++i) { // a lens may bend the edges outwards
+            const double along = half * ((i % 8) / 3.5 - 1);
+            const glm::dvec2 edge[] = {{along, -half}, {along, half}, {-half, along}, {half, along}};
             const glm::dvec2 px = pixel_of(camera, m * glm::dvec4(edge[i / 8], 0, 1));
             low = glm::min(low, px);
             high = glm::max(high, px);
@@ -100,24 +100,25 @@ struct View {
         const auto clamped = [](double px, std::uint32_t limit) {
             return static_cast<std::uint32_t>(std::clamp(px, 0.0, static_cast<double>(limit)));
         };
-        constexpr double spare = 2;
-        left = clamped(low.x - spare, camera.width), top = clamped(low.y - spare, camera.height);
-        right = clamped(high.x + spare, camera.width), bottom = clamped(high.y + spare, camera.height);
+        constexpr double margin_px = 2;
+        left = clamped(low.x - margin_px, camera.width), top = clamped(low.y - margin_px, camera.height);
+        right = clamped(high.x + margin_px, camera.width), bottom = clamped(high.y + margin_px, camera.height);
     }
 
-    // Where a ray meets the marker's plane, in its sides: (0, 0) is the print's top left, (1, 1) its bottom right.
-    std::optional<glm::dvec2> met_by(const glm::dvec3 &ray) const {
+    // Intersection with the marker's plane in units of its side: (0, 0) is the print's top left, (1, 1) its bottom
+    // right.
+    std::optional<glm::dvec2> intersect(const glm::dvec3 &ray) const {
         const glm::dvec3 at = marker_from_ray * ray;
         if (at.z <= 0)
             return std::nullopt;
         return glm::dvec2(0.5 + at.x / at.z / marker.side_mm, 0.5 - at.y / at.z / marker.side_mm);
     }
-    // The code there; nothing where there is no paper.
+    // The code at a point; nullopt outside the paper.
     std::optional<int> code(const glm::dvec2 &at) const {
-        const double least = std::min(at.x, at.y), most = std::max(at.x, at.y);
-        if (least < -margin || most > 1 + margin)
+        const double low = std::min(at.x, at.y), high = std::max(at.x, at.y);
+        if (low < -margin || high > 1 + margin)
             return std::nullopt;
-        if (least < 0 || most >= 1)
+        if (low < 0 || high >= 1)
             return paper_code;
         const auto [column, row] = cell(at);
         return ink_code +
@@ -131,22 +132,23 @@ struct View {
                 static_cast<int>(std::floor(at.y * marker.print.side))};
     }
 
-    // The mean over a pixel, before what is there. The rays: at its top left corner, and from there to the next ones.
+    // Mean code of a pixel over `background`. The rays go through its top left corner and the corners right of and
+    // below it.
     std::uint8_t mean(const glm::dvec3 &corner, const glm::dvec3 &right_of, const glm::dvec3 &below,
-                      const Offsets &offsets, std::uint8_t behind) const {
-        // Within a pixel any lens is linear enough.
+                      const Offsets &offsets, std::uint8_t background) const {
+        // Within a pixel the lens is approximately linear.
         const glm::dvec3 right = right_of - corner, down = below - corner;
-        const auto met = [&](double u, double v) { return met_by(corner + right * u + down * v); };
+        const auto hit = [&](double u, double v) { return intersect(corner + right * u + down * v); };
         const auto same = [&](const std::optional<glm::dvec2> &a, const std::optional<glm::dvec2> &b) {
             return a && b && cell(*a) == cell(*b) && code(*a) == code(*b);
         };
-        const auto first = met(0, 0);
-        if (same(first, met(1, 0)) && same(first, met(0, 1)) && same(first, met(1, 1))) // most pixels
-            return static_cast<std::uint8_t>(code(*first).value_or(behind));
+        const auto first = hit(0, 0);
+        if (same(first, hit(1, 0)) && same(first, hit(0, 1)) && same(first, hit(1, 1))) // most pixels
+            return static_cast<std::uint8_t>(code(*first).value_or(background));
         int sum = 0;
         for (const glm::dvec2 &offset : offsets) {
-            const auto at = met(offset.x, offset.y);
-            sum += (at ? code(*at) : std::nullopt).value_or(behind);
+            const auto at = hit(offset.x, offset.y);
+            sum += (at ? code(*at) : std::nullopt).value_or(background);
         }
         return static_cast<std::uint8_t>((sum + rays / 2) / rays);
     }
@@ -206,7 +208,7 @@ Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers) {
     for (const Placed &marker : markers)
         views.emplace_back(camera, marker);
     for (const View &view : views) {
-        const auto rays_at = [&](std::uint32_t row) { // at the pixels' top corners
+        const auto rays_at = [&](std::uint32_t row) { // through the pixels' top left corners
             std::vector<glm::dvec3> found;
             found.reserve(view.right - view.left + 1);
             for (std::uint32_t x = view.left; x <= view.right; ++x)
@@ -242,18 +244,18 @@ std::array<glm::dvec2, 4> corners_of(const arhost_intrinsics &camera, const Plac
 }
 
 Grey blurred(const Grey &image, double sigma_px) {
-    const int reach = static_cast<int>(std::ceil(3 * sigma_px));
+    const int radius = static_cast<int>(std::ceil(3 * sigma_px));
     std::vector<double> weights;
     double sum = 0;
-    for (int i = -reach; i <= reach; ++i)
+    for (int i = -radius; i <= radius; ++i)
         sum += weights.emplace_back(std::exp(-i * i / (2 * sigma_px * sigma_px)));
-    // Along rows into an image that is turned, twice.
+    // Filters along rows into a transposed image; applied twice.
     const auto pass = [&](const Grey &from) {
         return filled(from.height, from.width, [&](auto y, auto x) {
             double mean = 0;
-            for (int i = -reach; i <= reach; ++i) {
+            for (int i = -radius; i <= radius; ++i) {
                 const int at = std::clamp(static_cast<int>(x) + i, 0, static_cast<int>(from.width) - 1);
-                mean += weights[i + reach] / sum * from.at(static_cast<std::uint32_t>(at), y);
+                mean += weights[i + radius] / sum * from.at(static_cast<std::uint32_t>(at), y);
             }
             return static_cast<int>(std::lround(mean));
         });

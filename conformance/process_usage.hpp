@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What this process holds, to see what a plugin leaves behind.
+// Descriptors, threads and memory of this process, to detect a plugin's leaks.
 #pragma once
 
 #include "conformance/test.hpp"
@@ -18,11 +17,11 @@ namespace arhost::conformance {
 
 struct ProcessUsage {
     long descriptors, threads;
-    long allocated_kib; // by malloc; to the byte, wherever in the heap there was room
-    long dirty_kib;     // all of its own memory, whoever has mapped it, that has been written to
+    long allocated_kib; // by malloc, including allocations that reuse free heap memory
+    long dirty_kib;     // all private memory that has been written to, whoever mapped it
 
     static ProcessUsage now() {
-        ::malloc_trim(0); // what is free in the arenas of a driver's threads is no one's
+        ::malloc_trim(0); // returns free memory in the arenas of driver threads
         const auto heap = ::mallinfo2();
         return {descriptors_now(), entries("/proc/self/task"),
                 static_cast<long>((heap.uordblks + heap.hblkhd) / 1024), dirty_kib_now()};
@@ -35,23 +34,23 @@ private:
         return static_cast<long>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
     }
     static long dirty_kib_now() {
-        std::ifstream pages("/proc/self/smaps_rollup"); // counted one by one, unlike those of statm
+        std::ifstream pages("/proc/self/smaps_rollup"); // exact, unlike statm
         long kib = 0;
-        if (!pages) { // a kernel without it
+        if (!pages) { // not in this kernel
             long size = 0, resident = 0;
             if (!(std::ifstream("/proc/self/statm") >> size >> resident))
-                throw std::runtime_error("/proc/self/statm does not tell this process's memory");
+                throw std::runtime_error("/proc/self/statm can't be parsed");
             return resident * (::sysconf(_SC_PAGESIZE) / 1024);
         }
         for (std::string word; pages >> word && word != "Private_Dirty:";)
             pages.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
         if (!(pages >> kib))
-            throw std::runtime_error("/proc/self/smaps_rollup does not tell this process's memory");
+            throw std::runtime_error("/proc/self/smaps_rollup can't be parsed");
         return kib;
     }
 };
 
-// What has grown since `before` although nothing should have; empty: nothing. The allocator may keep some memory.
+// Describes what has grown since `before`; empty if nothing has. The allocator may keep kib_allowed.
 inline std::string growth(const ProcessUsage &before, const ProcessUsage &after, long kib_allowed) {
     const auto grown = [](long from, long to, const char *what) {
         return fmt::format("from {} {} to {}", from, what, to);
@@ -67,36 +66,36 @@ inline std::string growth(const ProcessUsage &before, const ProcessUsage &after,
     return {};
 }
 
-// What `work` leaves behind each time; empty: nothing. What pools and caches take they take once: only a leak grows
-// as often as one looks.
+// Describes what grows each time `work` runs; empty if nothing does. Pools and caches grow once; a leak grows every
+// time.
 template <class Work> std::string growth_by(Work &&work, long kib_allowed) {
-    constexpr int looks = 5;
+    constexpr int repetitions = 5;
     std::string grown;
-    for (int look = 0; look < looks; ++look) {
+    for (int i = 0; i < repetitions; ++i) {
         const ProcessUsage before = ProcessUsage::now();
         work();
         const ProcessUsage after = ProcessUsage::now();
         grown = growth(before, after, kib_allowed);
         const bool is_of_memory = after.descriptors <= before.descriptors && after.threads <= before.threads;
-        if (grown.empty() || (look > 0 && !is_of_memory)) // of the others there soon is none left
+        if (grown.empty() || (i > 0 && !is_of_memory)) // descriptors and threads run out soon
             break;
     }
     return grown;
 }
 
-// `run(frames)` is a start, so many frames, and a stop. Who leaks a KiB a frame, or 40 a start, is found.
+// `run(frames)` starts, processes that many frames, and stops. Detects 1 KiB leaked per frame, or 40 KiB per start.
 template <class Run> void expect_no_leak(Run &&run) {
     constexpr int frames = 40;
     constexpr long kib_allowed = 150, many_descriptors = 100;
     int starts = 0;
-    const auto work = [&](int most) {
+    const auto work = [&](int max_starts) {
         const long before = ProcessUsage::descriptors_now();
-        for (starts = 0; starts < most && ProcessUsage::descriptors_now() < before + many_descriptors; ++starts)
-            run(frames); // while descriptors are left
+        for (starts = 0; starts < max_starts && ProcessUsage::descriptors_now() < before + many_descriptors; ++starts)
+            run(frames); // stops before descriptors run out
     };
     work(2); // to warm up
     if (const std::string grown = growth_by([&] { work(5); }, kib_allowed); !grown.empty())
-        throw Failure(fmt::format("{} starts with {} frames each led {}", starts, frames, grown));
+        throw Failure(fmt::format("after {} starts with {} frames each, the process grew {}", starts, frames, grown));
 }
 
 } // namespace arhost::conformance

@@ -31,8 +31,8 @@ glm::dvec2 project(const arhost_intrinsics &in, const glm::dvec3 &point) {
 }
 
 glm::dvec2 silhouette_centroid(const arhost_camera &camera, const glm::dvec3 &centre, double radius) {
-    // The rays that touch the sphere form a cone; its rim in the image is taken as a polygon, whose centroid
-    // follows from the triangles that its edges make with the origin.
+    // The tangent rays of the sphere form a cone. Its outline in the image is approximated by a polygon, whose
+    // centroid is that of the triangles between its edges and the origin.
     const glm::dvec3 c = in_camera(camera, centre), axis = glm::normalize(c);
     const glm::dvec3 a = glm::normalize(glm::cross(axis, glm::dvec3(0, 1, 0))), b = glm::cross(axis, a);
     const double angle = std::asin(radius / glm::length(c));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Where a sphere must be seen, by the formulas of arhost/camera.h alone.
+// Projection of spheres by the formulas of arhost/camera.h.
 #pragma once
 
 #include "conformance/picture.hpp"
@@ -17,13 +16,13 @@ namespace arhost::conformance {
 // A world point in the camera's OpenCV axes: x right, y down, z forward.
 glm::dvec3 in_camera(const arhost_camera &camera, const glm::dvec3 &world);
 
-// The pixel at which a point, in the camera's axes, is seen. z > 0; no lens or Brown's.
+// The pixel of a point in the camera's axes with z > 0; no lens distortion, or Brown's model.
 glm::dvec2 project(const arhost_intrinsics &intrinsics, const glm::dvec3 &point);
 
-// Centroid of a sphere's silhouette. The sphere lies in front of the camera altogether.
+// Centroid of a sphere's silhouette. The whole sphere must be in front of the camera.
 glm::dvec2 silhouette_centroid(const arhost_camera &camera, const glm::dvec3 &centre, double radius);
 
-// Where the alpha is at least 128, each pixel counted whole: nothing where it is nowhere.
+// Centroid of the pixels with an alpha of 128 or more, equally weighted; nullopt if there are none.
 std::optional<glm::dvec2> centroid(const Picture &picture);
 
 } // namespace arhost::conformance

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What is transparent, what covers, and what shadows do.
+// Alpha: transparency, coverage and shadows.
 #include "conformance/expect.hpp"
 #include "conformance/tracer.hpp"
 
 namespace arhost::conformance {
 namespace {
 
-constexpr double rim = 1.5; // px on both sides of a silhouette that are not looked at
+constexpr double rim = 1.5; // px on both sides of a silhouette that are not checked
 constexpr int opaque = 153, translucent = 77;
 
 // A sphere of radius 30 at the origin, seen from (0, 0, 200): its silhouette has this radius.
@@ -58,7 +57,8 @@ void near_the_eye(Context &context) {
             constexpr double radius = 48; // of 51.6 px: the sine is 1/4
             const Pixel p = picture.at(x, y);
             if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // 231 and 255
-                return fmt::format("a bright sphere {} mm before the eye is not seen, but {}", mm, text_of(p));
+                return fmt::format("a bright sphere {} mm in front of the eye is not visible; the pixel is {}", mm,
+                                   text_of(p));
             return std::string();
         });
     }
@@ -67,14 +67,14 @@ void near_the_eye(Context &context) {
 void depth_order(Context &context) {
     scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
     const std::uint32_t bright = builder.add_material(glowing(glm::vec3(0.8f)));
-    for (const float z : {-60.0f, 60.0f}) // the one behind is hidden
+    for (const float z : {-60.0f, 60.0f}) // the farther one is hidden
         builder.add_object("small", builder.add_spheres({{0, 0, z, 8}}), bright);
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
         const int code = picture.at(x, y)[0];
-        if (r < 8 && code < 150) // 231, be it a fifth too dark
-            return fmt::format("the near sphere is bright, the code is {}: something farther is seen", code);
+        if (r < 8 && code < 150) // 231; passes if a fifth too dark
+            return fmt::format("the near sphere is bright, but the code is {}: a farther object is visible", code);
         if (r > 20 && r < 25 && code > 120) // 89
             return fmt::format("only the large, dark sphere is here, the code is {}", code);
         return std::string();
@@ -93,10 +93,10 @@ void occluder(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
         const int alpha = picture.alpha(x, y);
-        if (r < 12 && alpha > 2) // a screen of ±14 px; whether it is exactly 0, miss-alpha asks
-            return fmt::format("an occluder is before the sphere, alpha is {} and must be 0", alpha);
+        if (r < 12 && alpha > 2) // a screen of ±14 px; miss-alpha checks for exactly 0
+            return fmt::format("an occluder hides the sphere, alpha is {} and must be 0", alpha);
         if (r > 22 && r < silhouette - rim && alpha < 250)
-            return fmt::format("the sphere is seen past the occluder, alpha is {} and must be 255", alpha);
+            return fmt::format("the occluder does not hide the sphere here, alpha is {} and must be 255", alpha);
         return std::string();
     });
 }
@@ -130,7 +130,7 @@ void translucent_shadow(Context &context) {
 
 void catcher_in_light(Context &context) {
     const Picture picture = Tracer(context, ball_over_catcher(diffuse(glm::vec3(0.5f)))).render(from_front());
-    // Left of the shadow, and above and below; mirrored images included.
+    // Left of, above and below the shadow; also valid for mirrored images.
     expect_pixels(picture, [&](auto x, auto y) {
         const bool far = distance_from_centre(picture, x, y) > 24;
         const bool ball = std::abs(y - (picture.height() - 1) / 2.0) < 22;
@@ -141,7 +141,7 @@ void catcher_in_light(Context &context) {
 
 void stronger_shadow_wins(Context &context) {
     scene::ArenaBuilder builder = ball_over_catcher(diffuse(glm::vec3(0.5f)));
-    // Between lamp and ball, beyond the image: its shadow covers a half of the ball's, and more beside it.
+    // Between lamp and ball, outside the image: its shadow covers half of the ball's and extends beyond it.
     builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     // The glass ball's shadow (20 mm about y = 17.5) covers the upper half of the other (15 mm about y = 0).
@@ -184,9 +184,9 @@ void straight_alpha(Context &context) {
         edges += edge ? 1 : 0;
         return !edge || std::abs(p[1] - inside) <= 4
                    ? ""
-                   : fmt::format(
-                         "alpha is {}, green is {} and must be {} as where the sphere covers wholly (straight alpha)",
-                         p[3], p[1], inside);
+                   : fmt::format("alpha is {}, green is {} and must be {} as where the sphere covers the whole pixel "
+                                 "(straight alpha)",
+                                 p[3], p[1], inside);
     });
     if (edges == 0)
         throw Skip("no pixel is partly covered");
@@ -195,25 +195,26 @@ void straight_alpha(Context &context) {
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.empty-scene", "Of a scene without objects every alpha is 0.", kind, gate, 20s, empty_scene},
+    {"raytracer.empty-scene", "A scene without objects has alpha 0 everywhere.", kind, gate, 20s, empty_scene},
     {"raytracer.miss-alpha", "Where no ray hits, alpha is exactly 0.", kind, gate, 20s, miss_alpha},
     {"raytracer.hit-alpha", "Where every ray hits a virtual object, alpha is exactly 255.", kind, gate, 20s,
      hit_alpha},
-    {"raytracer.straight-alpha", "Where an object covers a part of a pixel, its colour is not multiplied by alpha.",
-     kind, gate, 20s, straight_alpha},
-    {"raytracer.inside-sphere", "A camera inside an object sees it everywhere.", kind, gate, 20s, inside_sphere},
-    {"raytracer.near-the-eye", "What is a twentieth of a millimetre before the eye is seen.", kind, gate, 20s,
-     near_the_eye},
+    {"raytracer.straight-alpha", "The colour of a partly covered pixel is not premultiplied by alpha.", kind, gate,
+     20s, straight_alpha},
+    {"raytracer.inside-sphere", "A camera inside an object sees the object in every pixel.", kind, gate, 20s,
+     inside_sphere},
+    {"raytracer.near-the-eye", "Objects 0.05 mm in front of the eye are visible.", kind, gate, 20s, near_the_eye},
     {"raytracer.depth-order", "The nearer object hides the farther one.", kind, gate, 20s, depth_order},
-    {"raytracer.occluder", "An occluder hides what is behind it, and nothing else.", kind, gate, 20s, occluder},
-    {"raytracer.catcher-in-light", "A catcher in the light is not seen.", kind, gate, 20s, catcher_in_light},
-    {"raytracer.opaque-shadow", "On a catcher, the shadow of an opaque body is black with alpha 153.", kind, gate,
+    {"raytracer.occluder", "An occluder hides only what is behind it.", kind, gate, 20s, occluder},
+    {"raytracer.catcher-in-light", "A lit shadow catcher is invisible.", kind, gate, 20s, catcher_in_light},
+    {"raytracer.opaque-shadow", "The shadow of an opaque object on a catcher is black with alpha 153.", kind, gate,
      20s, opaque_shadow},
-    {"raytracer.translucent-shadow", "On a catcher, the shadow of a glass body is black with alpha 77.", kind, gate,
+    {"raytracer.translucent-shadow", "The shadow of a glass object on a catcher is black with alpha 77.", kind, gate,
      20s, translucent_shadow},
-    {"raytracer.stronger-shadow-wins", "Where shadows of both classes overlap, alpha is that of the opaque one.",
-     kind, gate, 20s, stronger_shadow_wins},
-    {"raytracer.shadow-alpha-of-scene", "A scene that sets other shadow alphas gets these.", kind, gate, 20s,
+    {"raytracer.stronger-shadow-wins",
+     "Where opaque and translucent shadows overlap, alpha is that of the opaque one.", kind, gate, 20s,
+     stronger_shadow_wins},
+    {"raytracer.shadow-alpha-of-scene", "The shadow alphas are those of the scene.", kind, gate, 20s,
      shadow_alpha_of_the_scene},
 };
 

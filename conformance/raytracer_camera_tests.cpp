@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Where things are seen. One sample a pixel leaves a centroid uncertain by some hundredths of a pixel, so the
-// narrow bounds are on means over several places.
+// Projection. With one sample per pixel a centroid is uncertain by some hundredths of a pixel, so narrow bounds apply
+// to means over several positions.
 #include "conformance/expect.hpp"
 #include "conformance/projection.hpp"
 #include "conformance/tracer.hpp"
@@ -15,7 +14,7 @@ namespace {
 glm::dvec2 seen_at(const Picture &picture) {
     const auto at = centroid(picture);
     if (!at)
-        throw Failure("a sphere in full view is not seen: no alpha is 128 or more").with("rendered", picture);
+        throw Failure("a sphere in view is not visible: no alpha is 128 or more").with("rendered", picture);
     return *at;
 }
 
@@ -30,7 +29,7 @@ void expect_near(const glm::dvec2 &is, const glm::dvec2 &should, double toleranc
 }
 
 void pixel_centres(Context &context) {
-    // Pairs on both sides of the axis: their mean is on it, whichever way the image is turned.
+    // Pairs on both sides of the axis: their mean is on it, even if the image is mirrored.
     constexpr int pairs = 10;
     Tracer tracer(context, one_sphere({0, 0, 0, 30}));
     glm::dvec2 sum(0);
@@ -116,7 +115,7 @@ void eye_look_at_up(Context &context) {
         if (seen.z < 100 || std::abs(should.x - 79.5) > 55 || std::abs(should.y - 59.5) > 35 || off < 30 ||
             glm::length(glm::cross(glm::normalize(look_at - eye), glm::dvec3(view.up[0], view.up[1], view.up[2]))) <
                 0.2)
-            continue; // not all of it in view, or too near the axis to tell much
+            continue; // partly out of view, or too near the axis to be significant
         const Picture picture = tracer.render(view);
         const glm::dvec2 is = seen_at(picture);
         expect_near(is, should, 0.25,
@@ -152,14 +151,14 @@ void lens(Context &context) {
 
 void crop(Context &context) {
     Tracer tracer(context, still_life());
-    const Picture whole = tracer.render(of_still_life());
+    const Picture whole = tracer.render(still_life_camera());
     arhost_intrinsics part = pinhole();
     constexpr std::uint32_t x0 = 41, y0 = 30;
     part.width = 77;
     part.height = 61;
     part.cx -= x0;
     part.cy -= y0;
-    const Picture cropped = tracer.render(of_still_life(part));
+    const Picture cropped = tracer.render(still_life_camera(part));
     Picture expected(part.width, part.height);
     for (std::uint32_t y = 0; y < part.height; ++y)
         for (std::uint32_t x = 0; x < part.width; ++x)
@@ -170,8 +169,8 @@ void crop(Context &context) {
 void moved_with_camera(Context &context) {
     glm::dmat4 moved = glm::translate(glm::dmat4(1), glm::dvec3(300, -200, 150));
     moved = glm::rotate(moved, context.uniform(0.5, 2), glm::normalize(glm::dvec3(1, -2, 0.5)));
-    const Picture here = Tracer(context, still_life()).render(of_still_life());
-    const Picture there = Tracer(context, still_life(glm::mat4(moved))).render(of_still_life(pinhole(), moved));
+    const Picture here = Tracer(context, still_life()).render(still_life_camera());
+    const Picture there = Tracer(context, still_life(glm::mat4(moved))).render(still_life_camera(pinhole(), moved));
     expect_alike(there, here, "the scene moved together with its camera looks different", 3, 0.01);
 }
 
@@ -188,8 +187,8 @@ void moving_object(Context &context) {
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, radius}}),
                        builder.add_material(glowing(glm::vec3(0.5f))), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), motion);
     Tracer tracer(context, std::move(builder));
-    for (const double way : {0.0, 15.0, 30.0})
-        for (const glm::dvec3 &to : {glm::dvec3(way, way / 2, 0), glm::dvec3(-way, -way / 2, 0)}) {
+    for (const double mm : {0.0, 15.0, 30.0})
+        for (const glm::dvec3 &to : {glm::dvec3(mm, mm / 2, 0), glm::dvec3(-mm, -mm / 2, 0)}) {
             arhost_moved_object moved{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
             for (int i = 0; i < 3; ++i)
                 moved.world_from_object[9 + i] = static_cast<float>(to[i]);
@@ -208,19 +207,20 @@ void moving_object(Context &context) {
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.pixel-centres", "A pixel's ray goes through its centre, which is at integers, to 0.02 px.", kind,
-     gate, 30s, pixel_centres},
+    {"raytracer.pixel-centres", "Rays go through pixel centres, which are at integers, to 0.02 px.", kind, gate, 30s,
+     pixel_centres},
     {"raytracer.focal-length", "fx and fy are those of the intrinsics.", kind, gate, 20s, focal_length},
-    {"raytracer.orientation", "Right is right, and the first row is at the top.", kind, gate, 20s, orientation},
-    {"raytracer.principal-point", "The axis is seen at the principal point, wherever that is.", kind, gate, 20s,
-     principal_point},
-    {"raytracer.eye-look-at-up", "Of any eye, look-at and up a sphere is seen where the analytic projection has it.",
+    {"raytracer.orientation", "The image is not mirrored; its first row is at the top.", kind, gate, 20s,
+     orientation},
+    {"raytracer.principal-point", "The optical axis projects to the principal point, wherever that is.", kind, gate,
+     20s, principal_point},
+    {"raytracer.eye-look-at-up", "For any eye, look-at and up, a sphere is where the analytic projection puts it.",
      kind, gate, 30s, eye_look_at_up},
-    {"raytracer.lens", "One that traces the lens bends its rays by Brown's model.", kind, gate, 20s, lens},
-    {"raytracer.crop", "A part of an image is the image of a camera with that part.", kind, gate, 20s, crop},
-    {"raytracer.moved-with-camera", "A scene that is moved together with its camera looks the same.", kind, gate, 20s,
+    {"raytracer.lens", "A ray tracer with LENS_DISTORTION distorts rays by Brown's model.", kind, gate, 20s, lens},
+    {"raytracer.crop", "A camera for a crop of the image renders that crop.", kind, gate, 20s, crop},
+    {"raytracer.moved-with-camera", "A scene moved together with its camera looks the same.", kind, gate, 20s,
      moved_with_camera},
-    {"raytracer.moving-object", "An object is where the request's motion has it.", kind, gate, 20s, moving_object},
+    {"raytracer.moving-object", "Objects are where the request's motion puts them.", kind, gate, 20s, moving_object},
 };
 
 } // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The image as memory, the same image again, and the reference's image.
+// The image's memory, determinism, and the reference image.
 #include "conformance/expect.hpp"
 #include "conformance/tracer.hpp"
 
@@ -50,7 +49,7 @@ void sizes(Context &context) {
 }
 
 void region(Context &context) {
-    bool told = false;
+    bool reported = false;
     for (const glm::dvec3 &aside : {glm::dvec3(0), glm::dvec3(50, 30, 0), glm::dvec3(-70, -50, 0)}) {
         const glm::dvec3 eye = glm::dvec3(0, 0, 200) + aside;
         Tracer tracer(context, one_sphere({0, 0, 0, 25}));
@@ -58,7 +57,7 @@ void region(Context &context) {
         const arhost_render_info &info = tracer.info();
         if (!info.has_region)
             continue;
-        told = true;
+        reported = true;
         const std::uint64_t right = std::uint64_t{info.region_x} + info.region_width,
                             bottom = std::uint64_t{info.region_y} + info.region_height;
         if (right > picture.width() || bottom > picture.height())
@@ -69,59 +68,59 @@ void region(Context &context) {
             const int alpha = picture.alpha(x, y);
             return inside || alpha <= 2
                        ? ""
-                       : fmt::format("outside of the told region, {}×{} at ({}, {}), alpha is {}", info.region_width,
+                       : fmt::format("outside the reported region, {}×{} at ({}, {}), alpha is {}", info.region_width,
                                      info.region_height, info.region_x, info.region_y, alpha);
         });
     }
-    if (!told)
-        throw Skip("it tells no region");
+    if (!reported)
+        throw Skip("it reports no region");
 }
 
 void device_time(Context &context) {
-    bool told = false;
+    bool reported = false;
     Tracer tracer(context, still_life());
-    for (int image = 1; image <= 3; ++image) { // of one after another: it may be that of all
-        tracer.render(of_still_life());
+    for (int image = 1; image <= 3; ++image) { // several, because a device time may accumulate
+        tracer.render(still_life_camera());
         const auto ms = [](auto ns) { return 1e-6 * static_cast<double>(ns); };
-        const double device_ms = ms(tracer.info().device_time_ns), took_ms = ms(tracer.took().count());
+        const double device_ms = ms(tracer.info().device_time_ns), took_ms = ms(tracer.duration().count());
         if (device_ms > took_ms)
-            throw Failure(
-                fmt::format("of image {} it tells {:.3f} ms for the device's time, and render took {:.3f} ms", image,
-                            device_ms, took_ms));
-        told = told || device_ms > 0;
+            throw Failure(fmt::format("for image {} it reports a device time of {:.3f} ms, but render took {:.3f} ms",
+                                      image, device_ms, took_ms));
+        reported = reported || device_ms > 0;
     }
-    if (!told)
-        throw Skip("it tells no device's time");
+    if (!reported)
+        throw Skip("it reports no device time");
 }
 
 // ---- Sameness --------------------------------------------------------------------------------------
 
 void deterministic(Context &context) {
     Tracer tracer(context, still_life()), other(context, still_life());
-    const Picture first = tracer.render(of_still_life());
-    expect_alike(tracer.render(of_still_life()), first, "the same request gives different bytes the second time");
-    expect_alike(tracer.render(of_still_life()), first, "the same request gives different bytes the third time");
-    expect_alike(other.render(of_still_life()), first, "the same request gives different bytes in another instance");
+    const Picture first = tracer.render(still_life_camera());
+    expect_alike(tracer.render(still_life_camera()), first, "the same request gives different bytes the second time");
+    expect_alike(tracer.render(still_life_camera()), first, "the same request gives different bytes the third time");
+    expect_alike(other.render(still_life_camera()), first,
+                 "the same request gives different bytes in another instance");
 }
 
 void frames_before(Context &context) {
     Tracer tracer(context, still_life());
-    const arhost_camera here = of_still_life(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
+    const arhost_camera here = still_life_camera(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
     const Picture first = tracer.render(here);
     const Picture second = tracer.render(there);
     expect_alike(tracer.render(here), first, "an image depends on the frame before it", 1);
     if (!first_difference(first, second, 1))
-        throw Failure("two cameras have the same image").with("rendered", first);
+        throw Failure("two different cameras give the same image").with("rendered", first);
 }
 
 void threads(Context &context) {
     const arhost_option_descriptor *option = context.library.option("threads");
     if (!option || option->type != ARHOST_OPTION_INTEGER)
         throw Skip("it has no integer option 'threads'");
-    const Picture one = Tracer(context, still_life(), {{"threads", "1"}}).render(of_still_life());
+    const Picture one = Tracer(context, still_life(), {{"threads", "1"}}).render(still_life_camera());
     for (const char *count : {"2", "3"})
-        expect_alike(Tracer(context, still_life(), {{"threads", count}}).render(of_still_life()), one,
-                     fmt::format("{} threads do not give the image of one", count), 1);
+        expect_alike(Tracer(context, still_life(), {{"threads", count}}).render(still_life_camera()), one,
+                     fmt::format("{} threads give another image than one", count), 1);
 }
 
 // ---- The reference ---------------------------------------------------------------------------------
@@ -129,11 +128,11 @@ void threads(Context &context) {
 void reference(Context &context) {
     if (!std::filesystem::is_regular_file(context.reference))
         throw std::runtime_error("the reference '" + context.reference.string() +
-                                 "' is not there; give --reference FILE");
+                                 "' does not exist; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
     Context of_reference{library, context.reference, context.random};
-    const Picture should = Tracer(of_reference, still_life()).render(of_still_life());
-    const Picture is = Tracer(context, still_life()).render(of_still_life());
+    const Picture should = Tracer(of_reference, still_life()).render(still_life_camera());
+    const Picture is = Tracer(context, still_life()).render(still_life_camera());
     // Edges, and reflections of edges, may lie a pixel elsewhere.
     double squares = 0;
     int compared = 0, alphas = 0;
@@ -177,21 +176,20 @@ void reference(Context &context) {
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.writes-every-pixel", "Every pixel is written, whatever was there.", kind, gate, 20s,
-     writes_every_pixel},
-    {"raytracer.writes-nothing-else", "No byte before, behind or between the rows is written.", kind, gate, 20s,
-     writes_nothing_else},
-    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes show what they should.", kind, gate,
-     20s, sizes},
-    {"raytracer.region", "Outside of the region that it tells every alpha is 0.", kind, gate, 20s, region},
-    {"raytracer.device-time", "The device's time that it tells of an image is no longer than render took.", kind,
-     gate, 20s, device_time},
-    {"raytracer.deterministic", "The same request gives the same bytes, again and in another instance.", kind, gate,
-     20s, deterministic},
+    {"raytracer.writes-every-pixel", "Every pixel is written.", kind, gate, 20s, writes_every_pixel},
+    {"raytracer.writes-nothing-else", "No byte outside the pixels is written.", kind, gate, 20s, writes_nothing_else},
+    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes are correct.", kind, gate, 20s,
+     sizes},
+    {"raytracer.region", "Alpha is 0 outside the reported region.", kind, gate, 20s, region},
+    {"raytracer.device-time", "The reported device time is at most the duration of render.", kind, gate, 20s,
+     device_time},
+    {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", kind,
+     gate, 20s, deterministic},
     {"raytracer.frames-before", "An image does not depend on the frames before it.", kind, gate, 20s, frames_before},
-    {"raytracer.threads", "Any number of threads gives the same image.", kind, gate, 20s, threads},
-    {"raytracer.reference", "The image is the reference ray tracer's: 40 dB inside, the same alpha but at edges.",
-     kind, gate, 30s, reference},
+    {"raytracer.threads", "The image does not depend on the number of threads.", kind, gate, 20s, threads},
+    {"raytracer.reference",
+     "The image matches the reference ray tracer's: 40 dB inside objects, the same alpha except at edges.", kind,
+     gate, 30s, reference},
 };
 
 } // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A ray tracer's life from start to stop, what it refuses, and what it survives.
+// A ray tracer from start to stop: rejected input, cancellation and unusual scenes.
 #include "conformance/cancelling.hpp"
 #include "conformance/expect.hpp"
 #include "conformance/frame_times.hpp"
@@ -26,7 +25,8 @@ void start_again(Context &context) {
     tracer.render(from_front());
     tracer.change_scene(still_life());
     const arhost_intrinsics smaller = pinhole(90, 70, 110);
-    expect_alike(tracer.render(of_still_life(smaller)), Tracer(context, still_life()).render(of_still_life(smaller)),
+    expect_alike(tracer.render(still_life_camera(smaller)),
+                 Tracer(context, still_life()).render(still_life_camera(smaller)),
                  "stopped, and started with another scene and size, it gives another image than a new instance", 1);
 }
 
@@ -34,7 +34,7 @@ void leaks(Context &context) {
     Tracer tracer(context, still_life());
     expect_no_leak([&](int frames) {
         for (int frame = 0; frame < frames; ++frame)
-            tracer.render(of_still_life(pinhole(40, 30, 50)));
+            tracer.render(still_life_camera(pinhole(40, 30, 50)));
         tracer.stop();
     });
 }
@@ -68,10 +68,10 @@ void not_finite(Context &context) {
         if (const arhost_status status = tracer.try_render(view, picture, info);
             status != ARHOST_STATUS_ERROR_INVALID_ARGUMENT && status != ARHOST_STATUS_OK)
             throw Failure(
-                fmt::format("with a camera that is not finite, render returned {}; it must be INVALID_ARGUMENT, "
+                fmt::format("with a camera with non-finite numbers, render returned {}; it must be INVALID_ARGUMENT, "
                             "or OK",
                             status_name(status)));
-    expect_alike(tracer.render(from_front()), before, "after a camera that is not finite, the image is another", 1);
+    expect_alike(tracer.render(from_front()), before, "after a camera with non-finite numbers, the image differs", 1);
 }
 
 void cancelled(Context &context) {
@@ -80,7 +80,7 @@ void cancelled(Context &context) {
     running.instance().host().cancel();
     Picture picture(160, 120);
     arhost_render_info info;
-    expect_ok_or_cancelled("render", running.try_render(of_still_life(), picture, info));
+    expect_ok_or_cancelled("render", running.try_render(still_life_camera(), picture, info));
     starting.instance().host().cancel();
     expect_ok_or_cancelled("start", starting.try_start(pinhole()));
 }
@@ -95,7 +95,7 @@ scene::ArenaBuilder hall_of_mirrors() {
 void cancel_while_rendering(Context &context) {
     for (const char *const *need = context.library.descriptor().needs; need && *need; ++need)
         if (*need == std::string_view("gpu"))
-            throw Skip("it needs 'gpu', and what a GPU has begun can't be called back");
+            throw Skip("it needs 'gpu', and work submitted to a GPU can't be cancelled");
     const arhost_intrinsics large = pinhole(1920, 1440, 1600); // seconds of work for a processor
     Tracer tracer(context, hall_of_mirrors());
     tracer.start(large);
@@ -113,9 +113,9 @@ void expect_sphere(const Picture &picture, double radius_px, const char *scene) 
         const double r = distance_from_centre(picture, x, y);
         const int alpha = picture.alpha(x, y);
         if (r < radius_px - 2 && alpha < 250)
-            return fmt::format("{}, the sphere is not seen: alpha is {}", scene, alpha);
+            return fmt::format("{}, the sphere is not visible: alpha is {}", scene, alpha);
         if (r > radius_px + 2 && alpha > 2)
-            return fmt::format("{}, something is seen beside the sphere: alpha is {}", scene, alpha);
+            return fmt::format("{}, something is visible outside the sphere: alpha is {}", scene, alpha);
         return std::string();
     });
 }
@@ -144,9 +144,9 @@ void far_away(Context &context) {
 
 void speed(Context &context) {
     Tracer tracer(context, still_life());
-    const arhost_camera view = of_still_life(pinhole(640, 480, 800));
+    const arhost_camera view = still_life_camera(pinhole(640, 480, 800));
     tracer.render(view);
-    judge_speed(context, 640, 480, frame_times_ms([&] { return tracer.render(view), true; }), 250);
+    check_speed(context, 640, 480, frame_times_ms([&] { return tracer.render(view), true; }), 250);
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
@@ -155,21 +155,23 @@ constexpr Test tests[] = {
     {"raytracer.render", "It renders an image of a scene in read-only memory.", kind, "raytracer.start", 30s, render},
     {"raytracer.start-again", "After a stop it starts with another scene and another size.", kind, "raytracer.render",
      30s, start_again},
-    {"raytracer.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind,
-     "raytracer.render", 60s, leaks},
-    {"raytracer.parallel-up", "An up that is parallel to the view is refused as INVALID_ARGUMENT.", kind,
+    {"raytracer.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, "raytracer.render",
+     60s, leaks},
+    {"raytracer.parallel-up", "An up vector parallel to the view is rejected with INVALID_ARGUMENT.", kind,
      "raytracer.render", 20s, parallel_up},
-    {"raytracer.not-finite", "A camera that is not finite is refused or drawn, and the next image is right.", kind,
+    {"raytracer.not-finite",
+     "A camera with non-finite numbers is rejected or rendered, and the next image is correct.", kind,
      "raytracer.render", 20s, not_finite},
-    {"raytracer.cancelled", "Cancelled before, start and render return soon, OK or CANCELLED.", kind,
+    {"raytracer.cancelled", "After cancellation, start and render return soon, with OK or CANCELLED.", kind,
      "raytracer.render", 20s, cancelled},
     {"raytracer.cancel-while-rendering",
-     "Cancelled in the midst of a large image, render returns within 2 s; not of GPUs.", kind, "raytracer.cancelled",
+     "Cancelled during a large image, render returns within 2 s; not checked on GPUs.", kind, "raytracer.cancelled",
      30s, cancel_while_rendering},
-    {"raytracer.degenerate", "Triangles without area harm nothing.", kind, "raytracer.render", 20s, degenerate},
-    {"raytracer.far-away", "A scene of a kilometre looks like one of a foot.", kind, "raytracer.render", 20s,
-     far_away},
-    {"raytracer.speed", "A small image takes less than 250 ms on the median; a warning otherwise.", kind,
+    {"raytracer.degenerate", "Triangles without area do not affect the image.", kind, "raytracer.render", 20s,
+     degenerate},
+    {"raytracer.far-away", "A scene scaled to a kilometre looks the same as one of a foot.", kind, "raytracer.render",
+     20s, far_away},
+    {"raytracer.speed", "The median time of a small image is at most 250 ms; otherwise a warning.", kind,
      "raytracer.render", 120s, speed},
 };
 

@@ -122,15 +122,12 @@ constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
     {"raytracer.colour-order", "The bytes of a pixel are red, green, blue, alpha.", kind, gate, 20s, colour_order},
-    {"raytracer.srgb", "Colours are sRGB-encoded, to one code.", kind, gate, 20s, srgb},
-    {"raytracer.lambert", "A plane under a lamp is as bright as Lambert's law says, to one code.", kind, gate, 20s,
-     lambert},
-    {"raytracer.inverse-square", "A lamp's light falls off with the square of its distance, where the scene says so.",
-     kind, gate, 20s, inverse_square},
-    {"raytracer.directional-light", "Light from infinitely far comes along its direction.", kind, gate, 20s,
-     directional},
-    {"raytracer.shadow-on-object", "An object that another hides from the lamp is in its shadow.", kind, gate, 20s,
-     shadow_on_object},
+    {"raytracer.srgb", "Colours are sRGB-encoded, within one code.", kind, gate, 20s, srgb},
+    {"raytracer.lambert", "A plane under a lamp follows Lambert's law, within one code.", kind, gate, 20s, lambert},
+    {"raytracer.inverse-square", "A light with inverse-square falloff follows the inverse-square law.", kind, gate,
+     20s, inverse_square},
+    {"raytracer.directional-light", "A directional light comes from its direction.", kind, gate, 20s, directional},
+    {"raytracer.shadow-on-object", "Objects cast shadows on other objects.", kind, gate, 20s, shadow_on_object},
 };
 
 } // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// One scene in several words looks the same, and large ones are drawn whole.
+// Equivalent scenes look the same, and large ones are rendered completely.
 #include "conformance/expect.hpp"
 #include "conformance/tracer.hpp"
 
@@ -50,8 +49,8 @@ scene::ArenaBuilder scene_of(const std::vector<Part> &parts) {
 }
 
 void expect_same(Context &context, const std::vector<Part> &other, const std::string &what) {
-    const Picture should = Tracer(context, scene_of(parts())).render(of_still_life());
-    expect_alike(Tracer(context, scene_of(other)).render(of_still_life()), should, what, 3, 0.01);
+    const Picture should = Tracer(context, scene_of(parts())).render(still_life_camera());
+    expect_alike(Tracer(context, scene_of(other)).render(still_life_camera()), should, what, 3, 0.01);
 }
 
 void object_order(Context &context) {
@@ -98,10 +97,11 @@ void object_transform(Context &context) {
 // ---- Large ones ------------------------------------------------------------------------------------
 
 void size(Context &context) {
-    const Picture should = Tracer(context, still_life()).render(of_still_life());
+    const Picture should = Tracer(context, still_life()).render(still_life_camera());
     for (const double factor : {1e-3, 1e6}) {
         const glm::dmat4 scaled = glm::scale(glm::dmat4(1), glm::dvec3(factor));
-        const Picture is = Tracer(context, still_life(glm::mat4(scaled))).render(of_still_life(pinhole(), scaled));
+        const Picture is =
+            Tracer(context, still_life(glm::mat4(scaled))).render(still_life_camera(pinhole(), scaled));
         expect_alike(is, should, fmt::format("scene and camera {:g} times as large, the image is another", factor), 3,
                      0.01);
     }
@@ -155,13 +155,13 @@ constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
     {"raytracer.object-order", "The order of objects does not matter.", kind, gate, 20s, object_order},
-    {"raytracer.split-mesh", "A mesh looks the same in pieces, each an object.", kind, gate, 20s, split_mesh},
-    {"raytracer.object-transform", "An object is where its transform has it, smooth normals too.", kind, gate, 20s,
+    {"raytracer.split-mesh", "A mesh split into several objects looks the same.", kind, gate, 20s, split_mesh},
+    {"raytracer.object-transform", "world_from_object applies to positions and smooth normals.", kind, gate, 20s,
      object_transform},
-    {"raytracer.size", "A thousandth of a scene and a million times a scene look like the scene.", kind, gate, 20s,
-     size},
-    {"raytracer.many-triangles", "A mesh of 100,000 triangles is drawn whole.", kind, gate, 60s, many_triangles},
-    {"raytracer.many-objects", "A thousand objects are drawn, all of them.", kind, gate, 60s, many_objects},
+    {"raytracer.size", "Scaling scene and camera by 1e-3 or 1e6 does not change the image.", kind, gate, 20s, size},
+    {"raytracer.many-triangles", "A mesh of 100,000 triangles is rendered completely.", kind, gate, 60s,
+     many_triangles},
+    {"raytracer.many-objects", "All of 1,000 objects are rendered.", kind, gate, 60s, many_objects},
 };
 
 } // namespace

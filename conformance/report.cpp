@@ -17,7 +17,7 @@ std::string quoted(const std::string &word) {
             std::string::npos &&
         !word.empty())
         return word;
-    if (base::printable(word) != word) { // bytes that are better not shown, as bash writes them
+    if (base::printable(word) != word) { // unprintable bytes: bash's $'…' quoting
         std::string text = "$'";
         for (const char c : word)
             text += c == '\'' || c == '\\' ? fmt::format("\\{}", c)
@@ -74,7 +74,7 @@ std::string as_line(const Report &report, const Result &result) {
     if (!result.message.empty())
         text += fmt::format("\n         {}", base::printable(result.message));
     if (is_bad(result.verdict))
-        text += fmt::format("\n         promised: {}\n         again: {}", report.test_of(result).promise,
+        text += fmt::format("\n         requirement: {}\n         to repeat: {}", report.test_of(result).requirement,
                             report.command(result));
     return text + "\n";
 }
@@ -105,7 +105,7 @@ std::string as_json(const Report &report) {
     for (const Result &result : report.results) {
         ipc::Json one = to_json(result);
         one.erase("facts");
-        one["promise"] = report.test_of(result).promise;
+        one["promise"] = report.test_of(result).requirement;
         one["command"] = report.command(result);
         json["results"].push_back(std::move(one));
     }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A run's results, for people and for machines.
+// A run's results as text, JSON, JUnit XML and HTML.
 #pragma once
 
 #include "conformance/runner.hpp"
@@ -14,23 +13,23 @@ struct Report {
     RunSettings settings;
     std::vector<Test> tests;
     std::vector<Result> results; // in the order of the tests
-    ipc::Json plugin;            // id, version, …; empty where it could not be opened
+    ipc::Json plugin;            // id, version, …; empty if it could not be opened
 
     std::size_t count(Verdict verdict) const;
-    // 0: all well; 1: a test failed, crashed or timed out; 2: the suite erred, or no test ran.
+    // 0: success; 1: a test failed, crashed or timed out; 2: an error of the suite, or no test ran.
     int exit_status() const;
     const Test &test_of(const Result &result) const;
-    // Runs this one test again.
+    // The command that runs this test again.
     std::string command(const Result &result) const;
 };
 
-std::string as_line(const Report &report, const Result &result); // and its reason, and the command
+std::string as_line(const Report &report, const Result &result); // with the message and the command
 std::string as_summary(const Report &report);
 std::string as_json(const Report &report);
 std::string as_junit(const Report &report);
 std::string as_html(const Report &report);
 
-// Printable, with &, <, > and quotes as XML and HTML write them.
+// Printable, with &, <, > and quotes escaped for XML and HTML.
 std::string escaped(const std::string &text);
 
 } // namespace arhost::conformance

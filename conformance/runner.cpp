@@ -30,19 +30,19 @@ using Clock = std::chrono::steady_clock;
 using base::UniqueFd;
 using ipc::Call;
 
-std::string place(Call call, const Test &test) {
+std::string call_text(Call call, const Test &test) {
     constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
     return " " + ipc::to_text(call, per_frame[test.kind]);
 }
 
-// A folder of a test's own.
+// A temporary folder for one test.
 class ScratchFolder {
 public:
     ScratchFolder() {
         std::error_code error;
         std::string pattern = std::filesystem::temp_directory_path(error) / "arhost-conform-XXXXXX";
         if (error)
-            throw std::runtime_error("there is no folder for temporary files; set TMPDIR to one that is there");
+            throw std::runtime_error("the folder for temporary files does not exist; set TMPDIR to one that does");
         if (!::mkdtemp(pattern.data()))
             base::throw_errno("mkdtemp " + pattern);
         path_ = pattern;
@@ -59,38 +59,39 @@ private:
     std::filesystem::path path_;
 };
 
-// What a plugin prints: no part of the report, and shown as lines that can't steer a terminal, as many as one reads.
-class Printed {
+// Copies what a plugin prints to standard error, up to 64 KiB, as lines without control characters. It is not part of
+// the report.
+class PrintedText {
 public:
-    explicit Printed(int signals) : signals_(signals) {}
+    explicit PrintedText(int signals) : signals_(signals) {}
 
     void finish(const std::string &test) {
         if (!line_.empty())
-            show();
-        if (left_out_ > 0)
-            base::write_all(STDERR_FILENO, fmt::format("{}: and {} bytes more\n", test, left_out_), signals_);
+            print_line();
+        if (omitted_ > 0)
+            base::write_all(STDERR_FILENO, fmt::format("{}: {} more bytes omitted\n", test, omitted_), signals_);
     }
-    void take(std::string_view bytes) {
-        for (const char c : bytes.substr(0, room_))
+    void append(std::string_view bytes) {
+        for (const char c : bytes.substr(0, remaining_))
             if (c == '\n')
-                show();
+                print_line();
             else
                 line_ += c;
-        left_out_ += bytes.size() - std::min(bytes.size(), room_);
-        room_ -= std::min(bytes.size(), room_);
+        omitted_ += bytes.size() - std::min(bytes.size(), remaining_);
+        remaining_ -= std::min(bytes.size(), remaining_);
     }
 
 private:
-    void show() { base::write_all(STDERR_FILENO, base::printable(std::exchange(line_, {})) + '\n', signals_); }
+    void print_line() { base::write_all(STDERR_FILENO, base::printable(std::exchange(line_, {})) + '\n', signals_); }
 
     int signals_;
     std::string line_;
-    std::size_t room_ = 64 << 10, left_out_ = 0;
+    std::size_t remaining_ = 64 << 10, omitted_ = 0;
 };
 
 class Child {
 public:
-    // `alive`: all of its kind; what has been orphaned meanwhile ends with each of them.
+    // `alive`: the processes of all running tests. When a test ends, orphans that are not in it are killed.
     Child(const Test &test, const RunSettings &settings, std::set<pid_t> &alive)
         : test_(test), alive_(alive), begin_(Clock::now()),
           deadline_(begin_ +
@@ -123,7 +124,7 @@ public:
                              {no_input.get(), output, output, result_.write_end.get(), memory_.fd()}, true);
         result_.write_end.reset();
         output_.write_end.reset();
-        ::setpgid(pid_, pid_); // here too: who comes first is open
+        ::setpgid(pid_, pid_); // also here, to avoid a race with the child
         alive_.insert(pid_);
     }
     ~Child() {
@@ -133,34 +134,33 @@ public:
     Child(const Child &) = delete;
     Child &operator=(const Child &) = delete;
 
-    // To be waited for; -1: closed, which poll passes over.
+    // Descriptors to poll; -1 (closed) is ignored by poll.
     std::array<int, 2> fds() const { return {result_.read_end.get(), output_.read_end.get()}; }
     Clock::time_point deadline() const { return deadline_; }
 
-    // Takes what has come. True once the test is over: it ended, or its time is up, or it tells more than a test can.
+    // Reads available output. True once the process has ended, timed out, or written more than a result can take.
     bool poll() {
         const bool ended = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
-        take(); // afterwards: what it wrote at the end is there now
+        read_output(); // after waitpid, so that the process's last output is available
         ended_ = ended;
         return ended_ || Clock::now() >= deadline_ || has_flooded();
     }
 
     Result finish() {
-        const bool in_time = ended_, told = text_.ends_with('\n');
+        const bool in_time = ended_, has_result = text_.ends_with('\n');
         printed_.finish(test_.name);
-        const std::string where = told ? " when the process ended" : place(calls_.read(), test_);
+        const std::string where = has_result ? " when the process ended" : call_text(calls_.read(), test_);
         end();
         Result result;
         if (has_flooded()) {
             result.verdict = Verdict::fail;
-            result.message =
-                fmt::format("what came on its result pipe, descriptor {}, is no result: more than {} MiB", result_fd,
-                            max_told >> 20);
-        } else if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && told) {
-            result = told_result();
+            result.message = fmt::format("more than {1} MiB were written to the suite's result pipe, descriptor {0}",
+                                         result_fd, max_result_size >> 20);
+        } else if (in_time && WIFEXITED(status_) && WEXITSTATUS(status_) == EXIT_SUCCESS && has_result) {
+            result = parsed_result();
         } else if (!in_time) {
             result.verdict = Verdict::timeout;
-            result.message = fmt::format("no end after {:.3g} s{}",
+            result.message = fmt::format("timed out after {:.3g} s{}",
                                          std::chrono::duration<double>(deadline_ - begin_).count(), where);
         } else {
             result.verdict = Verdict::crashed;
@@ -174,44 +174,44 @@ public:
     }
 
 private:
-    static constexpr std::size_t max_told = 32 << 20; // a result has images of some MB
-    bool has_flooded() const { return text_.size() > max_told; }
+    static constexpr std::size_t max_result_size = 32 << 20; // images take some MB
+    bool has_flooded() const { return text_.size() > max_result_size; }
 
-    // The plugin could write there too.
-    Result told_result() const {
+    // The plugin may have written to the result pipe.
+    Result parsed_result() const {
         try {
             return result_from_json(ipc::Json::parse(text_, [](int depth, auto, auto &) {
                 if (depth > 16)
-                    throw std::runtime_error("nested too deep");
+                    throw std::runtime_error("nested too deeply");
                 return true;
             }));
         } catch (const std::exception &) {
             Result result;
             result.verdict = Verdict::fail;
-            result.message = fmt::format("what came on its result pipe, descriptor {}, is no result: '{}'", result_fd,
-                                         base::printable(text_.substr(0, 60)));
+            result.message = fmt::format("the suite's result pipe, descriptor {}, has an invalid result: '{}'",
+                                         result_fd, base::printable(text_.substr(0, 60)));
             return result;
         }
     }
-    // Not all, of who writes without end: others are waited for, and time goes by.
-    void take() {
-        take(result_.read_end, [&](std::string_view bytes) { text_ += bytes; });
-        take(output_.read_end, [&](std::string_view bytes) { printed_.take(bytes); });
+    // Reads a limited amount, so that endless output does not delay other tests and deadlines.
+    void read_output() {
+        read_output(result_.read_end, [&](std::string_view bytes) { text_ += bytes; });
+        read_output(output_.read_end, [&](std::string_view bytes) { printed_.append(bytes); });
     }
-    static void take(UniqueFd &from, const std::function<void(std::string_view)> &to) {
+    static void read_output(UniqueFd &from, const std::function<void(std::string_view)> &to) {
         char buffer[1 << 16];
         for (int i = 0; i < 16 && from; ++i) {
             const ssize_t count = ::read(from.get(), buffer, sizeof buffer);
             if (count > 0)
                 to({buffer, static_cast<std::size_t>(count)});
             else if (count < 0 && errno == EAGAIN)
-                break; // its children may keep it open
+                break; // the test's children may keep it open
             else
                 from.reset();
         }
     }
     void end() {
-        ::kill(-pid_, SIGKILL); // and what the plugin has started
+        ::kill(-pid_, SIGKILL); // and the processes that the plugin started
         if (!ended_)
             ::waitpid(pid_, &status_, 0);
         alive_.erase(pid_);
@@ -222,11 +222,11 @@ private:
     const Test &test_;
     std::set<pid_t> &alive_;
     Clock::time_point begin_, deadline_;
-    ScratchFolder scratch_; // goes once the process is gone
+    ScratchFolder scratch_; // removed after the process has ended
     ipc::SharedMemory memory_;
     CallPage calls_;
     Pipe result_, output_;
-    Printed printed_;
+    PrintedText printed_;
     pid_t pid_ = 0;
     std::string text_;
     bool ended_ = false;
@@ -238,13 +238,13 @@ const Result *find(const std::vector<Result> &results, const std::string &test) 
     return found == results.end() ? nullptr : &*found;
 }
 
-// Returns the signal that has come meanwhile; 0: none.
+// Returns a signal that has arrived, or 0.
 int wait(const std::list<Child> &running, int signals) {
     std::vector<pollfd> fds = {{signals, POLLIN, 0}};
     for (const Child &child : running)
         for (const int fd : child.fds())
             fds.push_back({fd, POLLIN, 0});
-    ::poll(fds.data(), fds.size(), 2); // an end of a process closes no pipe that its children hold
+    ::poll(fds.data(), fds.size(), 2); // a timeout, because a process's children may keep its pipes open
     return base::take_signal(signals);
 }
 
@@ -258,11 +258,11 @@ Result run_alone(const Test &test, const RunSettings &settings) {
 
 void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
              const std::function<void(const Result &)> &on_result) {
-    const auto is_waited_for = [&](const std::string &name) {
+    const auto is_pending = [&](const std::string &name) {
         return !find(results, name) &&
                std::any_of(tests.begin(), tests.end(), [&](const Test &test) { return name == test.name; });
     };
-    const auto take = [&](Result result) {
+    const auto add = [&](Result result) {
         on_result(result);
         results.push_back(std::move(result));
     };
@@ -270,20 +270,20 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
     for (const Test &test : tests)
         if (!find(results, test.name))
             waiting.push_back(&test);
-    ::prctl(PR_SET_CHILD_SUBREAPER, 1);       // what a test leaves behind comes here
-    std::set<pid_t> alive = base::children(); // of who became this program by exec
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1);       // orphans of tests are reparented to this process
+    std::set<pid_t> alive = base::children(); // children from before exec
     std::list<Child> running;
     while (!waiting.empty() || !running.empty()) {
         for (auto it = waiting.begin(); it != waiting.end() && running.size() < settings.jobs;) {
             const Test &test = **it;
-            if (is_waited_for(test.needs)) {
+            if (is_pending(test.needs)) {
                 ++it;
                 continue;
             }
             it = waiting.erase(it);
             const Result *need = find(results, test.needs);
             if (need && need->verdict != Verdict::pass)
-                take({test.name, Verdict::skip, fmt::format("needs {}, which has not passed", test.needs)});
+                add({test.name, Verdict::skip, fmt::format("needs {}, which has not passed", test.needs)});
             else
                 running.emplace_back(test, settings, alive);
         }
@@ -292,7 +292,7 @@ void run_all(std::span<const Test> tests, const RunSettings &settings, std::vect
                                                         results.size() + running.size() + waiting.size()));
         for (auto it = running.begin(); it != running.end();) {
             if (it->poll()) {
-                take(it->finish());
+                add(it->finish());
                 it = running.erase(it);
             } else {
                 ++it;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Runs tests, each in a process of its own with a deadline. Nothing of the plugin is opened in this one.
+// Runs each test in its own process with a deadline. This process never opens the plugin.
 #pragma once
 
 #include "base/write_all.hpp"
@@ -16,14 +15,14 @@ namespace arhost::conformance {
 struct RunSettings {
     Subject subject;
     unsigned jobs = 1;
-    int signals = -1; // a signalfd: what comes there ends a run
+    int signals = -1; // a signalfd whose signals end a run
 };
 
 Result run_alone(const Test &test, const RunSettings &settings);
 
-// `results` may begin with those of tests that were run before. A test whose need has not passed is skipped;
-// a need that is not among the tests counts as passed. What the tests leave behind is killed. Throws
-// base::Interrupted, and then nothing of the run is left, neither processes nor folders.
+// `results` may contain results of earlier tests. A test is skipped if the test that it needs has not passed; a
+// needed test outside `tests` counts as passed. Kills the processes that tests leave behind. Throws base::Interrupted
+// after removing all processes and folders of the run.
 void run_all(std::span<const Test> tests, const RunSettings &settings, std::vector<Result> &results,
              const std::function<void(const Result &)> &on_result);
 

@@ -90,14 +90,14 @@ scene::TriangleMesh ball(std::uint32_t stacks, std::uint32_t slices, bool shared
     scene::TriangleMesh mesh;
     for (std::uint32_t stack = 0; stack <= stacks; ++stack)
         for (std::uint32_t slice = 0; slice < slices; ++slice) {
-            const double down = stack * glm::pi<double>() / stacks, round = slice * glm::two_pi<double>() / slices;
-            mesh.positions.emplace_back(std::sin(down) * std::sin(round), std::cos(down),
-                                        std::sin(down) * std::cos(round));
+            const double theta = stack * glm::pi<double>() / stacks, phi = slice * glm::two_pi<double>() / slices;
+            mesh.positions.emplace_back(std::sin(theta) * std::sin(phi), std::cos(theta),
+                                        std::sin(theta) * std::cos(phi));
         }
     for (std::uint32_t stack = 0; stack < stacks; ++stack)
         for (std::uint32_t slice = 0; slice < slices; ++slice) {
             const std::uint32_t next = (slice + 1) % slices, above = stack * slices, below = above + slices;
-            if (stack > 0) // at the poles one side of each quad has no length
+            if (stack > 0) // at the poles one side of each quad has length 0
                 mesh.triangles.emplace_back(above + slice, below + slice, above + next);
             if (stack + 1 < stacks)
                 mesh.triangles.emplace_back(above + next, below + slice, below + next);
@@ -152,7 +152,7 @@ scene::ArenaBuilder still_life(const glm::mat4 &moved) {
     return builder;
 }
 
-arhost_camera of_still_life(const arhost_intrinsics &intrinsics, const glm::dmat4 &moved) {
+arhost_camera still_life_camera(const arhost_intrinsics &intrinsics, const glm::dmat4 &moved) {
     const auto apply = [&](double x, double y, double z, double w) {
         return glm::dvec3(moved * glm::dvec4(x, y, z, w));
     };

@@ -18,22 +18,22 @@ namespace {
 
 constexpr const char *helper = "sink.process";
 
-// What that process does: the work comes on its standard input; a byte goes out for each frame, and after them, where
-// it fails, why.
+// In that process: reads the work from standard input, and writes a byte per frame to result_fd. If it fails, the
+// test's result follows.
 void work(Context &context) {
     SinkProcess::Work work{};
     std::cin >> work.frames >> work.size.width >> work.size.height >> work.folder;
     SinkRun run(context, work.folder);
     run.start(0, work.size);
-    std::deque<SealedOutput> frames; // made before: behind a frame's byte the next is being written
+    std::deque<SealedOutput> frames; // prepared, so that the next write starts right after a frame's byte
     for (std::uint64_t n = 0; n < work.frames; ++n)
-        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = work.size});
+        frames.emplace_back(SealedOutput::Content{.sequence = n, .size = work.size});
     for (const SealedOutput &frame : frames) {
         run.write(frame);
         if (::write(result_fd, ".", 1) != 1)
             break;
     }
-    while (std::cin.get() != EOF) { // what is not on the disk yet will never be; at the end the suite itself is gone
+    while (std::cin.get() != EOF) { // waits to be killed; EOF: the suite has ended
     }
 }
 
@@ -47,8 +47,8 @@ std::span<const Test> helper_tests() {
 
 SinkProcess::SinkProcess(Context &context, const Work &work) {
     PluginLibrary &library = context.library;
-    std::vector<std::string> arguments = {"arhost-conform",  library.file(), "--run", helper, "--scratch",
-                                          library.scratch(), "--sandbox",    "none" /* it is in this one's */};
+    std::vector<std::string> arguments = {"arhost-conform", library.file(),    "--run",     helper,
+                                          "--scratch",      library.scratch(), "--sandbox", "none" /* inherited */};
     for (const auto &[key, value] : library.settings())
         arguments.insert(arguments.end(), {"--set", key + "=" + value});
 
@@ -65,7 +65,7 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
 }
 
 void SinkProcess::wait_until_written(std::uint64_t frames) {
-    std::string result; // comes after the last frame's byte
+    std::string result; // follows the last frame's byte
     for (char byte = 0; count_ < frames && ::read(written_.get(), &byte, 1) == 1;)
         if (byte == '.' && result.empty())
             ++count_;
@@ -73,9 +73,9 @@ void SinkProcess::wait_until_written(std::uint64_t frames) {
             result += byte;
     if (count_ == frames)
         return;
-    const ipc::Json told = ipc::Json::parse(result, nullptr, false);
-    throw Failure(fmt::format("in a process of its own it gave up after {} frames: {}", count_,
-                              told.is_object() ? told.value("message", "") : "the process ended"));
+    const ipc::Json reported = ipc::Json::parse(result, nullptr, false);
+    throw Failure(fmt::format("in a separate process it failed after {} frames: {}", count_,
+                              reported.is_object() ? reported.value("message", "") : "the process ended"));
 }
 
 void SinkProcess::kill() {
@@ -84,7 +84,7 @@ void SinkProcess::kill() {
     ::kill(pid_, SIGTERM);
     int status = 0;
     pid_t reaped = 0;
-    for (int i = 0; i < 500 && reaped == 0; ++i) { // it may do something about it
+    for (int i = 0; i < 500 && reaped == 0; ++i) { // the plugin may handle the signal
         std::this_thread::sleep_for(2ms);
         reaped = ::waitpid(pid_, &status, WNOHANG);
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A sink at work in a process of its own, to be killed there: this program executed anew, since a plugin that has
-// been used does not live through a fork.
+// Runs a sink in another process, to kill it there. The process executes this program again, because a plugin that
+// has been used does not survive a fork.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -14,22 +13,22 @@ namespace arhost::conformance {
 class SinkProcess {
 public:
     struct Work {
-        std::string folder; // of the test's own folder
+        std::string folder; // in the test's scratch folder
         std::uint64_t frames;
         Size size;
     };
-    // It writes its frames as fast as it can, and then waits for its end.
+    // The process writes its frames as fast as possible, then waits to be killed.
     SinkProcess(Context &context, const Work &work);
     ~SinkProcess() { kill(); }
     SinkProcess(const SinkProcess &) = delete;
     SinkProcess &operator=(const SinkProcess &) = delete;
 
-    void wait_until_written(std::uint64_t frames); // throws Failure where it ends before
-    void kill();                                   // by SIGTERM, and SIGKILL a second later; returns once it is gone
+    void wait_until_written(std::uint64_t frames); // throws Failure if it ends before
+    void kill();                                   // by SIGTERM, and SIGKILL a second later; waits for the process
 
 private:
-    pid_t pid_ = 0;                   // 0: reaped
-    base::UniqueFd orders_, written_; // while the former is open, it stays
+    pid_t pid_ = 0;                   // 0 once reaped
+    base::UniqueFd orders_, written_; // the process ends when orders_ is closed
     std::uint64_t count_ = 0;
 };
 

@@ -49,26 +49,26 @@ arhost_marker marker(double z_mm) {
 
 } // namespace
 
-SealedOutput::SealedOutput(const Look &look)
-    : stride_(ipc::OutputSlot::stride(look.size.width) + look.padding), record_(sizeof(arhost_record)),
-      pixels_(std::size_t{stride_} * look.size.height) {
-    const Size &size = look.size;
+SealedOutput::SealedOutput(const Content &content)
+    : stride_(ipc::OutputSlot::stride(content.size.width) + content.padding), record_(sizeof(arhost_record)),
+      pixels_(std::size_t{stride_} * content.size.height) {
+    const Size &size = content.size;
     auto *bgr = reinterpret_cast<std::uint8_t *>(pixels_.data());
-    std::mt19937 noise(static_cast<std::uint32_t>(2 * look.sequence + look.other));
+    std::mt19937 noise(static_cast<std::uint32_t>(2 * content.sequence + content.other));
     for (std::uint32_t y = 0; y < size.height; ++y) {
         std::uint8_t *row = bgr + std::size_t{stride_} * y;
-        std::memset(row, look.in_padding, stride_);
+        std::memset(row, content.in_padding, stride_);
         std::generate_n(row, 3 * size.width, [&] { return static_cast<std::uint8_t>(noise() >> 24); });
     }
 
     arhost_record &r = *new (record_.data()) arhost_record{};
     r.struct_size = sizeof r;
     r.clock = ARHOST_CLOCK_MEDIA;
-    r.sequence = look.sequence;
-    r.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(look.sequence) / fps);
+    r.sequence = content.sequence;
+    r.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(content.sequence) / fps);
     r.overlay = ARHOST_OVERLAY_RENDERED;
     r.has_camera = 1;
-    const double eye[] = {0, 0, look.other ? 400.5 : 500.5}, look_at[] = {0, 0, eye[2] - 1}, up[] = {0, 1, 0};
+    const double eye[] = {0, 0, content.other ? 400.5 : 500.5}, look_at[] = {0, 0, eye[2] - 1}, up[] = {0, 1, 0};
     r.camera.struct_size = sizeof r.camera;
     std::copy_n(eye, 3, r.camera.eye);
     std::copy_n(look_at, 3, r.camera.look_at);
@@ -138,6 +138,13 @@ void SinkRun::write(const SealedOutput &frame) {
 void SinkRun::write(std::uint64_t first, std::uint64_t end) {
     for (std::uint64_t sequence = first; sequence < end; ++sequence)
         write(SealedOutput({sequence, size_}));
+}
+
+Files SinkRun::run(std::uint64_t frames) {
+    start();
+    write(0, frames);
+    stop();
+    return files();
 }
 
 arhost_status SinkRun::try_idle() {

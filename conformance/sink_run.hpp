@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A sink at work in a folder, the frames that it is given, and what lies in the folder then.
+// Runs a sink in a folder: its input frames and output files.
 #pragma once
 
 #include "conformance/guarded_memory.hpp"
@@ -18,18 +17,18 @@ struct Size {
     std::uint32_t width = 64, height = 48;
 };
 
-// A frame in memory that can't be written, as the host's is, with memory behind its last row that can't be read.
-// Its pixels are noise, which no encoder makes small: each frame is another.
+// A frame in read-only memory, as the host's, with inaccessible memory after its last row. Its pixels are
+// incompressible noise that differs for each frame.
 class SealedOutput {
 public:
-    struct Look {
+    struct Content {
         std::uint64_t sequence;
         Size size{};
-        std::uint32_t padding = 0;   // bytes that a row takes beyond what the host gives it
-        std::uint8_t in_padding = 0; // what is there
-        bool other = false;          // another frame of that number
+        std::uint32_t padding = 0;   // bytes per row in addition to the host's stride
+        std::uint8_t in_padding = 0; // value of the bytes after a row's pixels
+        bool other = false;          // a different frame with that number
     };
-    explicit SealedOutput(const Look &look);
+    explicit SealedOutput(const Content &content);
 
     // Only while no sink reads it.
     template <class Change> void change(Change &&change) {
@@ -47,14 +46,14 @@ private:
     arhost_output output_{};
 };
 
-// Each file's bytes by its path in a folder.
+// Contents of files by path within a folder.
 using Files = std::map<std::string, std::string>;
 Files files_in(const std::filesystem::path &folder);
 
-// An instance is started once: another start makes another one.
+// An instance is started once; a further start creates a new instance.
 class SinkRun {
 public:
-    // Its output lies in `folder` of the test's own folder.
+    // Output goes to `folder` in the test's scratch folder.
     SinkRun(Context &context, const std::string &folder);
     ~SinkRun();
     SinkRun(const SinkRun &) = delete;
@@ -65,6 +64,7 @@ public:
     arhost_status try_write(const SealedOutput &frame);
     void write(const SealedOutput &frame); // throws Failure unless it succeeds
     void write(std::uint64_t first, std::uint64_t end);
+    Files run(std::uint64_t frames); // start, write and stop; returns the files
     arhost_status try_idle();
     arhost_status try_stop();
     void stop(); // throws Failure unless it succeeds

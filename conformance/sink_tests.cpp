@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Sinks: what they take, and what becomes of their files, in peace, after a kill and on a full disk.
+// Sinks: accepted input, and their files in normal operation, after a kill and on a full disk.
 #include "conformance/cancelling.hpp"
 #include "conformance/frame_times.hpp"
 #include "conformance/process_usage.hpp"
@@ -22,37 +21,38 @@
 namespace arhost::conformance {
 namespace {
 
-// What can only be seen in files needs some.
+// Skips tests of files if there is no output path.
 void require_files(Context &context) {
     const Settings &settings = context.library.settings();
     for (const arhost_option_descriptor *option : options_of(context.library.descriptor())) {
         const auto set = settings.find(option->key);
         const char *const path = set != settings.end() ? set->second.c_str() : option->default_value;
-        if (option->type == ARHOST_OPTION_OUTPUT_PATH && (!path || *path)) // without any, create tells what to set
+        if (option->type == ARHOST_OPTION_OUTPUT_PATH &&
+            (!path || *path)) // with neither, create reports the missing option
             return;
     }
-    throw Skip("it has no output path, so it can't be seen what becomes of the frames");
+    throw Skip("it has no output path, so its output can't be checked");
 }
 
 void expect_same(const Files &is, const Files &should, const std::string &what) {
     for (const auto &[name, bytes] : should) {
         const auto found = is.find(name);
         if (found == is.end())
-            throw Failure(fmt::format("{}: '{}' is not there", what, name));
+            throw Failure(fmt::format("{}: '{}' is missing", what, name));
         if (found->second.size() != bytes.size())
             throw Failure(
                 fmt::format("{}: '{}' has {} bytes instead of {}", what, name, found->second.size(), bytes.size()));
         const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin());
         if (at.first != bytes.end())
-            throw Failure(fmt::format("{}: '{}' is another from byte {} on", what, name, at.first - bytes.begin()));
+            throw Failure(fmt::format("{}: '{}' differs from byte {} on", what, name, at.first - bytes.begin()));
     }
     for (const auto &[name, bytes] : is)
         if (!should.contains(name))
-            throw Failure(fmt::format("{}: '{}' is there too", what, name));
+            throw Failure(fmt::format("{}: '{}' is unexpected", what, name));
 }
 
-// What lies in the folder after each of an uninterrupted run's frames, and at its end.
-struct Course {
+// The files after each frame of an uninterrupted run, and at its end.
+struct History {
     std::vector<Files> after; // after[n]: once n frames were written
     Files end;
 
@@ -64,18 +64,18 @@ struct Course {
         return in(end) || std::any_of(after.begin(), after.end(), in);
     }
 };
-Course course_of(Context &context, std::uint64_t frames, const Size &size = {}) {
+History history_of(Context &context, std::uint64_t frames, const Size &size = {}) {
     SinkRun run(context, "uninterrupted");
-    Course course;
+    History history;
     run.start(0, size);
-    course.after.push_back(run.files());
+    history.after.push_back(run.files());
     for (std::uint64_t n = 0; n < frames; ++n) {
         run.write(n, n + 1);
-        course.after.push_back(run.files());
+        history.after.push_back(run.files());
     }
     run.stop();
-    course.end = run.files();
-    return course;
+    history.end = run.files();
+    return history;
 }
 
 // ---- From start to stop ----------------------------------------------------------------------------
@@ -84,30 +84,20 @@ void start(Context &context) {
     SinkRun run(context, "out");
     const arhost_status status = run.try_start();
     if (const char *const *needs = context.library.descriptor().needs; needs && *needs && status < 0)
-        throw Skip(fmt::format("it needs '{}', and {}", *needs, told("start", status, run.instance().host())));
+        throw Skip(fmt::format("it needs '{}', and {}", *needs, call_result("start", status, run.instance().host())));
     run.instance().expect_ok("start", status);
     run.stop();
 }
 
 void write(Context &context) {
-    SinkRun run(context, "out");
-    run.start();
-    run.write(0, 4);
-    run.stop();
+    SinkRun(context, "out").run(4);
 }
 
 void start_again(Context &context) {
     SinkRun run(context, "a"), fresh(context, "b");
-    for (int i = 0; i < 2; ++i) {
-        run.start();
-        run.write(0, 3);
-        run.stop();
-    }
-    fresh.start();
-    fresh.write(0, 3);
-    fresh.stop();
-    expect_same(run.files(), fresh.files(), "in the second run with the same frames");
-    run.start(0, {90, 70}); // whatever becomes of the files: it works
+    run.run(3);
+    expect_same(run.run(3), fresh.run(3), "in the second run with the same frames");
+    run.start(0, {90, 70}); // must succeed; the files are not checked
     run.write(0, 2);
     run.stop();
 }
@@ -122,31 +112,24 @@ void two_instances(Context &context) {
     }
     second.stop();
     first.stop();
-    alone.start();
-    alone.write(0, 3);
-    alone.stop();
-    expect_same(first.files(), alone.files(), "with another instance at work meanwhile");
+    expect_same(first.files(), alone.run(3), "with another instance at work meanwhile");
 }
 
 void leaks(Context &context) {
     SinkRun run(context, "out");
-    expect_no_leak([&](int frames) {
-        run.start();
-        run.write(0, static_cast<std::uint64_t>(frames));
-        run.stop();
-    });
+    expect_no_leak([&](int frames) { run.run(static_cast<std::uint64_t>(frames)); });
 }
 
 void idle(Context &context) {
     SinkRun run(context, "out");
     if (!run.has_idle())
-        throw Skip("it has no idle");
+        throw Skip("it has no function idle");
     run.start();
     for (std::uint64_t n = 0; n < 3; ++n) {
         for (int i = 0; i < 3; ++i)
             if (const arhost_status status = run.try_idle();
                 status != ARHOST_STATUS_OK && status != ARHOST_STATUS_END)
-                throw Failure(told("idle", status, run.instance().host()));
+                throw Failure(call_result("idle", status, run.instance().host()));
         run.write(n, n + 1);
     }
     run.stop();
@@ -172,7 +155,7 @@ void sizes(Context &context) {
         const arhost_status status = run.try_start(0, size);
         if (status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION) {
             if (run.instance().host().last_error().empty())
-                throw Failure(fmt::format("it refuses {}×{} without a word", size.width, size.height));
+                throw Failure(fmt::format("it rejects {}×{} without an error message", size.width, size.height));
             continue;
         }
         run.instance().expect_ok(fmt::format("start with {}×{}", size.width, size.height).c_str(), status);
@@ -183,7 +166,7 @@ void sizes(Context &context) {
 
 void stride(Context &context) {
     const auto run = [&](const char *folder, std::uint32_t padding, std::uint8_t in_padding) {
-        constexpr Size size{50, 20}; // not even as the host has them do rows follow each other
+        constexpr Size size{50, 20}; // the host's stride has padding at this width, too
         SinkRun sink(context, folder);
         sink.start(0, size);
         for (std::uint64_t n = 0; n < 3; ++n)
@@ -256,16 +239,14 @@ void gaps(Context &context) {
 // ---- What becomes of it ----------------------------------------------------------------------------
 
 void files(Context &context) {
-    const Files once = course_of(context, 4).end;
+    const Files once = history_of(context, 4).end;
     if (once.empty())
-        throw Failure("4 frames were written, and there is no file");
+        throw Failure("4 frames were written, but there is no file");
     SinkRun run(context, "again");
-    run.start();
-    run.write(0, 4);
-    run.stop();
+    const Files again = run.run(4);
     try {
-        expect_same(run.files(), once, "given the same frames again");
-    } catch (const Failure &difference) { // a date, say
+        expect_same(again, once, "given the same frames again");
+    } catch (const Failure &difference) { // for example a date
         throw Skip(std::string("its runs can't be compared: ") + difference.what());
     }
 }
@@ -278,18 +259,18 @@ void require_every_frame(Context &context) {
 void every_frame(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 12;
-    const Course course = course_of(context, frames);
+    const History history = history_of(context, frames);
     for (std::size_t n = 0; n < frames; ++n)
-        if (course.after[n] == course.after[n + 1])
+        if (history.after[n] == history.after[n + 1])
             throw Failure(
                 fmt::format("write of frame {} returned OK, but no file has changed; from then on the frame "
                             "must survive a kill",
                             n));
 }
 
-using Number = std::pair<std::size_t, std::string>; // of so many digits: "10" comes behind "9"
+using Number = std::pair<std::size_t, std::string>; // number of digits first, so that "10" sorts after "9"
 
-// Each number in a file's name, under the path without it.
+// The numbers in a file's name, by the path with '#' in place of the number.
 std::map<std::string, Number> numbers_in(const std::string &path) {
     constexpr const char *digits = "0123456789";
     std::map<std::string, Number> numbers;
@@ -301,8 +282,8 @@ std::map<std::string, Number> numbers_in(const std::string &path) {
     return numbers;
 }
 
-// With another frame of one number its files change where that frame is; without knowing more of them, only those
-// tell that are as long whatever is in them, or one for each frame, with names that differ in a number.
+// Replaces one frame at a time and finds where the files change. This works for files of constant size, and for one
+// file per frame with numbered names.
 void order(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 6;
@@ -331,18 +312,19 @@ void order(Context &context) {
             const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin(), found->second.end());
             changes[name].push_back({frame, static_cast<std::size_t>(at.first - bytes.begin())});
         }
-    bool told = false;
+    bool reported = false;
     struct File {
         std::uint64_t frame;
         std::string name;
     };
-    std::map<std::string, std::map<Number, File>> families; // files of a frame each
+    std::map<std::string, std::map<Number, File>> families; // files that hold one frame
     for (const auto &[name, of_file] : changes) {
         if (of_file.size() == 1)
             for (const auto &[family, number] : numbers_in(name))
                 families[family][number] = {of_file[0].frame, name};
         for (std::size_t i = 1; i < of_file.size() && !resized.contains(name); ++i) {
-            told = told || of_file[i].byte > of_file[i - 1].byte; // the same byte may be a checksum's, ahead of all
+            reported =
+                reported || of_file[i].byte > of_file[i - 1].byte; // equal: may be a checksum at the file's start
             if (of_file[i].byte < of_file[i - 1].byte)
                 throw Failure(
                     fmt::format("in '{}', frame {} begins at byte {}, before frame {}, which begins at byte {}", name,
@@ -353,9 +335,9 @@ void order(Context &context) {
         std::set<std::uint64_t> in_files;
         for (const auto &[number, file] : files)
             in_files.insert(file.frame);
-        if (in_files.size() != frames) // what the number counts is not the frames
+        if (in_files.size() != frames) // the number is not the frame's
             continue;
-        told = true;
+        reported = true;
         const File *before = nullptr;
         for (const auto &[number, file] : files) {
             if (before && file.frame == before->frame)
@@ -367,24 +349,24 @@ void order(Context &context) {
             before = &file;
         }
     }
-    if (!told)
-        throw Skip("without decoding them its files do not tell where a frame begins");
+    if (!reported)
+        throw Skip("its files do not show where a frame begins unless decoded");
 }
 
 void last_frame(Context &context) {
-    const Files one = course_of(context, 3).end;
+    const Files one = history_of(context, 3).end;
     SinkRun run(context, "other");
     run.start();
     run.write(0, 2);
     run.write(SealedOutput({.sequence = 2, .size = {}, .padding = 0, .in_padding = 0, .other = true}));
     run.stop();
     if (run.files() == one)
-        throw Failure("with another last frame, and another camera, its files are the same");
+        throw Failure("with another last frame and another camera, its files are the same");
 }
 
 void earlier_files(Context &context) {
-    const Files should = course_of(context, 3).end;
-    SinkRun run(context, "uninterrupted"); // there
+    const Files should = history_of(context, 3).end;
+    SinkRun run(context, "uninterrupted"); // which has an earlier run's files
     run.start();
     expect_same(run.files(), should, "started anew, and no frame has come");
     run.stop();
@@ -401,12 +383,12 @@ void no_place(Context &context) {
         throw Failure("its output would lie in a folder that is a file, but start returned OK");
     if (run.instance().host().last_error().empty())
         throw Failure(
-            fmt::format("where nothing can be written start returned {} without a word", status_name(status)));
+            fmt::format("start can't write anything and returned {} without an error message", status_name(status)));
 }
 
 // ---- Kills -----------------------------------------------------------------------------------------
 
-// The shortest of some: the others waited for a disk or a processor.
+// The minimum, which is the least affected by waiting.
 std::chrono::steady_clock::duration time_of_a_write(Context &context, const Size &size) {
     auto shortest = std::chrono::steady_clock::duration::max();
     SinkRun run(context, "timed");
@@ -424,7 +406,7 @@ std::chrono::steady_clock::duration time_of_a_write(Context &context, const Size
 void killed(Context &context) {
     constexpr std::uint64_t frames = 4, done = 2;
     constexpr Size size{160, 120};
-    const Course course = course_of(context, frames, size);
+    const History history = history_of(context, frames, size);
     const std::chrono::duration<double> a_frame = time_of_a_write(context, size);
     int i = 0;
     for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9}) {
@@ -434,17 +416,16 @@ void killed(Context &context) {
         std::this_thread::sleep_for(part * a_frame);
         process.kill();
         for (const auto &[name, bytes] : files_in(context.library.scratch() / folder))
-            if (course.end.contains(name) && !course.has_been(name, bytes))
-                throw Failure(
-                    fmt::format("killed while it wrote frame {}, its file '{}' has {} bytes, as never between "
-                                "frames: it is no whole file",
-                                done, name, bytes.size()));
+            if (history.end.contains(name) && !history.has_been(name, bytes))
+                throw Failure(fmt::format("killed while it wrote frame {}, its file '{}' has {} bytes, unlike after "
+                                          "any frame: it is incomplete",
+                                          done, name, bytes.size()));
     }
 }
 
 void restart(Context &context) {
     constexpr std::uint64_t frames = 8, first = 4;
-    const Files should = course_of(context, frames).end;
+    const Files should = history_of(context, frames).end;
     {
         SinkProcess process(context, {"killed", frames, {}});
         process.wait_until_written(frames);
@@ -458,8 +439,8 @@ void restart(Context &context) {
     for (const auto &[name, bytes] : should) {
         const auto found = is.find(name);
         if (found == is.end())
-            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is not there", first, name));
-        // What is encoded anew is not the same, but has as many frames.
+            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is missing", first, name));
+        // Encoded again, the file differs but has as many frames.
         const double ratio = static_cast<double>(found->second.size()) / static_cast<double>(bytes.size());
         if (constexpr double least = 0.8; ratio < least || ratio > 1 / least)
             throw Failure(fmt::format("killed after {} frames, and started again at frame {}: '{}' has {} bytes, and "
@@ -473,7 +454,7 @@ void restart(Context &context) {
 
 // ---- A full disk -----------------------------------------------------------------------------------
 
-// As on a full disk, no file of this process can grow beyond `bytes`. The error is another.
+// Simulates a full disk: no file of this process can grow beyond `bytes`. The errno differs (EFBIG).
 class FullDisk {
 public:
     explicit FullDisk(std::uint64_t bytes) {
@@ -492,9 +473,9 @@ private:
 
 void full_disk(Context &context) {
     constexpr std::uint64_t frames = 6;
-    const Course course = course_of(context, frames);
+    const History history = history_of(context, frames);
     std::uint64_t largest = 0;
-    for (const Files &files : course.after)
+    for (const Files &files : history.after)
         for (const auto &[name, bytes] : files)
             largest = std::max<std::uint64_t>(largest, bytes.size());
     SinkRun run(context, "full");
@@ -511,12 +492,12 @@ void full_disk(Context &context) {
         throw Failure(fmt::format("a file of it that grows to {} bytes may have {}, but every call returned OK",
                                   largest, largest / 2));
     if (run.instance().host().last_error().empty())
-        throw Failure(fmt::format("where the disk takes no more it returned {} without a word", status_name(status)));
+        throw Failure(fmt::format("on a full disk it returned {} without an error message", status_name(status)));
     for (const auto &[name, bytes] : run.files())
-        if (const auto whole = course.end.find(name);
-            whole != course.end.end() && whole->second.starts_with(bytes) && !course.has_been(name, bytes))
-            throw Failure(fmt::format("where the disk took no more, '{}' is left with {} of {} bytes", name,
-                                      bytes.size(), whole->second.size()));
+        if (const auto whole = history.end.find(name);
+            whole != history.end.end() && whole->second.starts_with(bytes) && !history.has_been(name, bytes))
+            throw Failure(fmt::format("on a full disk, '{}' is left with {} of {} bytes", name, bytes.size(),
+                                      whole->second.size()));
 }
 
 // ---- A slow disk -----------------------------------------------------------------------------------
@@ -529,14 +510,14 @@ void slow_disk(Context &context) {
         SinkRun run(context, "slow");
         run.start();
         Files before = run.files();
-        bool has_held_up = false;
+        bool has_delayed = false;
         for (std::uint64_t n = 0; n < frames; ++n) {
-            disk.hold_up_next_write();
+            disk.delay_next_write();
             run.write(n, n + 1);
             Files after = run.files();
-            has_held_up = has_held_up || disk.has_held_up(); // at a frame that it drops there is nothing to hold up
-            if (!has_held_up)
-                throw Skip("it writes in a way that can't be held up: by memory maps, rings or another process");
+            has_delayed = has_delayed || disk.has_delayed(); // a dropped frame has no write to delay
+            if (!has_delayed)
+                throw Skip("its writes can't be delayed: memory maps, io_uring or another process");
             if (after == before)
                 throw Failure(
                     fmt::format("on a slow disk write of frame {} returned OK, but no file has changed", n));
@@ -552,9 +533,9 @@ void speed(Context &context) {
     constexpr Size size{640, 480};
     SinkRun run(context, "out");
     run.start(0, size);
-    std::deque<SealedOutput> frames; // made before, since noise takes its time
+    std::deque<SealedOutput> frames; // prepared, because generating noise is slow
     for (std::uint64_t n = 0; n < 8; ++n)
-        frames.emplace_back(SealedOutput::Look{.sequence = n, .size = size});
+        frames.emplace_back(SealedOutput::Content{.sequence = n, .size = size});
     std::uint64_t next = 0;
     const std::vector<double> ms = frame_times_ms([&] {
         SealedOutput &frame = frames[next % frames.size()];
@@ -562,7 +543,7 @@ void speed(Context &context) {
         ++next;
         return run.write(frame), true;
     });
-    judge_speed(context, size.width, size.height, ms, 100);
+    check_speed(context, size.width, size.height, ms, 100);
 }
 
 template <void (*test)(Context &)> void of_files(Context &context) {
@@ -574,42 +555,44 @@ constexpr arhost_kind kind = ARHOST_KIND_SINK;
 constexpr const char *gate = "sink.write", *same = "sink.files";
 constexpr Test tests[] = {
     {"sink.start", "It starts and stops.", kind, "abi.create", 30s, start},
-    {"sink.write", "It takes frames that can't be written, and reads nothing behind them.", kind, "sink.start", 30s,
+    {"sink.write", "It accepts frames in read-only memory and reads nothing after them.", kind, "sink.start", 30s,
      write},
-    {"sink.sizes", "It takes frames of one pixel, one row, one column, odd and usual sizes, or says why not.", kind,
-     gate, 60s, sizes},
-    {"sink.records", "It takes frames with any count of markers, without a camera, and with huge numbers.", kind,
+    {"sink.sizes",
+     "It accepts frames of one pixel, one row, one column, odd and usual sizes, or rejects them with an error "
+     "message.",
+     kind, gate, 60s, sizes},
+    {"sink.records", "It accepts records with any number of markers, without a camera, and with huge numbers.", kind,
      gate, 30s, records},
-    {"sink.gaps", "It takes frames with gaps in their numbers.", kind, gate, 30s, gaps},
-    {"sink.idle", "Between frames idle does no harm.", kind, gate, 30s, idle},
-    {"sink.cancelled", "Cancelled before, start, write and stop return soon, OK or CANCELLED.", kind, gate, 30s,
-     cancelled},
-    {"sink.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate, 60s,
-     leaks},
-    {"sink.files", "Its frames become files. Unless they are the same in each run, runs are not compared.", kind,
-     gate, 30s, of_files<files>},
-    {"sink.start-again", "Once it has been stopped another instance starts, with the same files for the same frames.",
-     kind, same, 30s, of_files<start_again>},
-    {"sink.two-instances", "Two instances at work at a time do not mix their files.", kind, same, 30s,
+    {"sink.gaps", "It accepts gaps in the frames' sequence numbers.", kind, gate, 30s, gaps},
+    {"sink.idle", "idle succeeds between frames.", kind, gate, 30s, idle},
+    {"sink.cancelled", "After cancellation, start, write and stop return soon, with OK or CANCELLED.", kind, gate,
+     30s, cancelled},
+    {"sink.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 60s, leaks},
+    {"sink.files",
+     "It writes files. Unless the same frames give the same files, tests that compare runs are skipped.", kind, gate,
+     30s, of_files<files>},
+    {"sink.start-again", "After a stop, another instance starts and writes the same files for the same frames.", kind,
+     same, 30s, of_files<start_again>},
+    {"sink.two-instances", "Two simultaneous instances do not mix their files.", kind, same, 30s,
      of_files<two_instances>},
-    {"sink.stride", "Its files depend on pixels, not on what lies between rows.", kind, same, 30s, of_files<stride>},
-    {"sink.every-frame", "Once write has returned OK the frame is in a file.", kind, gate, 30s,
-     of_files<every_frame>},
-    {"sink.order", "Its frames are in order, each once: in a file, and in files by the number in their names.", kind,
-     same, 30s, of_files<order>},
-    {"sink.last-frame", "Its files at the end show the last frame.", kind, same, 30s, of_files<last_frame>},
-    {"sink.earlier-files", "Until its first frame it leaves an earlier run's files as they are.", kind, gate, 30s,
+    {"sink.stride", "Its files do not depend on the padding between rows.", kind, same, 30s, of_files<stride>},
+    {"sink.every-frame", "When write returns OK, the frame is in a file.", kind, gate, 30s, of_files<every_frame>},
+    {"sink.order", "Each frame is stored once and in order: within a file, or in files by the number in their names.",
+     kind, same, 30s, of_files<order>},
+    {"sink.last-frame", "Its files contain the last frame.", kind, same, 30s, of_files<last_frame>},
+    {"sink.earlier-files", "It does not change an earlier run's files before its first frame.", kind, gate, 30s,
      of_files<earlier_files>},
-    {"sink.no-place", "Where nothing can be written start says so.", kind, gate, 30s, of_files<no_place>},
-    {"sink.killed", "Killed at any moment it leaves no part of a file under the file's name.", kind, same, 60s,
-     of_files<killed>, true},
-    {"sink.restart", "Killed and started again, it keeps what was before and replaces the rest.", kind, gate, 60s,
-     of_files<restart>, true},
-    {"sink.full-disk", "Where the disk takes no more it says so, and leaves no part of a file.", kind, same, 60s,
+    {"sink.no-place", "start fails with an error message if nothing can be written.", kind, gate, 30s,
+     of_files<no_place>},
+    {"sink.killed", "When it is killed, no incomplete file has a final file name.", kind, same, 60s, of_files<killed>,
+     true},
+    {"sink.restart", "Restarted after a kill, it keeps the frames before first_sequence and replaces the rest.", kind,
+     gate, 60s, of_files<restart>, true},
+    {"sink.full-disk", "On a full disk it reports an error and leaves no incomplete file.", kind, same, 60s,
      of_files<full_disk>},
-    {"sink.slow-disk", "Where the disk takes its time the frame is in a file as well once write has returned OK.",
-     kind, "sink.every-frame", 60s, slow_disk},
-    {"sink.speed", "A small frame takes less than 100 ms on the median; a warning otherwise.", kind, gate, 120s,
+    {"sink.slow-disk", "On a slow disk too, the frame is in a file when write returns OK.", kind, "sink.every-frame",
+     60s, slow_disk},
+    {"sink.speed", "The median time of a small frame is at most 100 ms; otherwise a warning.", kind, gate, 120s,
      speed},
 };
 

@@ -19,7 +19,7 @@ namespace {
 constexpr const char *writes[] = {"write", "writev",   "pwrite64",        "pwritev",   "pwritev2", "fdatasync",
                                   "fsync", "sendfile", "copy_file_range", "ftruncate", "fallocate"};
 
-// From here on the kernel asks before each of the calling thread's writes; where to answer, or negative.
+// From now on the kernel notifies of each write of the calling thread. Returns the listener, or a negative value.
 int listen_to_writes() {
     const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW), seccomp_release);
     bool failed = !filter;
@@ -42,34 +42,35 @@ void SlowDisk::under(const std::function<void(SlowDisk &)> &work) {
     std::future<void> done = std::async(std::launch::async, [&] {
         const int listener = listen_to_writes();
         listening.set_value(listener);
-        // Refused to go on, the kernel has no such call once the listener is closed.
+        // If serve() fails, the closed listener makes this write fail with ENOSYS.
         if (listener >= 0 && (::write(-1, "", 0) == 0 || errno != ENOSYS))
             work(disk);
     });
     const base::UniqueFd listener(listening.get_future().get());
     const auto is_done = [&] { return done.wait_for(0s) == std::future_status::ready; };
     if (listener.get() < 0 || !disk.serve(listener.get(), is_done))
-        throw Skip("this kernel does not let a process hold up its own writes");
+        throw Skip("this kernel does not support delaying writes");
     done.get();
 }
 
 bool SlowDisk::serve(int listener, const std::function<bool()> &is_done) {
-    seccomp_notif *asked = nullptr;
-    seccomp_notif_resp *answer = nullptr;
-    if (seccomp_notify_alloc(&asked, &answer) != 0)
+    seccomp_notif *request = nullptr;
+    seccomp_notif_resp *response = nullptr;
+    if (seccomp_notify_alloc(&request, &response) != 0)
         throw std::bad_alloc();
-    bool refused = false; // as by kernels before 5.5
+    bool refused = false; // by kernels before 5.5
     while (!refused && !is_done()) {
         pollfd ready{listener, POLLIN, 0};
-        *asked = {}; // or the kernel refuses it
-        if (::poll(&ready, 1, 2) != 1 || seccomp_notify_receive(listener, asked) != 0)
+        *request = {}; // required by the kernel
+        if (::poll(&ready, 1, 2) != 1 || seccomp_notify_receive(listener, request) != 0)
             continue;
-        if (is_file(static_cast<int>(asked->data.args[0])) && is_due_.exchange(false))
+        if (is_file(static_cast<int>(request->data.args[0])) && is_due_.exchange(false))
             std::this_thread::sleep_for(100ms);
-        *answer = {asked->id, 0, 0, SECCOMP_USER_NOTIF_FLAG_CONTINUE};
-        refused = seccomp_notify_respond(listener, answer) != 0 && errno == EINVAL; // not: who asked is gone
+        *response = {request->id, 0, 0, SECCOMP_USER_NOTIF_FLAG_CONTINUE};
+        refused =
+            seccomp_notify_respond(listener, response) != 0 && errno == EINVAL; // other errors: the thread has ended
     }
-    seccomp_notify_free(asked, answer);
+    seccomp_notify_free(request, response);
     return !refused;
 }
 

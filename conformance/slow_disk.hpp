@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A disk that takes its time. No file system is one at will, so what a thread writes is held up on its way there.
+// Simulates a slow disk: delays a thread's write system calls by seccomp's user notification, whichever library makes
+// them. No file system can be slowed down without privileges.
 #pragma once
 
 #include <atomic>
@@ -10,15 +10,15 @@ namespace arhost::conformance {
 
 class SlowDisk {
 public:
-    // Does the work on a thread of its own; what that and the threads that it starts write to files can be held up.
-    // Throws what the work throws, and Skip where the kernel has no such thing.
+    // Runs `work` on a new thread. File writes of that thread and the threads that it starts can be delayed. Throws
+    // what `work` throws, and Skip if the kernel does not support it.
     static void under(const std::function<void(SlowDisk &)> &work);
 
-    void hold_up_next_write() { is_due_ = true; } // by 100 ms
-    bool has_held_up() const { return !is_due_; }
+    void delay_next_write() { is_due_ = true; } // by 100 ms
+    bool has_delayed() const { return !is_due_; }
 
 private:
-    // Until the work is done; false: this kernel does not let those go on who wait.
+    // Answers notifications until the work is done. False if this kernel can't continue a system call.
     bool serve(int listener, const std::function<bool()> &is_done);
     std::atomic<bool> is_due_{false};
 };

@@ -47,7 +47,7 @@ std::string Slot::damage() const {
             return fmt::format("{} bytes before the slot", data() - p);
     for (const std::uint8_t *p = data() + size_; p < end; ++p)
         if (*p != guard)
-            return fmt::format("byte {} of a slot of {}", p - data(), size_);
+            return fmt::format("byte {} of a slot of {} bytes", p - data(), size_);
     return {};
 }
 
@@ -57,18 +57,19 @@ SourceRun::SourceRun(Context &context)
     instance_->create_or_fail();
 }
 
-arhost_status SourceRun::try_start(const Wish &wish) {
+arhost_status SourceRun::try_start(const Request &request) {
     stop();
     if (!std::exchange(fresh_, false)) {
         instance_.emplace(library_);
         instance_->create_or_fail();
     }
-    const arhost_source_setup setup{sizeof setup, 0, wish.first_sequence, wish.fps, wish.paced, wish.intrinsics};
+    const arhost_source_setup setup{sizeof setup,      0, request.first_sequence, request.fps, request.paced,
+                                    request.intrinsics};
     properties_ = {};
     properties_.struct_size = sizeof properties_;
     properties_.format.struct_size = sizeof properties_.format;
     properties_.intrinsics.struct_size = sizeof properties_.intrinsics;
-    next_ = wish.first_sequence;
+    next_ = request.first_sequence;
     const arhost_status status = in_call(library_.calls(), Call::start,
                                          [&] { return functions_.start(instance_->get(), &setup, &properties_); });
     started_ = status == ARHOST_STATUS_OK;
@@ -86,9 +87,9 @@ std::string SourceRun::problem() const {
     const arhost_frame_format &f = properties_.format;
     arhost_frame_format should = f;
     if (f.pixel_format < ARHOST_PIXEL_FORMAT_GREY8 || f.pixel_format > ARHOST_PIXEL_FORMAT_I420)
-        return fmt::format("its pixel format is {}, which is none", f.pixel_format);
+        return fmt::format("its pixel format {} is invalid", f.pixel_format);
     if (!arhost_frame_layout(&should))
-        return fmt::format("{}×{} is no size for its pixel format", f.width, f.height);
+        return fmt::format("{}×{} is not a valid size for its pixel format", f.width, f.height);
     for (std::uint32_t plane = 0; plane < ARHOST_MAX_PLANES; ++plane)
         if (f.stride[plane] != should.stride[plane] || f.offset[plane] != should.offset[plane])
             return fmt::format(
@@ -100,11 +101,11 @@ std::string SourceRun::problem() const {
                            f.byte_size, should.plane_count, should.byte_size);
     const bool is_yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
     if (is_yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709))
-        return fmt::format("it has Y, U and V by the matrix {}, which is none", f.yuv_matrix);
+        return fmt::format("its YUV matrix {} is invalid", f.yuv_matrix);
     if (is_yuv && (f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL))
-        return fmt::format("it has Y, U and V of the range {}, which is none", f.yuv_range);
+        return fmt::format("its YUV range {} is invalid", f.yuv_range);
     if (!std::isfinite(f.fps) || f.fps < 0)
-        return fmt::format("it gives {} frames a second", f.fps);
+        return fmt::format("its frame rate of {} is invalid", f.fps);
     return {};
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A source at work, and the frames that it gives.
+// Runs a source and keeps its frames.
 #pragma once
 
 #include "conformance/plugin_library.hpp"
@@ -19,23 +18,24 @@ struct PlaneShape {
 };
 PlaneShape shape_of(const arhost_frame_format &format, std::uint32_t plane);
 
-// A frame's pixels alone, plane after plane and row after row, and what was told of it.
+// A frame's pixels without padding, plane by plane and row by row, and its info.
 struct Frame {
     std::vector<std::uint8_t> pixels;
     arhost_frame_info info;
 };
 
-// "plane 0, row 17, byte 42": where `index` of Frame::pixels lies.
+// Position of an index of Frame::pixels, as "plane 0, row 17, byte 42".
 std::string place_of(const arhost_frame_format &format, std::size_t index);
 
-// Memory that a frame is read into, with guard bytes before and behind it.
+// Memory for a frame, with guard bytes before and after it.
 class Slot {
 public:
     explicit Slot(std::size_t size);
     std::uint8_t *data() { return lines_.front().bytes + guard_size; }
     const std::uint8_t *data() const { return lines_.front().bytes + guard_size; }
     std::size_t size() const { return size_; }
-    std::string damage() const; // what was written beside it, as the end of a sentence; empty: nothing
+    std::string
+    damage() const; // describes overwritten guard bytes, as the end of a sentence; empty if there are none
 
 private:
     struct alignas(64) Line {
@@ -47,15 +47,15 @@ private:
     std::vector<Line> lines_;
 };
 
-// What the host asks of a source: by default all there is, as fast as it comes.
-struct Wish {
+// The host's request to a source. Default: all frames, as fast as possible.
+struct Request {
     std::uint64_t first_sequence = 0;
     double fps = 0;
     bool paced = false;
     const arhost_intrinsics *intrinsics = nullptr;
 };
 
-// An instance is started once: another start makes another one.
+// An instance is started once; a further start creates a new instance.
 class SourceRun {
 public:
     explicit SourceRun(Context &context);
@@ -63,16 +63,16 @@ public:
     SourceRun(const SourceRun &) = delete;
     SourceRun &operator=(const SourceRun &) = delete;
 
-    arhost_status try_start(const Wish &wish = {});
-    void start(const Wish &wish = {}) { accept(try_start(wish)); }
-    void accept(arhost_status started); // throws Failure unless it succeeded with a format of the ABI's
+    arhost_status try_start(const Request &request = {});
+    void start(const Request &request = {}) { accept(try_start(request)); }
+    void accept(arhost_status started); // throws Failure unless it succeeded with a valid format
     void stop();
 
-    // The next frame into slot(). Its bytes are zeros before, unless `filled`.
+    // Reads the next frame into slot(), which is cleared first unless `filled`.
     arhost_status try_read(bool filled = false);
-    std::optional<Frame> read(bool filled = false);   // nothing: the source is at its end
-    std::vector<Frame> read_up_to(std::size_t count); // fewer: it is at its end
-    Frame frame() const;                              // what was read last
+    std::optional<Frame> read(bool filled = false);   // nullopt at the end
+    std::vector<Frame> read_up_to(std::size_t count); // fewer at the end
+    Frame frame() const;                              // the last one read
     std::uint64_t next() const { return next_; }      // arhost_frame_buffer.sequence of the next one
 
     bool is_live() const { return (library_.descriptor().capabilities & ARHOST_CAPABILITY_LIVE) != 0; }
@@ -83,7 +83,7 @@ public:
     Slot &slot() { return *slot_; }
 
 private:
-    std::string problem() const; // of what start told, as a sentence; empty: none
+    std::string problem() const; // with the properties from start, as a sentence; empty if none
 
     PluginLibrary &library_;
     std::optional<Instance> instance_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Sources: frames as memory, their times, the end, and the same frames again.
+// Sources: frame memory, capture times, the end, and determinism.
 #include "conformance/cancelling.hpp"
 #include "conformance/frame_times.hpp"
 #include "conformance/process_usage.hpp"
@@ -18,9 +17,9 @@
 namespace arhost::conformance {
 namespace {
 
-constexpr const char *is_live = "it is live: its frames are what the camera sees";
+constexpr const char *is_live = "it is live: its frames are not reproducible";
 
-// The two are the same frame: pixels and time.
+// Same pixels and capture time.
 void expect_same(const SourceRun &run, const Frame &is, const Frame &should, const std::string &what) {
     if (is.pixels.size() != should.pixels.size())
         throw Failure(
@@ -53,7 +52,7 @@ bool is_refusal(arhost_status status) {
     return status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION;
 }
 
-// At this rate, or at its own where it refuses that.
+// Starts at this rate, or at the source's own if it rejects it.
 void start_at(SourceRun &run, double fps, bool paced, std::uint64_t first = 0) {
     const arhost_status status = run.try_start({first, fps, paced, nullptr});
     run.accept(is_refusal(status) ? run.try_start({first, 0, paced, nullptr}) : status);
@@ -65,7 +64,7 @@ void start(Context &context) {
     SourceRun run(context);
     const arhost_status status = run.try_start();
     if (const char *const *needs = context.library.descriptor().needs; needs && *needs && status < 0)
-        throw Skip(fmt::format("it needs '{}', and {}", *needs, told("start", status, run.instance().host())));
+        throw Skip(fmt::format("it needs '{}', and {}", *needs, call_result("start", status, run.instance().host())));
     run.accept(status);
 }
 
@@ -74,9 +73,9 @@ void read(Context &context) {
     run.start();
     const std::optional<Frame> frame = run.read();
     if (!frame)
-        throw Failure("it is at its end before its first frame");
+        throw Failure("it ends before its first frame");
     if (frame->info.clock != ARHOST_CLOCK_MONOTONIC && frame->info.clock != ARHOST_CLOCK_MEDIA)
-        throw Failure(fmt::format("its clock is {}, which is none", frame->info.clock));
+        throw Failure(fmt::format("its clock {} is invalid", frame->info.clock));
 }
 
 void start_again(Context &context) {
@@ -87,7 +86,7 @@ void start_again(Context &context) {
     run.start();
     const std::vector<Frame> second = run.read_up_to(count);
     if (second.empty())
-        throw Failure("started again, it is at its end before its first frame");
+        throw Failure("started again, it ends before its first frame");
     if (!run.is_live())
         expect_same(run, second, first, "started again");
 }
@@ -105,7 +104,7 @@ void leaks(Context &context) {
 // ---- Memory ----------------------------------------------------------------------------------------
 
 void writes_every_pixel(Context &context) {
-    // A byte is as it was before by chance once in 256 times, so in all of these hardly ever.
+    // A byte keeps its value by chance with probability 1/256 per attempt.
     constexpr int attempts = 6;
     SourceRun run(context);
     run.start();
@@ -116,13 +115,13 @@ void writes_every_pixel(Context &context) {
         std::generate_n(slot.data(), slot.size(), [&] { return static_cast<std::uint8_t>(context.random() >> 24); });
         const std::vector<std::uint8_t> before = run.frame().pixels, all(slot.data(), slot.data() + slot.size());
         std::optional<Frame> frame = run.read(true);
-        if (!frame && i > 0) { // it is short: from its start again
+        if (!frame && i > 0) { // a short source: restart
             run.start();
             --i;
             continue;
         }
         if (!frame)
-            throw Failure("it is at its end before its first frame");
+            throw Failure("it ends before its first frame");
         kept.resize(before.size(), true);
         for (std::size_t k = 0; k < before.size(); ++k)
             kept[k] = kept[k] && frame->pixels[k] == before[k];
@@ -135,13 +134,13 @@ void writes_every_pixel(Context &context) {
         }
     }
     if (const auto at = std::find(kept.begin(), kept.end(), true); at != kept.end())
-        throw Failure(fmt::format("in each of {} frames, {} of {} bytes keep what was there before, the first is {}",
+        throw Failure(fmt::format("in each of {} frames, {} of {} bytes keep their previous value, the first is {}",
                                   attempts, std::count(kept.begin(), kept.end(), true), kept.size(),
                                   place_of(run.format(), static_cast<std::size_t>(at - kept.begin()))));
     if (has_grey && std::find(kept_grey.begin(), kept_grey.end(), true) != kept_grey.end())
-        throw Failure(fmt::format("it tells that it has written the grey plane, but {} of its {} bytes keep what was "
-                                  "there before",
-                                  std::count(kept_grey.begin(), kept_grey.end(), true), kept_grey.size()));
+        throw Failure(
+            fmt::format("it reports has_grey, but {} of the grey plane's {} bytes keep their previous value",
+                        std::count(kept_grey.begin(), kept_grey.end(), true), kept_grey.size()));
 }
 
 void writes_nothing_else(Context &context) {
@@ -158,13 +157,13 @@ void grey(Context &context) {
     const std::optional<Frame> frame = run.read();
     const arhost_frame_format &format = run.format();
     if (!frame || !frame->info.has_grey || format.grey_offset == 0)
-        throw Skip("it leaves the grey plane to arhost");
+        throw Skip("it does not write the grey plane");
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
     for (std::uint32_t i = 0; i < format.plane_count; ++i)
         planes[i] = run.slot().data() + format.offset[i];
     std::vector<std::uint8_t> should(std::size_t{format.grey_stride} * format.height);
     fill_grey_reference(format, planes, should.data());
-    constexpr int tolerance = 3; // other roundings
+    constexpr int tolerance = 3; // for rounding
     for (std::uint32_t y = 0; y < format.height; ++y)
         for (std::uint32_t x = 0; x < format.width; ++x) {
             const std::size_t at = std::size_t{format.grey_stride} * y + x;
@@ -189,25 +188,25 @@ void times(Context &context) {
             throw Failure(fmt::format("frame {} has the clock {}, those before it had {}", i, info.clock,
                                       frames[0].info.clock));
         if (i > 0 && info.capture_ns < frames[i - 1].info.capture_ns)
-            throw Failure(fmt::format("frame {} is of {} ns, before the one before it, which is of {} ns", i,
+            throw Failure(fmt::format("frame {} has a capture time of {} ns, less than the previous frame's {} ns", i,
                                       info.capture_ns, frames[i - 1].info.capture_ns));
-        // A camera's exposure may have been long ago where frames wait in buffers.
+        // Buffered frames may have been exposed long ago.
         constexpr std::int64_t buffered_ns = 10'000'000'000;
         if (info.clock == ARHOST_CLOCK_MONOTONIC &&
             (info.capture_ns < begin_ns - buffered_ns || info.capture_ns > end_ns))
             throw Failure(fmt::format("frame {} was captured {:.1f} s after the source was started, by its time", i,
                                       static_cast<double>(info.capture_ns - begin_ns) / 1e9));
         if (info.clock == ARHOST_CLOCK_MEDIA && info.capture_ns < 0)
-            throw Failure(fmt::format("frame {} is of {} ns, before the beginning", i, info.capture_ns));
+            throw Failure(fmt::format("frame {} has a negative capture time of {} ns", i, info.capture_ns));
     }
     if (frames.size() < 2 || run.is_live() || run.format().fps == 0)
         return;
-    double periods = 0; // those of skipped frames too
+    double periods = 0; // including skipped frames
     for (std::size_t i = 1; i < frames.size(); ++i)
         periods += 1.0 + frames[i].info.skipped;
     const double period_ns =
         static_cast<double>(frames.back().info.capture_ns - frames.front().info.capture_ns) / periods;
-    // A film's frames need not be evenly spaced.
+    // A video's frames need not be evenly spaced.
     constexpr double factor = 4;
     if (const double nominal_ns = 1e9 / run.format().fps;
         period_ns > factor * nominal_ns || period_ns < nominal_ns / factor)
@@ -226,19 +225,18 @@ void rate(Context &context) {
         const arhost_status status = run.try_start({0, fps, false, nullptr});
         if (is_refusal(status)) {
             refused += fmt::format("{}{}", refused.empty() ? "" : " and ", fps);
-            reason = told("start", status, run.instance().host());
+            reason = call_result("start", status, run.instance().host());
             continue;
         }
         run.accept(status);
         if (run.format().fps != fps)
-            throw Failure(
-                fmt::format("asked for {} frames a second, it says that it gives {}", fps, run.format().fps));
+            throw Failure(fmt::format("{} frames/s were requested, but start reports {}", fps, run.format().fps));
         const std::vector<Frame> frames = run.read_up_to(4);
         for (std::size_t i = 1; i < frames.size(); ++i) {
             const double ms = static_cast<double>(frames[i].info.capture_ns - frames[i - 1].info.capture_ns) / 1e6;
-            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of the files' clocks
-                throw Failure(fmt::format(
-                    "asked for {} frames a second, frame {} comes {:.3f} ms after the one before", fps, i, ms));
+            if (constexpr double tolerance_ms = 1; std::abs(ms - 1000 / fps) > tolerance_ms) // of file time stamps
+                throw Failure(fmt::format("with {} frames/s requested, frame {} is {:.3f} ms after the previous one",
+                                          fps, i, ms));
         }
         given = true;
     }
@@ -260,7 +258,7 @@ void late_reader(Context &context) {
     std::vector<Frame> late = run.read_up_to(count);
     std::move(late.begin(), late.end(), std::back_inserter(frames));
     const std::size_t without_restart = frames.size();
-    if (run.can_seek() && late.size() == count) { // as after a death; not at its end
+    if (run.can_seek() && late.size() == count) { // as after a worker's crash
         start_at(run, fps, true, run.next());
         if (std::optional<Frame> frame = run.read())
             frames.push_back(std::move(*frame));
@@ -293,20 +291,20 @@ void end(Context &context) {
     const std::uint64_t first = run.can_seek() && count > 3 ? count - 3 : 0;
     if (run.is_live() || count == 0 || count - first > most)
         throw Skip(run.is_live() ? is_live
-                   : count == 0  ? "it does not tell how many frames there are"
+                   : count == 0  ? "it does not report a frame count"
                                  : "it has too many frames to read them all, and can't seek");
     run.start({first, 0, false, nullptr});
     for (std::uint64_t i = first; i < count; ++i)
         if (!run.read())
-            throw Failure(fmt::format("it has {} frames, says start, but ends before frame {}", count, i));
+            throw Failure(fmt::format("start reports {} frames, but it ends before frame {}", count, i));
     const arhost_status status = run.try_read();
     if (status != ARHOST_STATUS_END && status != ARHOST_STATUS_END_TRUNCATED)
-        throw Failure(fmt::format("it has {} frames, says start, but after them {}", count,
-                                  told("read", status, run.instance().host())));
+        throw Failure(fmt::format("start reports {} frames, but after them {}", count,
+                                  call_result("read", status, run.instance().host())));
     for (int again = 0; again < 3; ++again)
         if (const arhost_status then = run.try_read(); then != status)
-            throw Failure(fmt::format("at the end read returned {}, and asked again {}", status_name(status),
-                                      status_name(then)));
+            throw Failure(
+                fmt::format("at the end read returned {}, and then {}", status_name(status), status_name(then)));
 }
 
 // ---- The same frames again -------------------------------------------------------------------------
@@ -336,8 +334,8 @@ void two_instances(Context &context) {
         for (SourceRun *run : {&first, &second}) {
             const std::optional<Frame> frame = run->read();
             if (!frame)
-                throw Failure(fmt::format("of two instances that are read by turns, one ends before frame {}", i));
-            expect_same(*run, *frame, should[i], fmt::format("of two instances that are read by turns, frame {}", i));
+                throw Failure(fmt::format("of two instances read alternately, one ends before frame {}", i));
+            expect_same(*run, *frame, should[i], fmt::format("of two instances read alternately, frame {}", i));
         }
 }
 
@@ -389,7 +387,7 @@ void intrinsics(Context &context) {
     SourceRun run(context);
     run.start();
     if (!run.properties().has_intrinsics)
-        throw Skip("it does not know its camera");
+        throw Skip("it does not report intrinsics");
     const arhost_intrinsics &camera = run.properties().intrinsics;
     const arhost_frame_format &format = run.format();
     if (camera.width != format.width || camera.height != format.height)
@@ -397,7 +395,7 @@ void intrinsics(Context &context) {
                                   format.width, format.height));
     if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
         throw Failure(fmt::format("its focal lengths are {} and {} px", camera.fx, camera.fy));
-    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // outside of the frames is fine: they may be a part
+    if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // may be outside the frame, as in a crop
         throw Failure(fmt::format("its principal point is ({}, {})", camera.cx, camera.cy));
     const std::uint32_t n = camera.coefficient_count;
     const bool fits = (camera.distortion == ARHOST_DISTORTION_NONE && n == 0) ||
@@ -431,60 +429,59 @@ void truth(Context &context) {
         if (!(worst < 1e-9))
             throw Failure(fmt::format("the rotation of its true pose is {:.2g} from an orthonormal one", worst));
         if (!(m[14] < 0))
-            throw Failure(
-                fmt::format("the marker of its true pose is at z = {} mm; what the camera sees is before it, "
-                            "where z is negative",
-                            m[14]));
+            throw Failure(fmt::format(
+                "the marker of its true pose is at z = {} mm; z is negative in front of the camera", m[14]));
     }
     if (!has_truth)
-        throw Skip("it does not know the markers' poses");
+        throw Skip("it does not report true poses");
 }
 
 void speed(Context &context) {
     SourceRun run(context);
     run.start();
-    const std::uint64_t count = run.properties().frame_count; // its end is no frame
+    const std::uint64_t count = run.properties().frame_count; // does not measure the END call
     std::uint64_t next = 0;
     const std::vector<double> ms =
         frame_times_ms([&] { return (count == 0 || next++ < count) && run.try_read() == ARHOST_STATUS_OK; });
     if (ms.empty())
-        throw Skip("it gives no frame");
-    judge_speed(context, run.format().width, run.format().height, ms, 100);
+        throw Skip("it delivers no frame");
+    check_speed(context, run.format().width, run.format().height, ms, 100);
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_SOURCE;
 constexpr const char *gate = "source.read";
 constexpr Test tests[] = {
-    {"source.start", "It starts with a format of the ABI's, laid out as the ABI says, and stops.", kind, "abi.create",
-     30s, start},
-    {"source.read", "It gives a frame and names its clock.", kind, "source.start", 30s, read},
-    {"source.deterministic", "Another instance gives the same frames at the same times; not of live ones.", kind,
+    {"source.start", "It starts with a pixel format and layout of the ABI, and stops.", kind, "abi.create", 30s,
+     start},
+    {"source.read", "It delivers a frame with a valid clock.", kind, "source.start", 30s, read},
+    {"source.deterministic",
+     "Another instance delivers the same frames with the same capture times; not checked for live sources.", kind,
      gate, 30s, deterministic},
-    {"source.start-again", "Once it has been stopped another instance starts, and gives the same frames.", kind, gate,
-     30s, start_again},
-    {"source.two-instances", "Two instances that are read by turns give the frames of one alone; not of live ones.",
-     kind, "source.deterministic", 30s, two_instances},
-    {"source.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
-     120s, leaks},
-    {"source.writes-every-pixel", "Every pixel of a frame is written, whatever was there.", kind, gate, 30s,
-     writes_every_pixel},
-    {"source.writes-nothing-else", "No byte before or behind the slot is written.", kind, gate, 30s,
+    {"source.start-again", "After a stop, another instance starts and delivers the same frames.", kind, gate, 30s,
+     start_again},
+    {"source.two-instances",
+     "Two instances read alternately deliver the frames of a single one; not checked for live sources.", kind,
+     "source.deterministic", 30s, two_instances},
+    {"source.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 120s, leaks},
+    {"source.writes-every-pixel", "Every pixel of a frame is written.", kind, gate, 30s, writes_every_pixel},
+    {"source.writes-nothing-else", "No byte before or after the slot is written.", kind, gate, 30s,
      writes_nothing_else},
-    {"source.grey", "A grey plane that it writes is the frame's luma.", kind, gate, 30s, grey},
-    {"source.times", "Capture times never go back, and are about of the rate that it tells.", kind, gate, 30s, times},
-    {"source.rate", "One that is not live gives as many frames a second as it is asked for, or refuses.", kind, gate,
-     30s, rate},
-    {"source.late-reader", "In mode live a late reader gets the frames of their times, also after a restart.", kind,
+    {"source.grey", "A grey plane that it writes equals the frame's luma.", kind, gate, 30s, grey},
+    {"source.times", "Capture times never decrease, and roughly match the reported rate.", kind, gate, 30s, times},
+    {"source.rate", "A source that is not live delivers the requested frame rate, or rejects it.", kind, gate, 30s,
+     rate},
+    {"source.late-reader", "In live mode a late reader gets frames with matching times, also after a restart.", kind,
      "source.deterministic", 30s, late_reader},
-    {"source.end", "It has as many frames as it tells, and once at its end it stays there.", kind, gate, 60s, end},
-    {"source.seek", "Started at any frame, it gives the frames of an uninterrupted run.", kind, gate, 30s, seek},
-    {"source.cancelled", "Cancelled before, start and read return soon, OK or CANCELLED.", kind, gate, 20s,
+    {"source.end", "It delivers the reported number of frames, and read keeps returning END after them.", kind, gate,
+     60s, end},
+    {"source.seek", "Started at any frame, it delivers the frames of an uninterrupted run.", kind, gate, 30s, seek},
+    {"source.cancelled", "After cancellation, start and read return soon, with OK or CANCELLED.", kind, gate, 20s,
      cancelled},
-    {"source.cancel-while-waiting", "Cancelled while it waits for a frame, read returns within 2 s.", kind, gate, 20s,
+    {"source.cancel-while-waiting", "Cancelled while waiting for a frame, read returns within 2 s.", kind, gate, 20s,
      cancel_while_waiting},
-    {"source.intrinsics", "The camera that it tells is one, and has the frames' size.", kind, gate, 20s, intrinsics},
-    {"source.truth", "The true pose that it tells is rigid and before the camera.", kind, gate, 20s, truth},
-    {"source.speed", "A frame takes less than 100 ms on the median; a warning otherwise.", kind, gate, 60s, speed},
+    {"source.intrinsics", "Reported intrinsics are valid and have the frames' size.", kind, gate, 20s, intrinsics},
+    {"source.truth", "A reported true pose is rigid and in front of the camera.", kind, gate, 20s, truth},
+    {"source.speed", "The median time of a frame is at most 100 ms; otherwise a warning.", kind, gate, 60s, speed},
 };
 
 } // namespace

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A test: one sentence that a plugin must keep, and a function that tries it. It runs in a process of its
-// own and says what is wrong by throwing.
+// A test: a requirement of the ABI and a function that checks it. It runs in its own process and reports a violation
+// by throwing.
 #pragma once
 
 #include "conformance/picture.hpp"
@@ -20,8 +19,8 @@
 
 namespace arhost::conformance {
 
-// The plugin is wrong: a sentence with numbers, and the images that show it. Any other std::exception is an
-// error of the suite.
+// The plugin violates the requirement: a sentence with numbers, and images that show it. Any other std::exception is
+// an error of the suite.
 class Failure : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -43,35 +42,35 @@ struct Warning : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// What a test is given.
+// Input of a test.
 struct Context {
     PluginLibrary &library;
-    std::filesystem::path reference;       // the ray tracer to compare with
-    std::mt19937_64 random;                // of the seed, the same for every test
-    ipc::Json facts = ipc::Json::object(); // of abi.load: what the plugin tells of itself
-    std::string note{};                    // beside a pass: what was measured
-    double timeout_factor = 1;             // times what a test allows
-    PrintFiles prints{};                   // of the markers that a tracker finds; none: the suite's own
+    std::filesystem::path reference;       // the ray tracer to compare images with
+    std::mt19937_64 random;                // seeded the same for every test
+    ipc::Json facts = ipc::Json::object(); // set by abi.load: the plugin's description
+    std::string note{};                    // reported with a pass: measurements
+    double timeout_factor = 1;             // multiplies the times that a test allows
+    PrintFiles prints{};                   // markers that the tracker detects; empty: the suite's tags
 
     double uniform(double low, double high) {
-        // std::uniform_real_distribution differs between libraries.
+        // std::uniform_real_distribution differs between standard libraries.
         return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
     }
 };
 
 struct Test {
-    const char *name;    // "raytracer.miss-alpha"
-    const char *promise; // what a plugin that passes does
-    arhost_kind kind;    // 0: any
-    const char *needs;   // the test without whose passing this one would say nothing; "": none
+    const char *name;        // "raytracer.miss-alpha"
+    const char *requirement; // one sentence about the plugin
+    arhost_kind kind;        // 0: every kind
+    const char *needs;       // a test that must pass for this one to be meaningful, or ""
     std::chrono::milliseconds deadline;
     void (*run)(Context &);
-    bool forks = false; // the suite itself, so the sandbox lets the plugin too
+    bool forks = false; // the test forks, so the sandbox allows it
 };
 
 using namespace std::chrono_literals;
 
-// In the order that they run in: what a test needs stands before it.
+// In order of execution: a test comes after the one that it needs.
 std::span<const Test> abi_tests();
 std::span<const Test> raytracer_alpha_tests();
 std::span<const Test> raytracer_camera_tests();
@@ -85,7 +84,7 @@ std::span<const Test> tracker_pose_tests();
 std::span<const Test> source_tests();
 std::span<const Test> sink_tests();
 
-// What some of the tests run in a further process; none of the suite's own.
+// Run by tests in further processes; not listed.
 std::span<const Test> helper_tests();
 
 inline std::vector<Test> all_tests() {

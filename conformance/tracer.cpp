@@ -28,7 +28,7 @@ SealedScene::SealedScene(scene::ArenaBuilder builder) : memory_(nullptr), size_(
     const std::span<std::byte> bytes(static_cast<std::byte *>(memory_), size_);
     std::move(builder).write(bytes);
     if (const std::string problem = scene::validate(bytes); !problem.empty())
-        throw std::runtime_error("the test's scene is not valid: " + problem);
+        throw std::runtime_error("the test's scene is invalid: " + problem);
     ::mprotect(memory_, size_, PROT_READ);
 }
 
@@ -71,14 +71,14 @@ void Tracer::change_scene(scene::ArenaBuilder builder) {
 arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                                  const arhost_motion *motion) {
     const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
-    slot_ = picture; // of the same size as the one before, and so at its place
+    slot_ = picture; // keeps its address, because the size is the same
     const arhost_image image = slot_->image();
     info = {};
     info.struct_size = sizeof info;
     const auto begin = std::chrono::steady_clock::now();
     const arhost_status status = in_call(instance_.library().calls(), Call::per_frame,
                                          [&] { return functions_.render(instance_.get(), &request, &image, &info); });
-    took_ = std::chrono::steady_clock::now() - begin;
+    duration_ = std::chrono::steady_clock::now() - begin;
     picture = *slot_;
     return status;
 }

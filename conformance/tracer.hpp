@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A ray tracer at work on a scene.
+// Runs a ray tracer on a scene.
 #pragma once
 
 #include "conformance/picture.hpp"
@@ -14,7 +13,7 @@
 
 namespace arhost::conformance {
 
-// A scene in memory that can't be written, as the host's is: who tries, crashes.
+// A scene in read-only memory, as the host's: a write crashes.
 class SealedScene {
 public:
     explicit SealedScene(scene::ArenaBuilder builder);
@@ -43,21 +42,21 @@ public:
     arhost_status try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                              const arhost_motion *motion = nullptr);
 
-    // Started if need be. Throws Failure unless it succeeds.
+    // Starts if necessary. Throws Failure unless it succeeds.
     Picture render(const arhost_camera &camera, const arhost_motion *motion = nullptr, std::uint8_t fill = 0);
 
     Instance &instance() { return instance_; }
-    const arhost_render_info &info() const { return info_; } // of the last render
-    std::chrono::nanoseconds took() const { return took_; }  // the last call of render
+    const arhost_render_info &info() const { return info_; }        // of the last render
+    std::chrono::nanoseconds duration() const { return duration_; } // duration of the last render
 
 private:
     Instance instance_;
-    std::optional<SealedScene> scene_; // ends after a stop
+    std::optional<SealedScene> scene_; // must outlive start to stop
     const arhost_raytracer &functions_;
     std::optional<arhost_intrinsics> started_;
-    std::optional<Picture> slot_; // where all images are written from start to stop
+    std::optional<Picture> slot_; // the same memory for all images from start to stop
     arhost_render_info info_{};
-    std::chrono::nanoseconds took_{};
+    std::chrono::nanoseconds duration_{};
 };
 
 } // namespace arhost::conformance

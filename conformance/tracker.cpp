@@ -23,7 +23,7 @@ arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_
     format.yuv_range = ARHOST_YUV_RANGE_FULL;
     format.fps = 30;
     if (!arhost_frame_layout(&format))
-        throw std::runtime_error("the test's frame has no layout");
+        throw std::runtime_error("the test's frame format is invalid");
     return format;
 }
 
@@ -114,16 +114,16 @@ void Tracker::stop() {
 arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns) {
     auto *result = new (result_memory_.data()) arhost_tracker_result{};
     result->struct_size = sizeof *result;
-    const arhost_frame given = frame.frame(sequence, capture_ns);
+    const arhost_frame input = frame.frame(sequence, capture_ns);
     return in_call(library_.calls(), Call::per_frame,
-                   [&] { return functions_.track(instance_->get(), &given, result); });
+                   [&] { return functions_.track(instance_->get(), &input, result); });
 }
 
 std::vector<arhost_marker> Tracker::records() const {
     const auto &result = *reinterpret_cast<const arhost_tracker_result *>(result_memory_.data());
     if (result.marker_count > ARHOST_MAX_MARKERS)
         throw Failure(
-            fmt::format("it reports {} markers; {} are the most", result.marker_count, +ARHOST_MAX_MARKERS));
+            fmt::format("it reports {} markers; the limit is {}", result.marker_count, +ARHOST_MAX_MARKERS));
     return {result.markers, result.markers + result.marker_count};
 }
 
@@ -142,7 +142,7 @@ std::vector<arhost_marker> Tracker::track(const SealedFrame &frame) {
     return seen();
 }
 
-std::vector<arhost_marker> Tracker::look(const SealedFrame &frame) {
+std::vector<arhost_marker> Tracker::track_first(const SealedFrame &frame) {
     if (sequence_ > 0)
         start(camera_, listed_, format_);
     return track(frame);
@@ -162,40 +162,40 @@ double angle_degrees(const Pose &a, const Pose &b) {
 arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
                          const Grey &image) {
     if (found.size() != 1)
-        throw Failure(fmt::format("{}, {} markers are seen and must be one", where, found.size()))
+        throw Failure(fmt::format("{}, it reports {} markers instead of 1", where, found.size()))
             .with("frame", image.picture());
     if (found[0].id != id)
-        throw Failure(fmt::format("{}, marker {} is reported and {} is in view", where, found[0].id, id))
+        throw Failure(fmt::format("{}, it reports marker {} instead of {}", where, found[0].id, id))
             .with("frame", image.picture());
     return found[0];
 }
 
-void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,
+void expect_pose(const arhost_marker &marker, const Pose &expected, const Bounds &bounds, const std::string &where,
                  const Grey &image) {
-    const Pose is = pose_of(marker);
-    const glm::dvec3 at = is[3], must = should[3];
-    const double off = glm::distance(at, must) / glm::length(must);
-    if (!(off <= bounds.share))
-        throw Failure(fmt::format("{}, marker {} is at ({:.2f}, {:.2f}, {:.2f}) mm and must be at ({:.2f}, {:.2f}, "
-                                  "{:.2f}): {:.2f} % of the distance off, {} % are allowed",
-                                  where, marker.id, at.x, at.y, at.z, must.x, must.y, must.z, 100 * off,
-                                  100 * bounds.share))
+    const Pose actual = pose_of(marker);
+    const glm::dvec3 at = actual[3], expected_at = expected[3];
+    const double error = glm::distance(at, expected_at) / glm::length(expected_at);
+    if (!(error <= bounds.share))
+        throw Failure(fmt::format("{}, marker {} is at ({:.2f}, {:.2f}, {:.2f}) mm instead of ({:.2f}, {:.2f}, "
+                                  "{:.2f}): an error of {:.2f} % of the distance, {} % are allowed",
+                                  where, marker.id, at.x, at.y, at.z, expected_at.x, expected_at.y, expected_at.z,
+                                  100 * error, 100 * bounds.share))
             .with("frame", image.picture());
-    if (const double turned = angle_degrees(is, should); !(turned <= bounds.degrees))
-        throw Failure(fmt::format("{}, marker {} is turned by {:.2f}° against the truth; {}° are allowed", where,
-                                  marker.id, turned, bounds.degrees))
+    if (const double angle = angle_degrees(actual, expected); !(angle <= bounds.degrees))
+        throw Failure(fmt::format("{}, the rotation of marker {} is off by {:.2f}°; {}° are allowed", where,
+                                  marker.id, angle, bounds.degrees))
             .with("frame", image.picture());
 }
 
 void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image) {
     if (!found.empty())
-        throw Failure(fmt::format("{}, marker {} is seen", where, found[0].id)).with("frame", image.picture());
+        throw Failure(fmt::format("{}, it reports marker {}", where, found[0].id)).with("frame", image.picture());
 }
 
 void expect_found(Tracker &tracker, const Placed &marker, const Grey &image, const Bounds &bounds,
                   const std::string &where) {
-    expect_pose(expect_one(tracker.look(image), marker.print.id, where, image), marker.camera_from_marker, bounds,
-                where, image);
+    expect_pose(expect_one(tracker.track_first(image), marker.print.id, where, image), marker.camera_from_marker,
+                bounds, where, image);
 }
 
 } // namespace arhost::conformance

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A tracker at work on frames of printed markers.
+// Runs a tracker on frames of printed markers.
 #pragma once
 
 #include "conformance/guarded_memory.hpp"
@@ -14,7 +13,7 @@
 
 namespace arhost::conformance {
 
-// A frame in memory that can't be written. What is in no pixel is noise, chosen by `filler`.
+// A frame in read-only memory. Bytes outside the pixels are noise with the seed `filler`.
 class SealedFrame {
 public:
     SealedFrame(const Grey &image, arhost_pixel_format format, std::uint64_t filler = 1);
@@ -27,12 +26,12 @@ private:
 
 arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_pixel_format format);
 
-struct Listed { // in the configuration
+struct Listed { // a marker of the configuration
     int id;
     double side_mm;
 };
 
-// An instance is started once: another start makes another one.
+// An instance is started once; a further start creates a new instance.
 class Tracker {
 public:
     explicit Tracker(Context &context, Settings overrides = {});
@@ -49,17 +48,19 @@ public:
     void stop();
 
     arhost_status try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns);
-    std::vector<arhost_marker> records() const; // of the last track
-    std::vector<arhost_marker> seen() const;    // those of markers in the frame, whatever their pose is made of
+    std::vector<arhost_marker> records() const; // of the last call of track
+    std::vector<arhost_marker> seen() const;    // records of markers in the frame, with measured or smoothed pose
 
-    // Those that it sees in the next frame, 30 a second. Throws Failure unless it succeeds.
+    // seen() in the next frame, at 30 frames/s. Throws Failure unless it succeeds.
     std::vector<arhost_marker> track(const SealedFrame &frame);
     std::vector<arhost_marker> track(const Grey &image) {
         return track(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8));
     }
-    // In a frame that is the first since start, and so has no history to smooth with.
-    std::vector<arhost_marker> look(const SealedFrame &frame);
-    std::vector<arhost_marker> look(const Grey &image) { return look(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8)); }
+    // Like track, in the first frame after a start: without history to smooth with.
+    std::vector<arhost_marker> track_first(const SealedFrame &frame);
+    std::vector<arhost_marker> track_first(const Grey &image) {
+        return track_first(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8));
+    }
 
     Instance &instance() { return *instance_; }
 
@@ -72,7 +73,7 @@ private:
     const arhost_tracker &functions_;
     GuardedMemory result_memory_;
     bool fresh_ = true, started_ = false;
-    arhost_intrinsics camera_{}; // as it was last started
+    arhost_intrinsics camera_{}; // of the last start
     std::vector<Listed> listed_;
     arhost_pixel_format format_ = ARHOST_PIXEL_FORMAT_GREY8;
     std::uint64_t sequence_ = 0; // of the next frame
@@ -80,7 +81,7 @@ private:
 
 inline constexpr std::int64_t frame_ns = 33'333'333;
 
-// A wide camera, whose frames of one byte a pixel end and begin with pages.
+// A wide-angle camera. Its frames with one byte per pixel fill whole memory pages.
 inline arhost_intrinsics wide_camera() {
     return pinhole(320, 256, 300);
 }
@@ -89,20 +90,20 @@ inline arhost_intrinsics wide_camera() {
 
 struct Bounds {
     double degrees; // of the rotation
-    double share;   // of the distance, for the translation
+    double share;   // of the translation, relative to the distance
 };
 inline constexpr Bounds roughly{3, 0.02};
 
 double angle_degrees(const Pose &a, const Pose &b);
 Pose pose_of(const arhost_marker &marker);
 
-// The one marker that is seen, and where it must be.
+// Returns the only marker in `found`; throws Failure if there is not exactly one, with this id.
 arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
                          const Grey &image);
 void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,
                  const Grey &image);
 void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image);
-// By a tracker that has been started for it.
+// `tracker` must have been started with this marker.
 void expect_found(Tracker &tracker, const Placed &marker, const Grey &image, const Bounds &bounds,
                   const std::string &where);
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Which markers are found, in good frames and bad ones, and what is none.
+// Detection of markers in good and bad frames, and false positives.
 #include "conformance/tracker.hpp"
 
 #include <fmt/format.h>
@@ -23,7 +22,7 @@ std::vector<Listed> listed(std::span<const Print> prints, double side = side_mm)
     return all;
 }
 
-// What a sensor adds, normally distributed by Box and Muller's method.
+// Adds normally distributed sensor noise (Box–Muller).
 Grey noisy(const Grey &image, double sigma, Context &context) {
     return filled(image.width, image.height, [&](auto x, auto y) {
         const double radius = std::sqrt(-2 * std::log(1 - context.uniform(0, 1)));
@@ -34,7 +33,7 @@ Grey noisy(const Grey &image, double sigma, Context &context) {
 
 // ---- Bad frames ------------------------------------------------------------------------------------
 
-// The first print at several poses, its image made worse by `change`: found, and where it is.
+// Expects the first print at several poses in images degraded by `change`.
 template <class Change> void expect_found_in(Context &context, const std::string &where, Change &&change) {
     const Print print = prints_of(context.prints).front();
     Tracker tracker(context);
@@ -86,7 +85,7 @@ void occlusion(Context &context) {
                 const Grey image = filled(whole.width, whole.height, [&](auto x, auto y) {
                     return glm::distance(glm::dvec2(x, y), hidden[corner]) < radius ? code : whole.at(x, y);
                 });
-                for (const arhost_marker &found : tracker.look(image))
+                for (const arhost_marker &found : tracker.track_first(image))
                     expect_pose(found, marker.camera_from_marker, {5, 0.03}, where, image);
             }
 }
@@ -105,7 +104,7 @@ void recall(Context &context) {
         const Placed marker{print, side_mm,
                             tilted(centre, context.uniform(0, 50), context.uniform(0, 360), context.uniform(0, 360))};
         const Grey image = draw(wide_camera(), marker);
-        const std::vector<arhost_marker> markers = tracker.look(image);
+        const std::vector<arhost_marker> markers = tracker.track_first(image);
         if (markers.empty()) {
             missed = image;
             continue;
@@ -126,12 +125,12 @@ void recall(Context &context) {
 
 // ---- Several markers -------------------------------------------------------------------------------
 
-// Each print in a quarter of the image, with sides of their own.
+// Each print in a quarter of the image, with different sides.
 struct Group {
     explicit Group(Context &context) {
         std::vector<Print> prints = prints_of(context.prints);
         if (prints.size() < 3)
-            throw Skip("it takes three prints");
+            throw Skip("it needs three prints");
         prints.resize(std::min<std::size_t>(prints.size(), 4), prints[0]);
         const glm::dvec3 places[] = {{-62, 45, -250}, {62, 45, -250}, {62, -48, -260}, {-62, -48, -240}};
         for (std::size_t i = 0; i < prints.size(); ++i) {
@@ -156,9 +155,9 @@ void several(Context &context) {
         for (const Placed &marker : order)
             list.push_back({marker.print.id, marker.side_mm});
         tracker.start(wide_camera(), list);
-        const std::vector<arhost_marker> found = tracker.look(image);
+        const std::vector<arhost_marker> found = tracker.track_first(image);
         if (found.size() != order.size())
-            throw Failure(fmt::format("of {} markers in view {} are seen", order.size(), found.size()))
+            throw Failure(fmt::format("of {} markers in view, {} are reported", order.size(), found.size()))
                 .with("frame", image.picture());
         for (std::size_t i = 0; i < order.size(); ++i) {
             if (found[i].id != order[i].print.id)
@@ -175,7 +174,8 @@ void unlisted(Context &context) {
     const Grey image = draw(wide_camera(), group.markers);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{group.markers[1].print.id, group.markers[1].side_mm}});
-    expect_one(tracker.look(image), group.markers[1].print.id, "with others in view that are not listed", image);
+    expect_one(tracker.track_first(image), group.markers[1].print.id, "with others in view that are not listed",
+               image);
 }
 
 void seen_twice(Context &context) {
@@ -185,7 +185,7 @@ void seen_twice(Context &context) {
     const Grey image = draw(wide_camera(), twice);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{print.id, 60}});
-    expect_one(tracker.look(image), print.id, "with the same print seen twice", image);
+    expect_one(tracker.track_first(image), print.id, "with the same print seen twice", image);
 }
 
 void mirrored(Context &context) {
@@ -194,7 +194,7 @@ void mirrored(Context &context) {
     tracker.start(wide_camera(), listed(prints));
     for (const Print &print : prints) {
         const Grey image = draw(wide_camera(), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
-        expect_none(tracker.look(image), "of a mirrored print", image);
+        expect_none(tracker.track_first(image), "of a mirrored print", image);
     }
 }
 
@@ -206,7 +206,7 @@ void no_marker(Context &context) {
     tracker.start(wide_camera(), listed(prints));
     const auto expect_nothing = [&](const std::string &what, const auto &code) {
         const Grey image = filled(320, 256, code);
-        expect_none(tracker.look(image), "in " + what, image);
+        expect_none(tracker.track_first(image), "in " + what, image);
     };
     for (const int grey : {0, 255, 128})
         expect_nothing(fmt::format("an image of code {}", grey), [&](auto, auto) { return grey; });
@@ -230,7 +230,7 @@ void no_marker(Context &context) {
         for (std::uint32_t y = y0; y < y1; ++y)
             std::fill(&clutter.at(x0, y), &clutter.at(x0, y) + (x1 - x0), code);
     }
-    expect_none(tracker.look(clutter), "among rectangles", clutter);
+    expect_none(tracker.track_first(clutter), "among rectangles", clutter);
 }
 
 // ---- Sizes and layouts -----------------------------------------------------------------------------
@@ -252,7 +252,7 @@ void sizes(Context &context) {
             const Grey image = filled(size.width, size.height, [&](auto, auto) {
                 return flat ? 0 : static_cast<int>(context.random() & 255);
             });
-            expect_none(tracker.look(image),
+            expect_none(tracker.track_first(image),
                         fmt::format("in {} of {}×{}", flat ? "black" : "noise", size.width, size.height), image);
         }
     }
@@ -266,8 +266,9 @@ void stride(Context &context) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, side_mm}});
     for (const std::uint64_t filler : {1, 2}) {
-        const arhost_marker found = expect_one(tracker.look(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8, filler)),
-                                               marker.print.id, "in rows with bytes between them", image);
+        const arhost_marker found =
+            expect_one(tracker.track_first(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8, filler)), marker.print.id,
+                       "in rows with bytes between them", image);
         expect_pose(found, marker.camera_from_marker, roughly, "in rows with bytes between them", image);
     }
 }
@@ -285,7 +286,7 @@ void formats(Context &context) {
         tracker.start(wide_camera(), {{marker.print.id, side_mm}}, format);
         const std::string where = fmt::format("in a frame of {}", name);
         const arhost_marker found =
-            expect_one(tracker.look(SealedFrame(image, format)), marker.print.id, where, image);
+            expect_one(tracker.track_first(SealedFrame(image, format)), marker.print.id, where, image);
         expect_pose(found, marker.camera_from_marker, roughly, where, image);
     }
 }
@@ -293,27 +294,29 @@ void formats(Context &context) {
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
 constexpr const char *gate = "tracker.track", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
-    {"tracker.blur", "A print is found in a blur of 1.5 px, and where it is: to 3° and 2 % of the distance.", kind,
-     pose_gate, 20s, blur},
-    {"tracker.noise", "A print is found in noise of 7 codes, and where it is: to 3° and 2 % of the distance.", kind,
-     pose_gate, 20s, noise},
+    {"tracker.blur", "A marker blurred by 1.5 px is detected, to 3° and 2 % of the distance.", kind, pose_gate, 20s,
+     blur},
+    {"tracker.noise", "A marker in noise of 7 codes is detected, to 3° and 2 % of the distance.", kind, pose_gate,
+     20s, noise},
     {"tracker.exposure",
-     "A print is found in the dark, overexposed, behind haze and lit from the side, and where it is.", kind,
+     "A marker is detected with a correct pose in the dark, overexposed, behind haze and lit from the side.", kind,
      pose_gate, 20s, exposure},
-    {"tracker.occlusion", "A print with a hidden corner is not found, or where it is: to 5° and 3 % of the distance.",
-     kind, pose_gate, 20s, occlusion},
-    {"tracker.recall", "Of 20 random views of a print 50 to 140 px wide, 19 are found and none elsewhere.", kind,
-     pose_gate, 30s, recall},
-    {"tracker.several", "Each of several markers has its own id, side and pose, in the order of the list.", kind,
+    {"tracker.occlusion", "A marker with a hidden corner is not detected, or to 5° and 3 % of the distance.", kind,
+     pose_gate, 20s, occlusion},
+    {"tracker.recall",
+     "Of 20 random views of a marker 50 to 140 px wide, 19 are detected, all at the right position.", kind, pose_gate,
+     30s, recall},
+    {"tracker.several", "Each of several markers has its id, side and pose, in the order of the list.", kind,
      pose_gate, 20s, several},
-    {"tracker.unlisted", "A marker that is not listed is not reported.", kind, gate, 20s, unlisted},
-    {"tracker.seen-twice", "A marker that is seen twice has one record.", kind, gate, 20s, seen_twice},
-    {"tracker.mirrored", "A mirrored print is not found.", kind, gate, 20s, mirrored},
-    {"tracker.no-marker", "In black, white, noise and clutter nothing is found.", kind, gate, 20s, no_marker},
-    {"tracker.sizes", "Images of one pixel, one row, one column and small ones are refused, or nothing is found.",
-     kind, gate, 20s, sizes},
-    {"tracker.stride", "What lies between the rows does not count.", kind, pose_gate, 20s, stride},
-    {"tracker.formats", "Of colour frames the grey plane is read, wherever it is.", kind, pose_gate, 20s, formats},
+    {"tracker.unlisted", "Markers that are not listed are not reported.", kind, gate, 20s, unlisted},
+    {"tracker.seen-twice", "A marker visible twice has one record.", kind, gate, 20s, seen_twice},
+    {"tracker.mirrored", "A mirrored marker is not detected.", kind, gate, 20s, mirrored},
+    {"tracker.no-marker", "Nothing is detected in black, white, noise and clutter.", kind, gate, 20s, no_marker},
+    {"tracker.sizes",
+     "Images of one pixel, one row, one column and other small sizes are rejected, or nothing is detected.", kind,
+     gate, 20s, sizes},
+    {"tracker.stride", "Padding between rows is ignored.", kind, pose_gate, 20s, stride},
+    {"tracker.formats", "For colour frames the grey plane is read, wherever it is.", kind, pose_gate, 20s, formats},
 };
 
 } // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// A tracker's life from start to stop, what it refuses, what its records say, and that a frame is tracked for itself.
+// A tracker from start to stop: rejected input, records, and independence of earlier frames.
 #include "conformance/cancelling.hpp"
 #include "conformance/frame_times.hpp"
 #include "conformance/process_usage.hpp"
@@ -23,7 +22,7 @@ Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25,
     return {prints_of(context.prints).front(), side_mm, at};
 }
 
-// A tracker that has been started with that print alone.
+// A tracker started with only that print.
 struct Started {
     explicit Started(Context &context, Settings overrides = {})
         : marker(first_print(context)), tracker(context, std::move(overrides)) {
@@ -35,7 +34,7 @@ struct Started {
     Tracker tracker;
 };
 
-// Where a new instance that has seen nothing else finds it.
+// The pose from a new instance.
 Pose found_by_new(Context &context, const arhost_intrinsics &camera, const Placed &marker, const Grey &image) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, marker.side_mm}});
@@ -127,7 +126,7 @@ void longer_structs(Context &context) {
     };
     const std::vector<Print> prints = prints_of(context.prints);
     if (prints.size() < 2)
-        throw Skip("it takes two prints");
+        throw Skip("it needs two prints");
     const std::uint64_t garbage = 0xa5a5a5a5a5a5a5a5;
     std::vector<Longer> listed;
     listed.reserve(2);
@@ -172,10 +171,10 @@ Grey without_print() {
 void deterministic(Context &context) {
     Started one(context), other(context);
     const Grey here = one.at(one.marker.camera_from_marker), beside = one.at(tilted({-15, 20, -280}, 30, 70, 30));
-    const Grey gone = without_print();
+    const Grey empty_frame = without_print();
     std::vector<arhost_marker> before;
     int number = 0;
-    for (const Grey *image : {&here, &here, &here, &beside, &gone, &here}) {
+    for (const Grey *image : {&here, &here, &here, &beside, &empty_frame, &here}) {
         const std::string frame = fmt::format("in frame {}", ++number);
         one.tracker.track(*image);
         other.tracker.track(*image);
@@ -201,15 +200,15 @@ void threads(Context &context) {
                     fmt::format("on {} threads", count));
 }
 
-arhost_marker told_anew(Context &context, const Started &started, const Grey &image) {
+arhost_marker detect_with_new(Context &context, const Started &started, const Grey &image) {
     Started other(context);
     return expect_one(other.tracker.track(image), started.marker.print.id, "to a new instance", image);
 }
 
-// What it has just told of this frame is what a new instance tells, unless it is smoothed.
+// The record of this frame equals that of a new instance, unless it is smoothed.
 void expect_as_new(Context &context, const Started &started, const Grey &image, const std::string &when) {
     const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
-    const arhost_marker should = told_anew(context, started, image);
+    const arhost_marker should = detect_with_new(context, started, image);
     if (is.state == ARHOST_MARKER_DETECTED && should.state == ARHOST_MARKER_DETECTED)
         expect_same({&is, 1}, {&should, 1}, when);
 }
@@ -242,8 +241,8 @@ void settles(Context &context) {
     const std::string when = fmt::format("standing still for {} frames", still);
     const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
     if (is.state == ARHOST_MARKER_DETECTED)
-        return; // of this frame alone
-    expect_pose(is, pose_of(told_anew(context, started, image)), roughly, when, image);
+        return; // not smoothed: covered by other tests
+    expect_pose(is, pose_of(detect_with_new(context, started, image)), roughly, when, image);
 }
 
 void out_of_order(Context &context) {
@@ -274,7 +273,7 @@ void out_of_order(Context &context) {
 
 constexpr double orthonormal = 1e-9; // arhost/tracker.h
 
-// What keeps a matrix from being a rigid motion, as the end of a sentence; empty: nothing.
+// Describes why a matrix is not a rigid transform, as the end of a sentence; empty if it is one.
 std::string not_rigid(const double *m, double tolerance) {
     if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
         return "is not finite";
@@ -297,7 +296,7 @@ template <class Check> void of_several_poses(Context &context, Check &&check) {
          {pose({0, 0, -250}), tilted({40, 30, -300}, 50, 20, 90), tilted({-60, -20, -280}, 40, 250, 200)}) {
         const Grey image = started.at(at);
         const arhost_marker marker =
-            expect_one(started.tracker.look(image), started.marker.print.id, "in view", image);
+            expect_one(started.tracker.track_first(image), started.marker.print.id, "in view", image);
         if (const std::string problem = check(marker); !problem.empty())
             throw Failure("the record's " + problem).with("frame", image.picture());
     }
@@ -332,29 +331,29 @@ void record(Context &context) {
     });
 }
 
-// What it tells of a marker that is not in view, if it tells of it.
+// Records of a marker that is out of view, if there are any.
 void not_seen(Context &context) {
-    constexpr std::uint32_t seen_for = 3, gone_for = 12;
+    constexpr std::uint32_t visible_for = 3, lost_for = 12;
     Started started(context);
-    const Grey here = started.at(started.marker.camera_from_marker), gone = without_print();
-    bool told = false;
+    const Grey here = started.at(started.marker.camera_from_marker), empty_frame = without_print();
+    bool reported = false;
     for (int time = 0; time < 2; ++time) {
         std::vector<arhost_marker> last, last_seen;
-        for (std::uint32_t i = 0; i < seen_for; ++i) {
+        for (std::uint32_t i = 0; i < visible_for; ++i) {
             started.tracker.track(here);
             last = last_seen = started.tracker.records();
             if (const arhost_marker is = expect_one(last, started.marker.print.id, "in view", here);
                 is.age_frames != 0)
                 throw Failure(fmt::format("seen, it has age_frames {} and must have 0", is.age_frames));
         }
-        for (std::uint32_t age = 1; age <= gone_for; ++age) {
-            started.tracker.track(gone);
+        for (std::uint32_t age = 1; age <= lost_for; ++age) {
+            started.tracker.track(empty_frame);
             const std::vector<arhost_marker> records = started.tracker.records();
             if (records.empty())
                 continue;
-            told = true;
+            reported = true;
             const std::string when = fmt::format("{} frames after it was last seen", age);
-            const arhost_marker is = expect_one(records, started.marker.print.id, when, gone);
+            const arhost_marker is = expect_one(records, started.marker.print.id, when, empty_frame);
             if (is.state != ARHOST_MARKER_PREDICTED && is.state != ARHOST_MARKER_LOST)
                 throw Failure(fmt::format("{}, its state is {}; it must be PREDICTED or LOST", when, is.state));
             if (is.age_frames != age)
@@ -367,8 +366,8 @@ void not_seen(Context &context) {
             last = records;
         }
     }
-    if (!told)
-        throw Skip("it tells nothing of markers that it does not see");
+    if (!reported)
+        throw Skip("it reports no markers that are out of view");
 }
 
 // ---- Speed -----------------------------------------------------------------------------------------
@@ -380,42 +379,42 @@ void speed(Context &context) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, side_mm}});
     tracker.track(frame);
-    judge_speed(context, camera.width, camera.height, frame_times_ms([&] { return tracker.track(frame), true; }), 50);
+    check_speed(context, camera.width, camera.height, frame_times_ms([&] { return tracker.track(frame), true; }), 50);
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
 constexpr const char *gate = "tracker.track";
 constexpr Test tests[] = {
     {"tracker.start", "It starts with a camera and a marker, and stops.", kind, "abi.create", 30s, start},
-    {"tracker.track",
-     "It finds a print that faces the camera, in a frame that is read-only and has no readable byte around.", kind,
-     "tracker.start", 30s, track},
-    {"tracker.start-again", "Once it has been stopped another instance starts, with another camera and marker.", kind,
-     gate, 30s, start_again},
-    {"tracker.leaks", "Frames, starts and stops leave no descriptor, no thread and no memory behind.", kind, gate,
-     60s, leaks},
-    {"tracker.unknown-id", "An id that no dictionary has is refused as CONFIGURATION.", kind, gate, 20s, unknown_id},
-    {"tracker.unusable-lens", "A lens of no model, or with too many coefficients for it or too few, is refused.",
-     kind, gate, 20s, unusable_lens},
+    {"tracker.track", "It detects a marker that faces the camera, in a read-only frame between inaccessible pages.",
+     kind, "tracker.start", 30s, track},
+    {"tracker.start-again", "After a stop, another instance starts with another camera and marker.", kind, gate, 30s,
+     start_again},
+    {"tracker.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 60s, leaks},
+    {"tracker.unknown-id", "An id outside every dictionary is rejected with CONFIGURATION.", kind, gate, 20s,
+     unknown_id},
+    {"tracker.unusable-lens", "A lens with an unknown model, or the wrong number of coefficients, is rejected.", kind,
+     gate, 20s, unusable_lens},
     {"tracker.longer-structs", "It steps through the markers by their struct_size.", kind, gate, 20s, longer_structs},
-    {"tracker.cancelled", "Cancelled before, start and track return soon, OK or CANCELLED.", kind, gate, 20s,
+    {"tracker.cancelled", "After cancellation, start and track return soon, with OK or CANCELLED.", kind, gate, 20s,
      cancelled},
-    {"tracker.record", "A record is whole: size, family, age 0, error and ambiguity within their ranges.", kind, gate,
-     20s, record},
+    {"tracker.record", "A record is complete: size, family, age 0, error and ambiguity within their ranges.", kind,
+     gate, 20s, record},
     {"tracker.rigid", "A pose is finite, orthonormal to 1e-9, with determinant 1 and last row 0 0 0 1.", kind, gate,
      20s, rigid},
-    {"tracker.deterministic", "The same frames give the same bytes in another instance, and a DETECTED one again.",
-     kind, gate, 20s, deterministic},
-    {"tracker.threads", "Any number of threads gives the same result.", kind, gate, 20s, threads},
-    {"tracker.frames-before", "What is DETECTED is in this frame, and of this frame alone, whatever came before.",
-     kind, "tracker.deterministic", 20s, frames_before},
-    {"tracker.not-seen", "What is not in view is left out, or PREDICTED or LOST, with its age and a rigid pose.",
-     kind, "tracker.frames-before", 20s, not_seen},
-    {"tracker.settles", "A print that stands still is told where it is within 60 frames, smoothed or not.", kind,
-     gate, 30s, settles},
-    {"tracker.out-of-order", "Dropped, repeated and older frames are tracked like others.", kind,
+    {"tracker.deterministic",
+     "The same frames give the same bytes in another instance; a repeated frame does too if DETECTED.", kind, gate,
+     20s, deterministic},
+    {"tracker.threads", "The result does not depend on the number of threads.", kind, gate, 20s, threads},
+    {"tracker.frames-before", "A DETECTED record depends only on the current frame.", kind, "tracker.deterministic",
+     20s, frames_before},
+    {"tracker.not-seen", "A marker out of view is omitted, PREDICTED or LOST, with its age and a rigid pose.", kind,
+     "tracker.frames-before", 20s, not_seen},
+    {"tracker.settles", "The pose of a marker at rest is correct within 60 frames, smoothed or not.", kind, gate, 30s,
+     settles},
+    {"tracker.out-of-order", "Dropped, repeated and older frames are handled like any other.", kind,
      "tracker.deterministic", 20s, out_of_order},
-    {"tracker.speed", "A frame of 640×480 takes less than 50 ms on the median; a warning otherwise.", kind, gate, 60s,
+    {"tracker.speed", "The median time of a frame of 640×480 is at most 50 ms; otherwise a warning.", kind, gate, 60s,
      speed},
 };
 

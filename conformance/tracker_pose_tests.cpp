@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The pose: axes, units, and exactness against frames drawn at known poses.
+// Poses: axes, units, and accuracy on frames rendered at known poses.
 #include "conformance/tracker.hpp"
 
 #include <fmt/format.h>
@@ -29,7 +28,7 @@ public:
     Shot shoot(const Pose &at, const std::string &where) {
         const Placed marker{print_, side_mm, at};
         const Grey image = draw(camera_, marker);
-        return {marker, image, expect_one(tracker_.look(image), print_.id, where, image)};
+        return {marker, image, expect_one(tracker_.track_first(image), print_.id, where, image)};
     }
     void expect_found(const Pose &at, const Bounds &bounds, const std::string &where) {
         const Shot shot = shoot(at, where);
@@ -69,7 +68,7 @@ void millimetres(Context &context) {
     Tracker tracker(context);
     for (const double factor : {1.0, 0.5, 3.0}) {
         tracker.start(wide_camera(), {{print.id, factor * side_mm}});
-        const glm::dvec3 is = pose_of(expect_one(tracker.look(image), print.id, "in view", image))[3],
+        const glm::dvec3 is = pose_of(expect_one(tracker.track_first(image), print.id, "in view", image))[3],
                          must = factor * glm::dvec3(at[3]);
         if (!(glm::distance(is, must) <= 0.02 * glm::length(must)))
             throw Failure(fmt::format("listed with a side of {} mm, the marker is at {} mm and must be at {}",
@@ -110,17 +109,18 @@ void corners(Context &context) {
             const glm::dvec2 is(shot.found.corners_px[k][0], shot.found.corners_px[k][1]);
             sum += is - must[k];
             if (!(glm::distance(is, must[k]) <= bound_px))
-                throw Failure(fmt::format("the {} corner is told at ({:.2f}, {:.2f}) px and is at ({:.2f}, {:.2f})",
-                                          names[k], is.x, is.y, must[k].x, must[k].y))
+                throw Failure(
+                    fmt::format("the {} corner is reported at ({:.2f}, {:.2f}) px instead of ({:.2f}, {:.2f})",
+                                names[k], is.x, is.y, must[k].x, must[k].y))
                     .with("frame", shot.image.picture())
                     .at(static_cast<unsigned>(std::lround(must[k].x)), static_cast<unsigned>(std::lround(must[k].y)));
         }
     }
     const glm::dvec2 mean = sum / (4.0 * count);
     if (glm::length(mean) > bound_mean_px)
-        throw Failure(fmt::format("over {} corners, they are told ({:.3f}, {:.3f}) px beside the truth on the mean; "
-                                  "{} px are allowed (pixel centres are at integers)",
-                                  4 * count, mean.x, mean.y, bound_mean_px));
+        throw Failure(fmt::format(
+            "the mean error of {} corners is ({:.3f}, {:.3f}) px; {} px are allowed (pixel centres are at integers)",
+            4 * count, mean.x, mean.y, bound_mean_px));
 }
 
 void pixel_centres(Context &context) {
@@ -138,8 +138,8 @@ void pixel_centres(Context &context) {
     }
     const glm::dvec2 mean = sum / static_cast<double>(count);
     if (!(glm::length(mean) <= bound_px))
-        throw Failure(fmt::format("over {} poses, the marker's centre is projected ({:.3f}, {:.3f}) px beside the "
-                                  "truth on the mean; {} px are allowed (pixel centres are at integers)",
+        throw Failure(fmt::format("over {} poses, the mean error of the marker's projected centre is ({:.3f}, "
+                                  "{:.3f}) px; {} px are allowed (pixel centres are at integers)",
                                   count, mean.x, mean.y, bound_px));
 }
 
@@ -157,8 +157,8 @@ void focal_length(Context &context) {
             ratio += pose_of(studio.shoot(at, "in view").found)[3].z / at[3].z / count;
         }
         if (!(std::abs(ratio - 1) <= share))
-            throw Failure(fmt::format("with fx = {} px and fy = {} px, distances are {:.4f} times the truth on the "
-                                      "mean; {} to {} are allowed",
+            throw Failure(fmt::format("with fx = {} px and fy = {} px, distances are {:.4f} times the truth on "
+                                      "average; {} to {} are allowed",
                                       fx, fy, ratio, 1 - share, 1 + share));
     }
 }
@@ -169,7 +169,7 @@ void principal_point(Context &context) {
     camera.cy -= 45;
     Studio(context, camera)
         .expect_found(tilted({-40, -20, -250}, 30, 70), {2, 0.01}, "with cx = 229.5 and cy = 82.5");
-    // A part of an image is the image of a camera with that part.
+    // A crop of an image equals the image of a camera for that crop.
     constexpr std::uint32_t x0 = 90, y0 = 60;
     arhost_intrinsics part = wide_camera();
     part.width = 192;
@@ -208,36 +208,37 @@ void fisheye(Context &context) {
     const Print print = prints_of(context.prints).front();
     const arhost_status status = Tracker(context).try_start(camera, {{print.id, side_mm}});
     if (status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION) {
-        context.note = "it is refused";
+        context.note = "it is rejected";
         return;
     }
     through_lens(context, camera, "a fisheye lens");
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
-// Where these fail, all poses are wrong for the same reason.
+// If these fail, all poses are wrong for the same reason.
 constexpr const char *gate = "tracker.track", *axes_gate = "tracker.axes", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
-    {"tracker.axes", "A marker's x axis is right, y up and z out of the paper, to 5°, however the print is turned.",
-     kind, gate, 20s, axes},
-    {"tracker.millimetres", "Places are in mm, for the side that is listed, to 2 % of the distance.", kind, axes_gate,
-     20s, millimetres},
+    {"tracker.axes",
+     "A marker's x axis points right, y up and z out of the paper, to 5°, for any rotation of the print.", kind, gate,
+     20s, axes},
+    {"tracker.millimetres", "Positions are in mm, scaled by the listed side, to 2 % of the distance.", kind,
+     axes_gate, 20s, millimetres},
     {"tracker.tilt-and-distance",
-     "Of prints 30 to 130 px wide, tilted by 20° to 60°, poses are right to 1.5° and 1 % of the distance.", kind,
+     "Poses of markers 30 to 130 px wide, tilted by 20° to 60°, are accurate to 1.5° and 1 % of the distance.", kind,
      pose_gate, 30s, tilt_and_distance},
-    {"tracker.near-frontal", "A print that nearly faces the camera is not tilted to the wrong side: 4° are allowed.",
-     kind, pose_gate, 20s, near_frontal},
-    {"tracker.corners", "Corners are told in their order, to 0.3 px each and 0.06 px on the mean.", kind, gate, 20s,
-     corners},
-    {"tracker.pixel-centres", "Poses are projected to where the print is, to 0.06 px on the mean.", kind, pose_gate,
-     20s, pixel_centres},
-    {"tracker.focal-length", "fx and fy are those of the intrinsics: distances are right to 0.4 % on the mean.", kind,
-     pose_gate, 20s, focal_length},
-    {"tracker.principal-point", "The principal point may lie anywhere, and the image be a part of another.", kind,
-     pose_gate, 20s, principal_point},
-    {"tracker.lens", "Through Brown's lens poses are right to 1.5° and 1 % of the distance.", kind, pose_gate, 20s,
-     lens},
-    {"tracker.fisheye", "A fisheye lens is refused, or poses are right to 1.5° and 1 % of the distance.", kind,
+    {"tracker.near-frontal", "A nearly frontal marker is not tilted to the wrong side: 4° are allowed.", kind,
+     pose_gate, 20s, near_frontal},
+    {"tracker.corners", "Corners are in the specified order, accurate to 0.3 px each and 0.06 px on average.", kind,
+     gate, 20s, corners},
+    {"tracker.pixel-centres", "Poses project to the marker's position, to 0.06 px on average.", kind, pose_gate, 20s,
+     pixel_centres},
+    {"tracker.focal-length", "fx and fy are used: distances are accurate to 0.4 % on average.", kind, pose_gate, 20s,
+     focal_length},
+    {"tracker.principal-point", "The principal point is used, also for a crop of an image.", kind, pose_gate, 20s,
+     principal_point},
+    {"tracker.lens", "With Brown's lens model, poses are accurate to 1.5° and 1 % of the distance.", kind, pose_gate,
+     20s, lens},
+    {"tracker.fisheye", "A fisheye lens is rejected, or poses are accurate to 1.5° and 1 % of the distance.", kind,
      pose_gate, 20s, fisheye},
 };
 

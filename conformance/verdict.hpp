@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// What comes of a test.
+// The result of a test.
 #pragma once
 
 #include "ipc/channel.hpp"
@@ -17,11 +16,11 @@ namespace arhost::conformance {
 enum class Verdict {
     pass = 1,
     fail,
-    crashed, // by a signal, or it ended the process
+    crashed, // killed by a signal, or the plugin ended the process
     timeout,
-    skip, // a capability is not declared, or a test that this one needs has not passed
+    skip, // a capability is not declared, or a needed test has not passed
     warn, // slow
-    error // of the suite: nothing is known of the plugin
+    error // of the suite; says nothing about the plugin
 };
 inline constexpr std::array<std::string_view, 8> verdict_texts = {"",        "pass", "fail", "crashed",
                                                                   "timeout", "skip", "warn", "error"};
@@ -39,11 +38,11 @@ struct Exhibit {
 struct Result {
     std::string test;
     Verdict verdict = Verdict::error;
-    std::string message; // one sentence; empty: there is nothing to say
+    std::string message; // one sentence, or empty
     double seconds = 0;
     std::vector<Exhibit> exhibits{};
-    std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the exhibits
-    ipc::Json facts = ipc::Json::object();                // of abi.load: the descriptor
+    std::optional<std::array<unsigned, 2>> wrong_pixel{}; // in the exhibits
+    ipc::Json facts = ipc::Json::object();                // set by abi.load: the descriptor
 };
 
 } // namespace arhost::conformance

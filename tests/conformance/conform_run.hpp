@@ -47,7 +47,7 @@ public:
         run.run({"--list"});
         std::istringstream lines(run.output());
         std::set<std::string> names;
-        for (std::string name, promise; lines >> name && std::getline(lines, promise);)
+        for (std::string name, requirement; lines >> name && std::getline(lines, requirement);)
             names.insert(name);
         return names;
     }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The program about the tests: what it reports, how, and with which exit status.
+// arhost-conform: options, reports and exit status.
 #include "conform_run.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +27,7 @@ TEST(Conform, ListsTheTestsThatAPatternMatches) {
     EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
 }
 
-TEST(Conform, SaysWhatIsWrongWithNumbersAndHowToSeeItAgain) {
+TEST(Conform, ReportsTheFailureAndTheCommandToRepeatIt) {
     ConformRun run;
     const std::string plugin = run.link_wrong("miss_alpha_1").string();
     EXPECT_EQ(run.run({plugin, "--only", "raytracer.miss-alpha", "--seed", "7", "--set", "samples=2"}), 1);
@@ -43,13 +42,13 @@ TEST(Conform, NamesTheSignalAndTheCall) {
     EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.render\n         SIGSEGV in render"));
 }
 
-TEST(Conform, SkipsWhatNeedsATestThatHasNotPassed) {
+TEST(Conform, SkipsTestsWhoseNeededTestHasNotPassed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string()}), 1);
     EXPECT_THAT(run.output(), HasSubstr("raytracer.start\n         needs abi.create, which has not passed"));
 }
 
-TEST(Conform, RunsWhatATestNeedsWithoutAWord) {
+TEST(Conform, RunsNeededTestsWithoutReportingThem) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.miss-alpha"}), 0) << run.output();
     EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
@@ -58,7 +57,7 @@ TEST(Conform, RunsWhatATestNeedsWithoutAWord) {
     EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n         needs abi.create, which has not "));
 }
 
-TEST(Conform, TellsInOnePlaceWhatCantBeLoaded) {
+TEST(Conform, ReportsALoadFailureOnce) {
     ConformRun run;
     run.write("text.so", "no library");
     EXPECT_EQ(run.run({"text.so", "--only", "abi.longer-options"}), 1);
@@ -66,28 +65,28 @@ TEST(Conform, TellsInOnePlaceWhatCantBeLoaded) {
     EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n"));
 }
 
-TEST(Conform, ErrsWhereNoTestRan) {
+TEST(Conform, FailsIfNoTestRan) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("no test"));
 }
 
-TEST(Conform, ErrsWhereTheReferenceIsMissing) {
+TEST(Conform, FailsIfTheReferenceIsMissing) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", "none.so"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("none.so' is not there; give --reference FILE"));
+    EXPECT_THAT(run.output(), HasSubstr("none.so' does not exist; give --reference FILE"));
 }
 
 // What is wrong with the reference is no plugin's fault.
-TEST(Conform, ErrsWhereTheReferenceCantBeComparedWith) {
+TEST(Conform, FailsIfTheReferenceCantBeUsed) {
     ConformRun run;
     run.write("text.so", "no library");
     const std::string crashing = run.link_wrong("crash_in_render").string();
     for (const auto &[reference, why] :
          {std::pair<std::string, std::string>{ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
-                                              "tracker_aruco.so' is a tracker and must be a ray tracer"},
-          {"text.so", "text.so' can't be used, by abi.load: "},
-          {crashing, "can't be used, by raytracer.render: SIGSEGV in render"}}) {
+                                              "tracker_aruco.so' is a tracker but must be a ray tracer"},
+          {"text.so", "text.so' can't be used: abi.load failed: "},
+          {crashing, "can't be used: raytracer.render failed: SIGSEGV in render"}}) {
         EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
                            ARHOST_PLUGIN_DIRECTORY}),
                   2);
@@ -96,18 +95,18 @@ TEST(Conform, ErrsWhereTheReferenceCantBeComparedWith) {
     }
 }
 
-TEST(Conform, TellsHowToRunATestAgainAsItWasRun) {
+TEST(Conform, PrintsTheCommandWithAllOptions) {
     ConformRun run;
     const std::string plugin = run.link_wrong("no_licence").string(), reference = run.link_wrong("none").string();
     EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", ARHOST_PLUGIN_DIRECTORY, "--reference",
                        reference, "--timeout-factor", "2.5"}),
               1);
     EXPECT_THAT(run.output(),
-                HasSubstr("again: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
+                HasSubstr("to repeat: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
                           ARHOST_PLUGIN_DIRECTORY + " --reference " + reference + " --timeout-factor 2.5\n"));
 }
 
-TEST(Conform, RefusesOptionsThatMakeNoSense) {
+TEST(Conform, RejectsInvalidOptions) {
     const std::array<std::array<std::string, 3>, 13> wrong = {
         {{"--timeout-factor", "nan", "'nan' must be a number from 0.001 to 1000"},
          {"--timeout-factor", "1e300", "'1e300' must be a number from 0.001 to 1000"},
@@ -119,9 +118,9 @@ TEST(Conform, RefusesOptionsThatMakeNoSense) {
          {"--json", "", "the name is empty"},
          {"--print", "1=", "must be ID=FILE"},
          {"--print", "99999999999=a.png", "must be ID=FILE"},
-         {"--environment", "A=B", "'A=B' must be a variable's name alone"},
-         {"--environment", "A B", "'A B' must be a variable's name alone"},
-         {"--environment", "", "must be a variable's name alone"}}};
+         {"--environment", "A=B", "'A=B' must be only a variable's name"},
+         {"--environment", "A B", "'A B' must be only a variable's name"},
+         {"--environment", "", "must be only a variable's name"}}};
     for (const auto &[option, value, why] : wrong) {
         ConformRun run;
         EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, value}), 2) << option << " " << value;
@@ -131,7 +130,7 @@ TEST(Conform, RefusesOptionsThatMakeNoSense) {
     }
 }
 
-TEST(Conform, SeesBeforeTheRunWhetherItsReportsCanBeWritten) {
+TEST(Conform, ChecksBeforeTheRunThatReportsCanBeWritten) {
     ConformRun run;
     std::filesystem::create_directory(run.path("folder"));
     for (const auto &[file, why] : {std::pair<std::string, std::string>{"none/page", "No such file"},
@@ -148,14 +147,14 @@ bool has_unfinished_file(const ConformRun &run) {
     return std::any_of(begin(files), end(files), [](const auto &file) { return file.path().extension() == ".tmp"; });
 }
 
-TEST(Conform, WritesNoTwoReportsToOneFile) {
+TEST(Conform, RejectsTwoReportsInOneFile) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "report", "--html", "./report"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("can't write ./report: another report is written there"));
     EXPECT_FALSE(has_unfinished_file(run));
 }
 
-TEST(Conform, WritesAReportWhereALinkLeads) {
+TEST(Conform, WritesAReportThroughASymbolicLink) {
     ConformRun run;
     run.write("target.json", "earlier");
     std::filesystem::create_symlink("target.json", run.path("link.json"));
@@ -164,7 +163,7 @@ TEST(Conform, WritesAReportWhereALinkLeads) {
     EXPECT_EQ(run.json("target.json").at("exit_status"), 0);
 }
 
-TEST(Conform, KeepsAnEarlierReportUntilThereIsANewOne) {
+TEST(Conform, KeepsAnEarlierReportUntilTheNewOneIsComplete) {
     ConformRun run;
     run.write("results.json", "earlier");
     EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*", "--json", "results.json"}), 2);
@@ -177,7 +176,7 @@ TEST(Conform, KeepsAnEarlierReportUntilThereIsANewOne) {
     EXPECT_THAT(run.output(), HasSubstr("\"exit_status\": 0"));
 }
 
-TEST(Conform, WritesNoReportOverWhatItReads) {
+TEST(Conform, RejectsAReportThatWouldReplaceAnInput) {
     ConformRun run;
     const std::string plugin = run.link_wrong("none").string();
     run.write("print.png", "no picture");
@@ -194,21 +193,21 @@ TEST(Conform, WritesNoReportOverWhatItReads) {
     EXPECT_EQ(run.read("print.png"), "no picture");
 }
 
-TEST(Conform, IsNotWellWhereItsWordsCanNotBeWritten) {
+TEST(Conform, FailsIfStandardOutputCantBeWritten) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("standard output can't be written: No space left on device"));
 }
 
-TEST(Conform, SaysSoWhereTheListCanNotBeWritten) {
+TEST(Conform, FailsIfTheListCantBeWritten) {
     ConformRun run;
     run.start({"--list"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("No space left on device"));
 }
 
-TEST(Conform, EndsAsItShouldWhereNobodyCanBeTold) {
+TEST(Conform, ExitsCorrectlyIfStandardErrorCantBeWritten) {
     for (const char *stream : {"/dev/full", "pipe"}) {
         ConformRun run;
         run.start({"nosuch.so"}, [&] {
@@ -223,7 +222,7 @@ TEST(Conform, EndsAsItShouldWhereNobodyCanBeTold) {
 }
 
 // A pipe that is full and that nobody reads.
-TEST(Conform, IsEndedBySignalsWhereNobodyReadsIt) {
+TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
         ConformRun run;
         std::filesystem::create_directory(run.path("tmp"));
@@ -252,25 +251,25 @@ TEST(Conform, IsEndedBySignalsWhereNobodyReadsIt) {
     }
 }
 
-TEST(Conform, RefusesToRunWhereAPluginWouldBeBlamed) {
+TEST(Conform, RefusesToRunInAnUnsuitableEnvironment) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] {
         const rlimit few{16, 16};
         ::setrlimit(RLIMIT_NOFILE, &few);
     });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("16 files may be open at once, and "));
+    EXPECT_THAT(run.output(), HasSubstr("the limit of open files is 16, but "));
     EXPECT_THAT(run.output(), HasSubstr("raise it: ulimit -n "));
     run.start({rt_embree, "--only", "abi.load"}, [] { ::setenv("TMPDIR", "/no/such/folder", 1); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that is there"));
+    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that does"));
     std::filesystem::create_directory(run.path("caf\xe9"));
     run.start({rt_embree, "--only", "abi.load"}, [&] { ::setenv("TMPDIR", run.path("caf\xe9").c_str(), 1); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("is no UTF-8, as what a plugin is given must be"));
+    EXPECT_THAT(run.output(), HasSubstr("is not UTF-8, as text for a plugin must be"));
 }
 
-TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
+TEST(Conform, WorksIfSigchldIsIgnored) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::signal(SIGCHLD, SIG_IGN); });
     EXPECT_EQ(run.wait(), 0) << run.output();
@@ -278,7 +277,7 @@ TEST(Conform, WaitsForItsTestsWhereWhoeverStartedItIgnoresTheirEnds) {
 
 // ---- What a plugin gets, leaves behind, and says ---------------------------------------------------
 
-TEST(Conform, GivesAPluginNothingOfWhoeverStartedIt) {
+TEST(Conform, PassesNoDescriptorsToThePlugin) {
     ConformRun run;
     run.write("secret.txt", "secret");
     run.start({run.link_wrong("none").string(), "--only", "abi.create", "--environment", "ARHOST_TELLS_DESCRIPTORS"},
@@ -306,16 +305,16 @@ pid_t process_beside(const ConformRun &run) {
     throw std::runtime_error("it has started none: " + run.output());
 }
 
-TEST(Conform, EndsWhatATestHasStarted) {
+TEST(Conform, KillsProcessesThatATestHasStarted) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
-                       "processes"}), // and not less patience: what comes before it must end in time
+                       "processes"}), // no timeout factor: abi.load must end in time
               1);
     EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
     EXPECT_FALSE(is_alive(process_beside(run)));
 }
 
-TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
+TEST(Conform, LeavesNothingBehindIfInterrupted) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         ConformRun run;
         std::filesystem::create_directory(run.path("tmp"));
@@ -341,15 +340,15 @@ TEST(Conform, LeavesNothingBehindWhereItIsInterrupted) {
 TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("floods_descriptor_3").string(), "--only", "abi.create"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: more than 32 MiB"));
+    EXPECT_THAT(run.output(), HasSubstr("more than 32 MiB were written to the suite's result pipe, descriptor 3"));
     EXPECT_EQ(run.run({run.link_wrong("writes_to_descriptor_3").string(), "--only", "abi.create"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, is no result: '{} {"));
+    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, has an invalid result: '{} {"));
 }
 
-TEST(Conform, FailsDescriptorsThatAHostCantTake) {
+TEST(Conform, FailsInvalidDescriptors) {
     const std::array<std::array<std::string, 3>, 4> wrong = {
         {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes, and 4096 are the most"},
-         {"many_options", "abi.load", "bytes as JSON, and 130048 are the most: fewer options"},
+         {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
          {"option_without_key", "abi.load", "its option 1 has no key"},
          {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
     for (const auto &[defect, test, why] : wrong) {
@@ -360,7 +359,7 @@ TEST(Conform, FailsDescriptorsThatAHostCantTake) {
     }
 }
 
-TEST(Conform, ShowsAPluginsWordsWithoutTheirControlCharacters) {
+TEST(Conform, RemovesControlCharactersFromAPluginsMessages) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("create_fails").string(), "--only", "abi.create", "--junit", "junit.xml",
                        "--html", "page.html"}),
@@ -370,7 +369,7 @@ TEST(Conform, ShowsAPluginsWordsWithoutTheirControlCharacters) {
         EXPECT_THAT(run.read(file), HasSubstr("create returned UNSUPPORTED: no [2J \ufffd&lt;&amp;"));
 }
 
-TEST(Conform, ShowsPathsWithoutTheirControlCharacters) {
+TEST(Conform, RemovesControlCharactersFromPaths) {
     ConformRun run;
     run.write("a\x1b[2J\xff/text.so", "no library");
     EXPECT_EQ(run.run({"a\x1b[2J\xff/text.so", "--junit", "junit.xml", "--html", "page.html"}), 1);
@@ -382,19 +381,19 @@ TEST(Conform, ShowsPathsWithoutTheirControlCharacters) {
     }
 }
 
-TEST(Conform, ErrsOnAPluginThatIsNotThere) {
+TEST(Conform, FailsIfThePluginDoesNotExist) {
     ConformRun run;
     EXPECT_EQ(run.run({"nothing.so"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'nothing.so'"));
 }
 
-TEST(Conform, ErrsOnAnOptionThatThePluginHasNot) {
+TEST(Conform, FailsOnAnUnknownOption) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "abi.create", "--set", "sampels=2"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("sampels"));
 }
 
-TEST(Conform, FailsAFileThatIsNoPlugin) {
+TEST(Conform, FailsAFileThatIsNotAPlugin) {
     ConformRun run;
     std::ofstream(run.path("text.so")) << "no library";
     EXPECT_EQ(run.run({"text.so"}), 1);
@@ -413,7 +412,7 @@ TEST(Conform, PassesTheTrackers) {
     }
 }
 
-TEST(Conform, SaysWhichFunctionIsMissing) {
+TEST(Conform, NamesTheMissingFunction) {
     const std::array<std::array<std::string, 3>, 4> lacking = {{{"rt", "render", "a ray tracer"},
                                                                 {"tracker", "track", "a tracker"},
                                                                 {"source", "read", "a source"},
@@ -426,7 +425,7 @@ TEST(Conform, SaysWhichFunctionIsMissing) {
     }
 }
 
-TEST(Conform, TellsHowLongAFrameTakesWhereItIsSoonEnoughToo) {
+TEST(Conform, ReportsFrameTimesWhenTheyPassToo) {
     ConformRun run;
     run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--timeout-factor", "3", "--only", "tracker.speed",
              "--json", "results.json", "--html", "page.html"});
@@ -436,7 +435,7 @@ TEST(Conform, TellsHowLongAFrameTakesWhereItIsSoonEnoughToo) {
     EXPECT_THAT(run.read("page.html"), measured);
 }
 
-TEST(Conform, RunsTheTestsOfThePluginsKindAlone) {
+TEST(Conform, RunsOnlyTestsOfThePluginsKind) {
     ConformRun run;
     run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--only", "*.start", "--json", "results.json"});
     const nlohmann::json report = run.json("results.json");
@@ -463,21 +462,21 @@ void write_tag_0(const std::filesystem::path &file) {
     ASSERT_TRUE(png_image_write_to_file(&png, file.c_str(), 0, cells.data(), 0, nullptr));
 }
 
-TEST(Conform, DrawsTheMarkersThatAreGiven) {
+TEST(Conform, DrawsTheUsersMarkers) {
     ConformRun run;
     write_tag_0(run.path("tag.png"));
     const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so", tag = run.path("tag.png");
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.*s"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("pass     tracker.corners"));
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("it takes three prints"));
+    EXPECT_THAT(run.output(), HasSubstr("it needs three prints"));
     EXPECT_EQ(run.run({tracker, "--print", "5=" + tag, "--only", "tracker.track"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("0 markers are seen and must be one"));
+    EXPECT_THAT(run.output(), HasSubstr("it reports 0 markers instead of 1"));
     EXPECT_THAT(run.output(),
-                HasSubstr("again: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
+                HasSubstr("to repeat: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
 }
 
-TEST(Conform, ErrsOnAMarkerThatCantBeRead) {
+TEST(Conform, FailsIfAMarkersPictureCantBeRead) {
     ConformRun run;
     const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
     EXPECT_EQ(run.run({tracker, "--print", "one=tag.png"}), 2);
@@ -486,7 +485,7 @@ TEST(Conform, ErrsOnAMarkerThatCantBeRead) {
     EXPECT_THAT(run.output(), HasSubstr("none.png"));
 }
 
-TEST(Conform, SkipsWhatNeedsADeviceThatIsNotThere) {
+TEST(Conform, SkipsTestsThatNeedAMissingDevice) {
     ConformRun run;
     EXPECT_EQ(
         run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--allow", "video", "--set", "device=/dev/arhost-none"}),
@@ -495,11 +494,11 @@ TEST(Conform, SkipsWhatNeedsADeviceThatIsNotThere) {
     EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
 }
 
-TEST(Conform, SkipsWhatMakesAnInstanceWhereANeedIsNotAllowed) {
+TEST(Conform, SkipsTestsWithInstancesIfANeedIsNotAllowed) {
     ConformRun run;
     const std::string camera = ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so";
     EXPECT_EQ(run.run({camera}), 0);
-    const std::string why = "it needs 'video', which the sandbox keeps from it: give --allow video";
+    const std::string why = "it needs 'video', which the sandbox does not allow: give --allow video";
     EXPECT_THAT(run.output(), HasSubstr("pass     abi.descriptor"));
     EXPECT_THAT(run.output(), HasSubstr("skip     abi.create\n         " + why));
     EXPECT_THAT(run.output(), HasSubstr("skip     source.seek\n         " + why));
@@ -508,7 +507,7 @@ TEST(Conform, SkipsWhatMakesAnInstanceWhereANeedIsNotAllowed) {
     EXPECT_EQ(run.run({camera, "--allow", "vidoe"}), 2);
 }
 
-TEST(Conform, PutsThePluginIntoTheSandboxOfARun) {
+TEST(Conform, RunsThePluginInTheSandbox) {
     ConformRun run;
     const std::string plugin = run.link_wrong("opens_a_socket", "source").string();
     EXPECT_EQ(run.run({plugin, "--only", "source.start", "--reads", "/srv"}), 1);
@@ -522,7 +521,7 @@ TEST(Conform, PutsThePluginIntoTheSandboxOfARun) {
     }
 }
 
-TEST(Conform, LetsAPluginWriteIntoItsTestsFolderAlone) {
+TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
     ConformRun run;
     const std::string plugin = run.link_wrong("caches_beside_its_library", "sink").string();
     const std::filesystem::path cache = run.path("sink_caches_beside_its_library.cache");
@@ -533,14 +532,14 @@ TEST(Conform, LetsAPluginWriteIntoItsTestsFolderAlone) {
     EXPECT_TRUE(std::filesystem::exists(cache));
 }
 
-TEST(Conform, NamesTheNeedThatIsUnknown) {
+TEST(Conform, NamesAnUnknownNeed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost can't allow; a plugin may need "
                                         "video, usb, gpu, display, network, processes"));
 }
 
-TEST(Conform, LeavesNothingOfASinksFilesBehind) {
+TEST(Conform, RemovesASinksFiles) {
     ConformRun run;
     std::filesystem::create_directory(run.path("tmp"));
     run.link_wrong("crash_in_stop", "sink");
@@ -552,7 +551,7 @@ TEST(Conform, LeavesNothingOfASinksFilesBehind) {
     EXPECT_FALSE(std::filesystem::exists(run.path("out")));
 }
 
-TEST(Conform, BlamesNoSinkForAFullDisk) {
+TEST(Conform, ReportsAFullDiskAsAnErrorOfTheSuite) {
     ConformRun run;
     run.start({ARHOST_PLUGIN_DIRECTORY "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"}, [] {
         const rlimit full{1 << 20, 1 << 20}; // as far as a process can see
@@ -560,10 +559,10 @@ TEST(Conform, BlamesNoSinkForAFullDisk) {
     });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("error    sink.start\n"));
-    EXPECT_THAT(run.output(), HasSubstr("has no room for 16 MiB: File too large; free some, or set TMPDIR"));
+    EXPECT_THAT(run.output(), HasSubstr("has no space for 16 MiB: File too large; free some, or set TMPDIR"));
 }
 
-TEST(Conform, BlamesASinkThatLeavesNoDescriptor) {
+TEST(Conform, FailsASinkThatUsesUpDescriptors) {
     ConformRun run;
     run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks", "--jobs", "1"}, [] {
         const rlimit few{100, 100}; // gone after the warm-up

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Each wrong plugin of wrong/, and the tests that find it: these and no other. Here the ray tracers, of wrong.cpp.
+// The plugins of wrong/ with one defect each, and exactly the tests that find it. Here the ray tracers of wrong.cpp.
 #pragma once
 
 #include <ostream>
@@ -10,11 +10,11 @@
 namespace arhost::test {
 
 struct WrongPlugin {
-    std::string defect; // its name there
+    std::string defect; // selects the defect
     std::string what;
     std::string verdict; // of the tests that find it
     std::vector<std::string> found_by;
-    std::string kind = "rt"; // as its file's name begins
+    std::string kind = "rt"; // prefix of its file's name
 };
 inline std::ostream &operator<<(std::ostream &stream, const WrongPlugin &wrong) {
     return stream << wrong.defect;
@@ -40,15 +40,12 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"crash_on_degenerate", "crashes on a triangle without area", "crashed", {"raytracer.degenerate"}},
     {"exits_in_render", "ends the process in render", "crashed", {"raytracer.render"}},
     {"hang_in_create", "never returns from create", "timeout", {"abi.create"}},
-    {"hangs_beside_a_process",
-     "never returns from create, in which it has started a process",
-     "timeout",
-     {"abi.create"}},
+    {"hangs_beside_a_process", "starts a process in create and never returns", "timeout", {"abi.create"}},
     {"hang_in_start", "never returns from start", "timeout", {"raytracer.start"}},
     {"hang_in_render", "never returns from render", "timeout", {"raytracer.render"}},
     {"exports_more", "exports a symbol of its own", "fail", {"abi.exports"}},
-    {"id_unlike_file", "has another id than its file's name", "fail", {"abi.load"}},
-    {"needs_what_is_unknown", "needs what no sandbox can allow", "fail", {"abi.load"}},
+    {"id_unlike_file", "has an id that differs from its file's name", "fail", {"abi.load"}},
+    {"needs_what_is_unknown", "has a need that no sandbox can allow", "fail", {"abi.load"}},
     {"long_name", "has a name of 5 MB", "fail", {"abi.load"}},
     {"many_options", "has 5,000 options", "fail", {"abi.load"}},
     {"option_without_key", "has an option whose key is NULL", "fail", {"abi.load"}},
@@ -57,28 +54,28 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"writes_past_short_answer", "writes past the end of a short answer", "fail", {"abi.negotiation"}},
     {"no_get_extension", "has no get_extension", "fail", {"abi.load"}},
     {"no_render", "has no render", "fail", {"abi.load"}},
-    {"needs_an_extension", "uses a host's extension without looking for it", "crashed", {"abi.create"}},
-    {"no_licence", "names no licence", "fail", {"abi.descriptor"}},
+    {"needs_an_extension", "uses a host extension without checking for it", "crashed", {"abi.create"}},
+    {"no_licence", "has no licence", "fail", {"abi.descriptor"}},
     {"description_is_no_utf8", "describes itself in Latin-1", "fail", {"abi.descriptor"}},
     {"other_kinds_capability", "declares a capability of sources", "fail", {"abi.descriptor"}},
-    {"unknown_capability", "declares a capability that the ABI has not", "fail", {"abi.descriptor"}},
-    {"withdraws_a_capability", "declares one capability less when asked again", "fail", {"abi.same-answer"}},
+    {"unknown_capability", "declares a capability that the ABI does not define", "fail", {"abi.descriptor"}},
+    {"withdraws_a_capability", "declares one capability fewer in a second negotiate", "fail", {"abi.same-answer"}},
     {"default_out_of_range", "has an option whose default is out of range", "fail", {"abi.descriptor", "abi.create"}},
-    {"any_extension", "has a pointer for any extension", "fail", {"abi.unknown-extension"}},
+    {"any_extension", "returns a pointer for any extension", "fail", {"abi.unknown-extension"}},
     {"writes_to_descriptor_3", "writes a line to its worker's descriptors", "fail", {"abi.create"}},
-    {"tells_its_own_verdict", "tells the suite a verdict that there is not, and exits", "fail", {"abi.create"}},
-    {"floods_descriptor_3", "writes to its worker's descriptors without end", "fail", {"abi.create"}},
+    {"tells_its_own_verdict", "reports an unknown verdict to the suite, and exits", "fail", {"abi.create"}},
+    {"floods_descriptor_3", "writes endlessly to its worker's descriptors", "fail", {"abi.create"}},
     {"no_instance", "create succeeds without an instance", "fail", {"abi.create"}},
     {"create_fails", "create refuses its own defaults", "fail", {"abi.create"}},
     {"steps_by_its_own_size", "steps through the options by its own struct size", "crashed", {"abi.longer-options"}},
     {"refuses_unknown_options", "refuses an option that it has not declared", "fail", {"abi.unknown-option"}},
     {"cancelled_create_is_internal", "create returns INTERNAL once cancelled", "fail", {"abi.cancelled-create"}},
     {"one_instance", "has one instance for all", "fail", {"abi.two-instances"}},
-    {"leaks_memory", "leaks 256 KiB a create", "fail", {"abi.create-1000-times"}},
-    {"leaks_descriptors", "leaks a descriptor a create", "fail", {"abi.create-1000-times"}},
+    {"leaks_memory", "leaks 256 KiB per create", "fail", {"abi.create-1000-times"}},
+    {"leaks_descriptors", "leaks a descriptor per create", "fail", {"abi.create-1000-times"}},
     {"leaves_a_thread", "leaves a thread running after destroy", "fail", {"abi.create-1000-times"}},
-    {"leaks_memory_in_render", "leaks 4 KiB a frame", "fail", {"raytracer.leaks"}},
-    {"leaks_descriptors_in_render", "leaks a descriptor a frame", "fail", {"raytracer.leaks"}},
+    {"leaks_memory_in_render", "leaks 4 KiB per frame", "fail", {"raytracer.leaks"}},
+    {"leaks_descriptors_in_render", "leaks a descriptor per frame", "fail", {"raytracer.leaks"}},
     {"writes_into_scene", "writes into the scene", "crashed", {"raytracer.start"}},
     {"starts_once",
      "can't be started a second time",
@@ -87,11 +84,11 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"status_0", "returns 0 from render", "fail", {"raytracer.render"}},
     {"cancelled_is_internal", "render returns INTERNAL once cancelled", "fail", {"raytracer.cancelled"}},
     {"deaf_while_it_renders",
-     "does not ask cancelled while it renders",
+     "does not check for cancellation while it renders",
      "fail",
      {"raytracer.cancel-while-rendering"}},
     {"accepts_parallel_up", "accepts an up that is parallel to the view", "fail", {"raytracer.parallel-up"}},
-    {"slow", "takes 300 ms an image", "warn", {"raytracer.speed"}},
+    {"slow", "takes 300 ms per image", "warn", {"raytracer.speed"}},
     {"miss_alpha_1", "alpha 1 where no ray hit", "fail", {"raytracer.empty-scene", "raytracer.miss-alpha"}},
     {"opaque_background",
      "alpha 255 where no ray hit",
@@ -105,7 +102,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"shadow_alpha_154", "alpha 154 in opaque shadows", "fail", {"raytracer.opaque-shadow"}},
     {"one_shadow_class", "glass casts the shadow of an opaque body", "fail", {"raytracer.translucent-shadow"}},
     {"own_shadow_alphas",
-     "0.6 and 0.3 whatever the scene's shadow alphas",
+     "0.6 and 0.3 instead of the scene's shadow alphas",
      "fail",
      {"raytracer.shadow-alpha-of-scene"}},
     {"shadows_add", "overlapping shadows add up", "fail", {"raytracer.stronger-shadow-wins"}},
@@ -153,7 +150,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
      {"raytracer.orientation", "raytracer.principal-point", "raytracer.eye-look-at-up", "raytracer.lens",
       "raytracer.crop", "raytracer.region", "raytracer.reference"}},
     {"mirrored_columns",
-     "right for left",
+     "mirrored columns",
      "fail",
      {"raytracer.orientation", "raytracer.principal-point", "raytracer.eye-look-at-up", "raytracer.lens",
       "raytracer.crop", "raytracer.region", "raytracer.reference"}},
@@ -164,7 +161,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
       "raytracer.shadow-alpha-of-scene", "raytracer.orientation", "raytracer.eye-look-at-up", "raytracer.lens",
       "raytracer.moved-with-camera", "raytracer.reference"}},
     {"metres",
-     "takes the camera's place as metres",
+     "takes the camera's position as metres",
      "fail",
      {"raytracer.degenerate",     "raytracer.far-away",          "raytracer.miss-alpha",
       "raytracer.inside-sphere",  "raytracer.near-the-eye",      "raytracer.depth-order",
@@ -175,22 +172,22 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
       "raytracer.frames-before",  "raytracer.reference"}},
     {"look_at_is_a_direction", "takes look_at as a direction", "fail", {"raytracer.render"}},
     {"own_up",
-     "y is up whatever the camera's up",
+     "y is up instead of the camera's up",
      "fail",
      {"raytracer.parallel-up", "raytracer.eye-look-at-up", "raytracer.moved-with-camera", "raytracer.reference"}},
     {"no_motion", "ignores motion", "fail", {"raytracer.moving-object"}},
     {"near_plane", "nothing is nearer than a millimetre", "fail", {"raytracer.near-the-eye"}},
     {"small_world", "nothing is farther than 100 m", "fail", {"raytracer.far-away", "raytracer.size"}},
-    {"nothing_tiny", "takes what is smaller than a millimetre for nothing", "fail", {"raytracer.size"}},
+    {"nothing_tiny", "ignores objects smaller than a millimetre", "fail", {"raytracer.size"}},
     {"materials_by_object",
-     "takes an object's number for its material's",
+     "uses the object's index as material index",
      "fail",
      {"raytracer.object-order", "raytracer.split-mesh"}},
     {"knows_8_objects", "draws the first 8 objects", "fail", {"raytracer.split-mesh", "raytracer.many-objects"}},
     {"knows_256_objects", "draws the first 256 objects", "fail", {"raytracer.many-objects"}},
-    {"normals_like_points", "turns normals as it turns points", "fail", {"raytracer.object-transform"}},
+    {"normals_like_points", "transforms normals like points", "fail", {"raytracer.object-transform"}},
     {"indices_of_16_bits", "indices of 16 bits", "fail", {"raytracer.many-triangles"}},
-    {"writes_behind", "writes 4 bytes behind the image", "fail", {"raytracer.writes-nothing-else"}},
+    {"writes_behind", "writes 4 bytes after the image", "fail", {"raytracer.writes-nothing-else"}},
     {"writes_before", "writes a byte before the image", "fail", {"raytracer.writes-nothing-else"}},
     {"writes_padding", "writes between the rows", "fail", {"raytracer.writes-nothing-else"}},
     {"unwritten_pixel",
@@ -202,13 +199,13 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"nondeterministic", "every other image differs by a code", "fail", {"raytracer.deterministic"}},
     {"depends_on_threads", "two threads give another image", "fail", {"raytracer.threads"}},
     {"stale_image",
-     "gives the image before",
+     "returns the previous image",
      "fail",
      {"raytracer.pixel-centres", "raytracer.focal-length", "raytracer.eye-look-at-up", "raytracer.lens",
       "raytracer.moving-object", "raytracer.frames-before"}},
-    {"small_region", "tells a region 4 px too narrow", "fail", {"raytracer.region"}},
-    {"region_beyond_image", "tells a region beyond the image", "fail", {"raytracer.region"}},
-    {"device_time_since_boot", "tells what the clock shows for the device's time", "fail", {"raytracer.device-time"}},
+    {"small_region", "reports a region 4 px too narrow", "fail", {"raytracer.region"}},
+    {"region_beyond_image", "reports a region beyond the image", "fail", {"raytracer.region"}},
+    {"device_time_since_boot", "reports the time since boot as device time", "fail", {"raytracer.device-time"}},
 };
 
 } // namespace arhost::test

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Which defect this library has: the one that its file's name tells, so source_late.so, a link to it, is late.
+// This library's defect, selected by its file name: source_late.so, a link to it, has the defect "late".
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -43,7 +42,7 @@ inline void leak_memory(std::size_t bytes) {
     kept.emplace_back(bytes, 'x');
 }
 
-// The plugin in this file of arhost's own, for who spoils it.
+// Opens one of arhost's own plugins, to modify it.
 inline const arhost_plugin &open_plugin(const char *file) {
     void *library = ::dlopen(file, RTLD_NOW | RTLD_LOCAL);
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
@@ -53,7 +52,7 @@ inline const arhost_plugin &open_plugin(const char *file) {
     return *answer.plugin;
 }
 
-// Negotiates for the class T under the file's name, which is another for each defect.
+// Negotiates for the class T with the file's name as id.
 template <class T>
 arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, const arhost_descriptor &descriptor,
                            const void *functions) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Every wrong ray tracer at once: rt_embree with the one defect that this library's file name tells, so
-// rt_bgra.so, a link to it, has red and blue exchanged. A name that is no defect's has none.
+// All wrong ray tracers: rt_embree with the defect that this library's file name selects. rt_bgra.so, a link to it,
+// swaps red and blue. Other names select no defect.
 #include "defect.hpp"
 
 #include <arhost/arhost.h>
@@ -24,7 +23,7 @@ namespace {
 
 using namespace arhost::test;
 
-// ---- The ray tracer that is spoilt ------------------------------------------------------------------
+// ---- The modified ray tracer ------------------------------------------------------------------------
 
 struct AtEnds {
     AtEnds() {
@@ -62,7 +61,7 @@ Wrong &wrong(arhost_instance *instance) {
     return *reinterpret_cast<Wrong *>(instance);
 }
 
-// ---- What is asked, spoilt ---------------------------------------------------------------------------
+// ---- Modified input ----------------------------------------------------------------------------------
 
 arhost_intrinsics spoil(arhost_intrinsics in) {
     if (has("half_a_pixel")) {
@@ -106,7 +105,7 @@ arhost_camera spoil(arhost_camera camera) {
     return camera;
 }
 
-// ---- What is answered, spoilt ------------------------------------------------------------------------
+// ---- Modified output ---------------------------------------------------------------------------------
 
 struct Pixels {
     const arhost_image &image;
@@ -182,9 +181,9 @@ void spoil(const Pixels &pixels) {
 
 // ---- The plugin --------------------------------------------------------------------------------------
 
-Wrong *only = nullptr; // one_instance: the one that lives
+Wrong *only = nullptr; // one_instance: the existing one
 
-// In a session of its own and nobody's child.
+// In its own session, reparented.
 void start_a_process() {
     if (::fork() != 0)
         return;
@@ -207,7 +206,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     }
     if (std::getenv("ARHOST_TELLS_DESCRIPTORS"))
         for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-            std::error_code closed; // the folder's own
+            std::error_code closed; // the directory's descriptor
             ::dprintf(STDERR_FILENO, "%s is %s\n", entry.path().filename().c_str(),
                       std::filesystem::read_symlink(entry, closed).c_str());
         }
@@ -299,7 +298,7 @@ arhost_scene &scene_in(const SceneCopy &copy) {
     return *reinterpret_cast<arhost_scene *>(copy.get());
 }
 
-// A sphere is before the camera, less than a millimetre off.
+// A sphere is less than a millimetre in front of the camera.
 bool is_near(const Wrong &self, const arhost_camera &camera) {
     const arhost_scene &scene = scene_in(self.scene);
     for (const auto &geometry : view<arhost_geometry>(scene, scene.geometries))
@@ -333,7 +332,7 @@ void spoil(arhost_scene &scene) {
             for (auto &triangle : view<std::array<std::uint32_t, 3>>(scene, geometry.indices))
                 for (std::uint32_t &index : triangle)
                     index &= 0xffff;
-    if (has("normals_like_points")) // by the inverse's transpose these come out as if they were turned like points
+    if (has("normals_like_points")) // the inverse transpose transforms these as points would be
         for (const arhost_object &object : objects) {
             const float *m = object.world_from_object;
             for (auto &normal : view<std::array<float, 3>>(scene, geometries[object.geometry].normals)) {
@@ -347,7 +346,7 @@ void spoil(arhost_scene &scene) {
         }
 }
 
-// Of the scene's virtual objects the others are far below.
+// The scene's other virtual objects are far below.
 void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
     self.glass_scene = make_copy(*setup.scene);
     arhost_scene *scene = &scene_in(self.glass_scene);
@@ -381,7 +380,7 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
     if (self.glass_only)
         start_glass_only(self, spoilt);
     const arhost_status status = embree_functions().start(self.real, &spoilt);
-    self.scene = std::move(copy); // only now the one before may go
+    self.scene = std::move(copy); // frees the previous one
     return status;
 }
 
@@ -399,7 +398,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
     if (has("slow") && image->width >= 640)
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
     if (has("deaf_while_it_renders") && image->width > 1000)
-        std::this_thread::sleep_for(std::chrono::seconds(8)); // 2 are allowed, times the patience
+        std::this_thread::sleep_for(std::chrono::seconds(8)); // 2 are allowed, times the timeout factor
     if (has("leaks_descriptors_in_render"))
         (void)::dup(0);
     if (has("leaks_memory_in_render"))
@@ -506,7 +505,7 @@ const arhost_plugin &spoilt_plugin() {
     if (has("option_without_key"))
         options[1].key = nullptr;
     if (has("many_options"))
-        options.resize(5000, options[0]); // of one key: it is their number that matters
+        options.resize(5000, options[0]); // all with the same key; only their number matters
     descriptor.options = options.data();
     descriptor.option_count = static_cast<std::uint32_t>(options.size());
     static constexpr const char *unknown[] = {"bluetooth", nullptr};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Every wrong sink at once: one that puts each frame into a file of its own and a line about it into another, and
-// has the one defect that this library's file name tells.
+// All wrong sinks: writes each frame to its own file and a line about it to a log, with the defect that this
+// library's file name selects.
 #include "defect.hpp"
 
 #include <algorithm>
@@ -23,7 +22,7 @@ Failure full(const std::string &file) {
     return Failure(ARHOST_STATUS_ERROR_IO, "can't write " + file + ": " + std::strerror(errno));
 }
 
-// With nothing in memory but what write(2) has not taken.
+// Unbuffered.
 void put(const std::string &file, const std::string &bytes, int flags) {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
     if (fd < 0)
@@ -222,8 +221,7 @@ private:
                     fs::rename(part, name);
                 throw;
             }
-            // Before it has its name: behind that, killed between the two, it would leave files as never between
-            // frames.
+            // Before the rename: a kill between the two must not leave files unlike those after any frame.
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
@@ -233,7 +231,7 @@ private:
             put(part, frame.pixels, O_TRUNC);
             fs::rename(part, path + std::to_string(number + 1));
         }
-        if (has("writes_more_files")) // whose names sort before the others'
+        if (has("writes_more_files")) // their names sort first
             for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
                 put(part, frame.line, O_TRUNC);
                 fs::rename(part, fs::path(path).replace_filename(more));

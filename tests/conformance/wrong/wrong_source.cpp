@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Every wrong source at once: a small pattern that moves, with its camera and its pose, and the one defect that
-// this library's file name tells.
+// All wrong sources: a small moving pattern with camera and pose, and the defect that this library's file name
+// selects.
 #include "defect.hpp"
 
 #include <cerrno>
@@ -17,7 +16,7 @@ using namespace arhost;
 using namespace arhost::test;
 using Clock = std::chrono::steady_clock;
 
-// Of all instances.
+// Shared by all instances.
 std::uint64_t position = 0, instances = 0;
 bool is_in_use = false;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Every wrong tracker at once: tracker_apriltag with the one defect that this library's file name tells, so
-// tracker_metres.so, a link to it, takes metres for millimetres. A name that is no defect's has none.
+// All wrong trackers: tracker_apriltag with the defect that this library's file name selects. tracker_metres.so, a
+// link to it, reports metres instead of millimetres. Other names select no defect.
 #include "defect.hpp"
 
 #include <arhost/arhost.h>
@@ -21,7 +20,7 @@ namespace {
 
 using namespace arhost::test;
 
-// ---- The tracker that is spoilt ---------------------------------------------------------------------
+// ---- The modified tracker ---------------------------------------------------------------------------
 
 const arhost_plugin &real() {
     static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so");
@@ -31,7 +30,7 @@ const arhost_tracker &real_functions() {
     return *static_cast<const arhost_tracker *>(real().functions);
 }
 
-// Of all instances.
+// Shared by all instances.
 bool was_started = false;
 arhost_intrinsics first_camera{};
 
@@ -52,7 +51,7 @@ Wrong &wrong(arhost_instance *instance) {
     return *reinterpret_cast<Wrong *>(instance);
 }
 
-// ---- What is asked, spoilt ---------------------------------------------------------------------------
+// ---- Modified input ----------------------------------------------------------------------------------
 
 arhost_intrinsics spoil(arhost_intrinsics in) {
     if (has("half_a_pixel")) {
@@ -101,7 +100,7 @@ std::vector<arhost_marker_config> listed_in(const arhost_tracker_setup &setup) {
     return all;
 }
 
-// The frame's grey plane, where it may be written.
+// A writable copy of the frame's grey plane.
 std::uint8_t *copied(Wrong &self, arhost_frame &frame) {
     const std::size_t size = std::size_t{frame.format->grey_stride} * frame.format->height;
     self.copy.assign(frame.grey, frame.grey + size);
@@ -115,7 +114,7 @@ void mirror(Wrong &self, arhost_frame &frame) {
         std::reverse(row, row + frame.format->width);
 }
 
-// ---- What the frame is like --------------------------------------------------------------------------
+// ---- Properties of the frame -------------------------------------------------------------------------
 
 struct Pixels {
     explicit Pixels(const arhost_frame &f) : frame(f) {}
@@ -128,7 +127,7 @@ struct Pixels {
         each_row([&](auto row) { most = std::max<int>(most, *std::ranges::max_element(row)); });
         return most;
     }
-    int steepest() const { // step from a pixel to the one after the next
+    int steepest() const { // difference between pixels two apart
         int most = 0;
         each_row([&](auto row) {
             for (std::size_t x = 2; x < row.size(); ++x)
@@ -136,7 +135,7 @@ struct Pixels {
         });
         return most;
     }
-    bool is_noisy() const { // in the first row, where there is no print
+    bool is_noisy() const { // from the first row, which shows no print
         const std::span row(frame.grey, frame.format->width);
         std::size_t steps = 0;
         for (std::size_t x = 1; x < row.size(); ++x)
@@ -146,7 +145,7 @@ struct Pixels {
     const arhost_frame &frame;
 };
 
-// ---- What is answered, spoilt ------------------------------------------------------------------------
+// ---- Modified output ---------------------------------------------------------------------------------
 
 double longest_side_px(const arhost_marker &marker) {
     double most = 0;
