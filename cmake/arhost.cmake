@@ -45,10 +45,11 @@ endfunction()
 # the shading headers of core/.
 include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
-# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…]): a GoogleTest
-# program; each of its tests is a CTest test.
+# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [EXHAUSTIVE]): a GoogleTest
+# program; each of its tests is a CTest test. With EXHAUSTIVE, those of instantiations named `Exhaustive` are
+# registered, too, with that label and ten times the timeout.
 function(arhost_add_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "EXHAUSTIVE" "TIMEOUT" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
@@ -66,8 +67,13 @@ function(arhost_add_test name)
   endif()
   # LeakSanitizer may crash while scanning thread-locals of libraries loaded with dlopen, such as the image module's.
   set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_FILTER "-Exhaustive/*"
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT}
                        ENVIRONMENT "LSAN_OPTIONS=${lsan_options}"
                        LABELS "${ARG_LABELS}")
+  if(ARG_EXHAUSTIVE)
+    math(EXPR exhaustive_timeout "10 * ${ARG_TIMEOUT}")
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_FILTER "Exhaustive/*"
+                         PROPERTIES TIMEOUT ${exhaustive_timeout} LABELS exhaustive)
+  endif()
 endfunction()

@@ -43,12 +43,11 @@ TEST_P(PathImages, MatchThePlainPath) {
 constexpr auto name_of = [](const auto &info) {
     return std::get<0>(info.param) + "_" + name_of_view(std::get<1>(info.param));
 };
-// These cover all that is specific to a path: spheres, holes, lights, motion, deformation, glass.
-const auto some_scenes = scenes_named({"classes", "room", "moving", "optix-skybox-teapot", "vkray-hbf"});
-INSTANTIATE_TEST_SUITE_P(SomeScenes, PathImages, testing::Combine(testing::Values("query", "pipeline"), some_scenes),
+// All roles and material models; motion and deformation. rt_vulkan_test.cpp tests cut-outs and lights on each path.
+INSTANTIATE_TEST_SUITE_P(Sample, PathImages,
+                         testing::Combine(testing::Values("query", "pipeline"), scenes_named({"classes", "moving"})),
                          name_of);
-// Compiling takes minutes: tools/likeness runs them.
-INSTANTIATE_TEST_SUITE_P(DISABLED_EveryScene, PathImages,
-                         testing::Combine(testing::Values("query", "pipeline"), every_scene), name_of);
+INSTANTIATE_TEST_SUITE_P(Exhaustive, PathImages, testing::Combine(testing::Values("query", "pipeline"), every_scene),
+                         name_of);
 
 } // namespace arhost::test

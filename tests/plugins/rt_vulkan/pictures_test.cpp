@@ -47,7 +47,8 @@ TEST_P(SceneImages, MatchRtEmbree) {
 }
 
 constexpr auto name_of = [](const auto &info) { return name_of_view(info.param); };
-INSTANTIATE_TEST_SUITE_P(Scenes, SceneImages, every_scene, name_of);
+INSTANTIATE_TEST_SUITE_P(Sample, SceneImages, scenes_named({"classes", "moving", "optix-cgl", "vkray-hbf"}), name_of);
+INSTANTIATE_TEST_SUITE_P(Exhaustive, SceneImages, every_scene, name_of);
 
 // Behind glass the last bits of a hit decide which facet is hit next. The tolerance is the difference between
 // rt_embree's robust and fast traversal. A few bright pixels dominate it: the images of a camera path are summed up.
@@ -78,8 +79,7 @@ TEST_P(BehindGlass, DifferenceIsBelowThatOfEmbreesRobustAndFastTraversal) {
     EXPECT_EQ(of_vulkan.alphas_off_inside, 0);
 }
 
-// They take minutes: tools/likeness runs them.
-INSTANTIATE_TEST_SUITE_P(DISABLED_Scenes, BehindGlass,
+INSTANTIATE_TEST_SUITE_P(Exhaustive, BehindGlass,
                          scenes_named({"optix-gd", "optix-gl", "optix-skybox-lucy", "optix-skybox-teapot"}), name_of);
 
 } // namespace arhost::test
