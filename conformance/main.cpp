@@ -162,7 +162,7 @@ bool creates_instances(std::span<const Test> tests, std::string_view name) {
     return test != tests.end() && creates_instances(tests, test->needs);
 }
 
-// Explains why images can't be compared with the reference, which is not the plugin's fault; empty if they can.
+// Explains why images cannot be compared with the reference, which is not the plugin's fault; empty if they can.
 std::string reference_problem(std::span<const Test> tests, const RunSettings &settings) {
     const fs::path &file = settings.subject.reference;
     if (!fs::is_regular_file(file))
@@ -174,7 +174,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
         if (test.name == std::string_view("abi.load") || test.name == std::string_view("raytracer.render")) {
             const Result result = run_alone(test, reference_settings);
             if (result.verdict != Verdict::pass)
-                return fmt::format("the reference '{}' can't be used: {} failed: {}", file.string(), test.name,
+                return fmt::format("the reference '{}' cannot be used: {} failed: {}", file.string(), test.name,
                                    result.message);
             if (const arhost_kind kind = result.facts.value("kind", arhost_kind{ARHOST_KIND_RAYTRACER});
                 kind != ARHOST_KIND_RAYTRACER)
@@ -189,7 +189,7 @@ void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);
     } catch (const std::system_error &error) {
-        throw std::runtime_error("standard output can't be written: " + error.code().message());
+        throw std::runtime_error("standard output cannot be written: " + error.code().message());
     }
 }
 
@@ -281,9 +281,9 @@ void check_report_files(const std::vector<std::string> &reports, const Subject &
             continue;
         const auto [path, node] = identity_of(report);
         if (read.contains(path) || read.contains(node))
-            throw std::runtime_error("can't write " + report + ": it is a file that this run reads; choose another");
+            throw std::runtime_error("cannot write " + report + ": it is a file that this run reads; choose another");
         if (written.contains(path) || written.contains(node))
-            throw std::runtime_error("can't write " + report + ": another report is written there");
+            throw std::runtime_error("cannot write " + report + ": another report is written there");
         add(written, report);
     }
 }

@@ -39,13 +39,13 @@ private:
         if (!pages) { // not in this kernel
             long size = 0, resident = 0;
             if (!(std::ifstream("/proc/self/statm") >> size >> resident))
-                throw std::runtime_error("/proc/self/statm can't be parsed");
+                throw std::runtime_error("/proc/self/statm cannot be parsed");
             return resident * (::sysconf(_SC_PAGESIZE) / 1024);
         }
         for (std::string word; pages >> word && word != "Private_Dirty:";)
             pages.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
         if (!(pages >> kib))
-            throw std::runtime_error("/proc/self/smaps_rollup can't be parsed");
+            throw std::runtime_error("/proc/self/smaps_rollup cannot be parsed");
         return kib;
     }
 };

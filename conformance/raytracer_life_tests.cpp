@@ -95,7 +95,7 @@ scene::ArenaBuilder hall_of_mirrors() {
 void cancel_while_rendering(Context &context) {
     for (const char *const *need = context.library.descriptor().needs; need && *need; ++need)
         if (*need == std::string_view("gpu"))
-            throw Skip("it needs 'gpu', and work submitted to a GPU can't be cancelled");
+            throw Skip("it needs 'gpu', and work submitted to a GPU cannot be cancelled");
     const arhost_intrinsics large = pinhole(1920, 1440, 1600); // seconds of work for a processor
     Tracer tracer(context, hall_of_mirrors());
     tracer.start(large);

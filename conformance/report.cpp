@@ -105,7 +105,7 @@ std::string as_json(const Report &report) {
     for (const Result &result : report.results) {
         ipc::Json one = to_json(result);
         one.erase("facts");
-        one["promise"] = report.test_of(result).requirement;
+        one["requirement"] = report.test_of(result).requirement;
         one["command"] = report.command(result);
         json["results"].push_back(std::move(one));
     }

@@ -31,7 +31,7 @@ void require_files(Context &context) {
             (!path || *path)) // with neither, create reports the missing option
             return;
     }
-    throw Skip("it has no output path, so its output can't be checked");
+    throw Skip("it has no output path, so its output cannot be checked");
 }
 
 void expect_same(const Files &is, const Files &should, const std::string &what) {
@@ -247,7 +247,7 @@ void files(Context &context) {
     try {
         expect_same(again, once, "given the same frames again");
     } catch (const Failure &difference) { // for example a date
-        throw Skip(std::string("its runs can't be compared: ") + difference.what());
+        throw Skip(std::string("its runs cannot be compared: ") + difference.what());
     }
 }
 
@@ -368,9 +368,9 @@ void earlier_files(Context &context) {
     const Files should = history_of(context, 3).end;
     SinkRun run(context, "uninterrupted"); // which has an earlier run's files
     run.start();
-    expect_same(run.files(), should, "started anew, and no frame has come");
+    expect_same(run.files(), should, "after a restart without a frame");
     run.stop();
-    expect_same(run.files(), should, "started and stopped anew without a frame");
+    expect_same(run.files(), should, "after a restart and a stop without a frame");
 }
 
 void no_place(Context &context) {
@@ -383,7 +383,7 @@ void no_place(Context &context) {
         throw Failure("its output would lie in a folder that is a file, but start returned OK");
     if (run.instance().host().last_error().empty())
         throw Failure(
-            fmt::format("start can't write anything and returned {} without an error message", status_name(status)));
+            fmt::format("start cannot write anything and returned {} without an error message", status_name(status)));
 }
 
 // ---- Kills -----------------------------------------------------------------------------------------
@@ -517,7 +517,7 @@ void slow_disk(Context &context) {
             Files after = run.files();
             has_delayed = has_delayed || disk.has_delayed(); // a dropped frame has no write to delay
             if (!has_delayed)
-                throw Skip("its writes can't be delayed: memory maps, io_uring or another process");
+                throw Skip("its writes cannot be delayed: memory maps, io_uring or another process");
             if (after == before)
                 throw Failure(
                     fmt::format("on a slow disk write of frame {} returned OK, but no file has changed", n));

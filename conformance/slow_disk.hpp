@@ -18,7 +18,7 @@ public:
     bool has_delayed() const { return !is_due_; }
 
 private:
-    // Answers notifications until the work is done. False if this kernel can't continue a system call.
+    // Answers notifications until the work is done. False if this kernel cannot continue a system call.
     bool serve(int listener, const std::function<bool()> &is_done);
     std::atomic<bool> is_due_{false};
 };

@@ -292,7 +292,7 @@ void end(Context &context) {
     if (run.is_live() || count == 0 || count - first > most)
         throw Skip(run.is_live() ? is_live
                    : count == 0  ? "it does not report a frame count"
-                                 : "it has too many frames to read them all, and can't seek");
+                                 : "it has too many frames to read them all, and cannot seek");
     run.start({first, 0, false, nullptr});
     for (std::uint64_t i = first; i < count; ++i)
         if (!run.read())
@@ -381,7 +381,7 @@ void cancel_while_waiting(Context &context) {
     expect_to_be_cancelled(context, run.instance().host(), "read", [&] { return run.try_read(); });
 }
 
-// ---- What it tells of its camera -------------------------------------------------------------------
+// ---- camera ----
 
 void intrinsics(Context &context) {
     SourceRun run(context);

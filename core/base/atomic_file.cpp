@@ -43,7 +43,7 @@ AtomicFile::AtomicFile(const fs::path &file, int signals) : file_(file), signals
     std::error_code error;
     const fs::file_status status = fs::status(file_, error);
     if (fs::is_directory(status))
-        throw std::runtime_error("can't write " + file.string() + ": it is a folder");
+        throw std::runtime_error("cannot write " + file.string() + ": it is a folder");
     if (status.type() == fs::file_type::none) // such as a circular link
         fail(error.value());
     if (const int fd = standard_stream(file_); fd >= 0)
@@ -88,7 +88,7 @@ void AtomicFile::write(const std::string &text) {
 }
 
 void AtomicFile::fail(int error) const {
-    throw std::runtime_error("can't write " + file_.string() + ": " + std::strerror(error));
+    throw std::runtime_error("cannot write " + file_.string() + ": " + std::strerror(error));
 }
 
 } // namespace arhost::base

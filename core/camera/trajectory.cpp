@@ -241,7 +241,7 @@ Trajectory read_trajectory(const std::filesystem::path &file) {
     std::ifstream stream(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
     if (!stream)
-        throw yaml::Error(file.string() + ": can't be read: " + std::strerror(errno ? errno : EIO));
+        throw yaml::Error(file.string() + ": cannot be read: " + std::strerror(errno ? errno : EIO));
     const std::vector<Line> lines = lines_of(file, text);
     Trajectory trajectory = text.starts_with('{') ? read_arhost(lines) : read_dissertation(lines);
     if (trajectory.frames.empty())

@@ -271,7 +271,7 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
 // The lines that `arhost plugins --devices` prints for a plugin; none if it does not support listing devices.
 std::vector<std::string> lines_of(const DevicesResult &result) {
     if (const auto *reason = std::get_if<std::string>(&result))
-        return {"its devices can't be listed: " + *reason};
+        return {"its devices cannot be listed: " + *reason};
     const auto &list = std::get<std::optional<ipc::DeviceList>>(result);
     if (!list)
         return {};
@@ -364,7 +364,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
     for (const fs::path &file : files) {
         const ProbeResult result = probe(context, file, policy, &level);
         if (const auto *reason = std::get_if<std::string>(&result)) {
-            print(fmt::format("{:<18} can't be used: {}", file.stem().string(), *reason));
+            print(fmt::format("{:<18} cannot be used: {}", file.stem().string(), *reason));
             status = run_failed;
             continue;
         }
@@ -413,7 +413,7 @@ int conform(std::vector<std::string> arguments) {
         argv.push_back(argument.data());
     argv.push_back(nullptr);
     ::execv(program.c_str(), argv.data());
-    throw yaml::Error(program + " can't be executed: " + std::strerror(errno));
+    throw yaml::Error(program + " cannot be executed: " + std::strerror(errno));
 }
 
 } // namespace arhost::host

@@ -123,7 +123,7 @@ void SourceChecks::check(ContractChecks &checks, const arhost_record &record, st
                record.clock == clock_ ? ""
                                       : fmt::format("has the clock {}, earlier frames had {}", record.clock, clock_));
 
-    // In floating point, which can't overflow: a source may report any time.
+    // In floating point, which cannot overflow: a source may report any time.
     const double capture_s = seconds(record.capture_ns), age_s = seconds(now_ns) - capture_s;
     std::string problem;
     if (record.clock == ARHOST_CLOCK_MONOTONIC && age_s < 0)

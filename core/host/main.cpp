@@ -36,7 +36,7 @@ int print_error(const std::string &why, int exit_status) {
 
 int checked_output(int status) {
     return arhost::base::flush_stdout() ? status
-                                        : print_error("can't write to standard output", arhost::host::run_failed);
+                                        : print_error("cannot write to standard output", arhost::host::run_failed);
 }
 
 } // namespace
@@ -103,7 +103,7 @@ int main(int argc, char **argv) {
     add_configuration_options(check_command);
 
     PluginsArguments plugins_arguments;
-    CommandLine plugins_command = app.subcommand("plugins", "List the plugins, or why one can't be used");
+    CommandLine plugins_command = app.subcommand("plugins", "List the plugins, or why one cannot be used");
     plugins_command.flag("--options", plugins_arguments.with_options, "Also list their options");
     plugins_command.flag("--devices", plugins_arguments.with_devices,
                          "Also list the devices they can run on (loading drivers may be slow)");

@@ -117,7 +117,7 @@ void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
     std::ofstream file(to, std::ios::binary);
     file << filled_in(text.str(), words) << std::flush;
     if (!file)
-        throw std::runtime_error("can't write " + to.string());
+        throw std::runtime_error("cannot write " + to.string());
 }
 
 // Copies recursively, except for top-level folders named after plugin kinds.
@@ -148,7 +148,7 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
     fs::create_directories(plugin.into);
     std::string pattern = folder.string() + ".XXXXXX";
     if (!::mkdtemp(pattern.data()))
-        throw std::runtime_error("can't create a folder in " + plugin.into.string() + ": " + std::strerror(errno));
+        throw std::runtime_error("cannot create a folder in " + plugin.into.string() + ": " + std::strerror(errno));
     const fs::path temporary = pattern;
     try {
         for (const fs::path &part :

@@ -99,7 +99,7 @@ void Pipeline::advance_phase() {
         phase_ = Phase::stages;
     }
     if (phase_ == Phase::stages && is_ready(tracker_) && is_ready(raytracer_)) {
-        make_outputs(); // last, so that a run that can't start touches no file
+        make_outputs(); // last, so that a run that cannot start touches no file
         phase_ = Phase::outputs;
     }
     if (phase_ == Phase::outputs &&

@@ -90,7 +90,7 @@ void Pipeline::make_source() {
         if (next_read_ > 0 && !plugin.id.empty() &&
             !(plugin.capabilities & (ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE)) && !input_ended_) {
             input_ended_ = true;
-            fail("source: " + plugin.id + " died, and can't continue at a later frame", false);
+            fail("source: " + plugin.id + " died, and cannot continue at a later frame", false);
         }
     };
     source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, source.policy,
@@ -221,7 +221,7 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
             return;
         // A retry would not help, e.g. with a full disk: keep the complete files, and continue with the other
         // outputs.
-        const std::string reason = "can't write frame " + std::to_string(command.sequence) + ": " +
+        const std::string reason = "cannot write frame " + std::to_string(command.sequence) + ": " +
                                    status_text(result.status) + "; see its messages above";
         context_.log(ARHOST_SEVERITY_ERROR, name, reason);
         fail(name + ": " + reason, false);

@@ -15,7 +15,7 @@
 
 namespace arhost::host {
 
-// The description, or why the plugin can't be used.
+// The description, or why the plugin cannot be used.
 using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
 
 // The plugin may read what `policy` permits and write nothing. On success, `level` receives the sandbox level
@@ -23,7 +23,7 @@ using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
 ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                   std::string *level = nullptr);
 
-// The devices, nullopt if the plugin lacks the extension (arhost/devices.h), or why they can't be listed.
+// The devices, nullopt if the plugin lacks the extension (arhost/devices.h), or why they cannot be listed.
 using DevicesResult = std::variant<std::optional<ipc::DeviceList>, std::string>;
 
 // From `needs` (of the descriptor) it grants access to devices only, and not to network, processes and display. The

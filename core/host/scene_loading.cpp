@@ -85,7 +85,7 @@ void SceneLoading::on_died(const supervise::Death &death) {
             return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault);
         callbacks.loaded(std::move(arena));
     } catch (const std::exception &error) {
-        callbacks.failed(std::string("the scene loader's memory can't be used: ") + error.what());
+        callbacks.failed(std::string("the scene loader's memory cannot be used: ") + error.what());
     }
 }
 

@@ -40,7 +40,7 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
         base::throw_errno("pipe for a worker's output");
     spawned.output.reset(pipe_ends[0]);
     ::close(pipe_ends[1]);
-    // Readable once the worker has ended, like a pidfd. Signals can't be sent to it.
+    // Readable once the worker has ended, like a pidfd. Signals cannot be sent to it.
     spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
     base::UniqueFd death(base::checked(::dup(spawned.pidfd.get()), "dup"));
 

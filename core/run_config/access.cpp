@@ -25,7 +25,7 @@ void add_reads(sandbox::Policy &policy, const yaml::Node &paths) {
         policy.readable.push_back(path.input_path());
         if (!fs::exists(policy.readable.back(), ignored))
             path.fail("there is no file or folder '" + policy.readable.back().string() +
-                      "', or it can't be accessed; correct the path or remove it");
+                      "', or it cannot be accessed; correct the path or remove it");
     }
 }
 
@@ -35,7 +35,7 @@ void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
         policy.writable.push_back(folder.output_path());
         if (!fs::is_directory(policy.writable.back(), ignored))
             folder.fail("there is no folder '" + policy.writable.back().string() +
-                        "', or it can't be accessed; name an existing folder (mkdir -p creates one)");
+                        "', or it cannot be accessed; name an existing folder (mkdir -p creates one)");
     }
 }
 

@@ -79,7 +79,7 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     if (component.policy.memory_bytes && component.policy.allows("gpu"))
         node.require("memory_mb")
-            .fail("can't be enforced with 'allow: [gpu]', as GPU drivers map large regions; remove one of the two");
+            .fail("cannot be enforced with 'allow: [gpu]', as GPU drivers map large regions; remove one of the two");
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
     return component;
@@ -239,7 +239,8 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;
             if (type != regular && type != not_found && type != character)
-                node->fail("'" + node->text() + "' is not a regular file, or can't be accessed; choose another path");
+                node->fail("'" + node->text() +
+                           "' is not a regular file, or cannot be accessed; choose another path");
             if (type != character) // /dev/null may be used for both
                 configuration.files.write(*node);
         }

@@ -431,7 +431,7 @@ private:
             for (int column = 0; column < 4; ++column)
                 matrix[column][3] = column == 3;
             if (!(std::abs(glm::determinant(matrix)) > 1e-18))
-                accessors_.fail("node " + std::to_string(index) + " has a matrix that can't be inverted");
+                accessors_.fail("node " + std::to_string(index) + " has a matrix that cannot be inverted");
             return matrix;
         }
         glm::dmat4 matrix = glm::mat4_cast(rotation(index));
@@ -476,7 +476,7 @@ private:
         for (SceneNode &node : nodes_) {
             node.moves = node.has_channel || (node.parent != ARHOST_NONE && nodes_[node.parent].moves);
             if (node.has_channel && !model_.nodes[static_cast<std::size_t>(node.file_node)].matrix.empty())
-                accessors_.fail("node " + std::to_string(node.file_node) + " has a matrix, so it can't be animated");
+                accessors_.fail("node " + std::to_string(node.file_node) + " has a matrix, so it cannot be animated");
         }
     }
 
@@ -947,7 +947,7 @@ private:
         const tinygltf::Texture &texture = accessors_.at(model_.textures, info.index, "texture");
         const tinygltf::Image &image = accessors_.at(model_.images, texture.source, "image");
         if (image.image.empty())
-            accessors_.fail("the image '" + printable(image.uri.substr(0, 100)) + "' can't be read");
+            accessors_.fail("the image '" + printable(image.uri.substr(0, 100)) + "' cannot be read");
         TextureUse use{is_colour};
         if (texture.sampler >= 0) {
             const auto wrap = [](int mode) {

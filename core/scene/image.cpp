@@ -28,7 +28,7 @@ ReadImage *reader() {
         void *module = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
         void *symbol = module ? ::dlsym(module, read_image_symbol) : nullptr;
         if (!symbol)
-            throw ImageError(std::string("images can't be loaded: ") + ::dlerror());
+            throw ImageError(std::string("images cannot be loaded: ") + ::dlerror());
         return reinterpret_cast<ReadImage *>(symbol);
     }();
     return found;
@@ -60,7 +60,7 @@ std::string start_of(const std::filesystem::path &file) {
     char start[8] = {};
     stream.read(start, sizeof start);
     if (stream.gcount() == 0)
-        throw ImageError(file.string() + (errno ? std::string(": can't be read: ") + std::strerror(errno)
+        throw ImageError(file.string() + (errno ? std::string(": cannot be read: ") + std::strerror(errno)
                                                 : std::string(": is empty")));
     return {start, static_cast<std::size_t>(stream.gcount())};
 }

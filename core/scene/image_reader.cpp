@@ -25,16 +25,16 @@ template <class T> void expand(T *texels, std::size_t count, bool grey, int alph
 std::string read(const ImageRequest &request) {
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(request.format);
     if (!input)
-        return "can't be loaded: this OpenImageIO lacks the format '" + std::string(request.format) + "'";
+        return "cannot be loaded: this OpenImageIO lacks the format '" + std::string(request.format) + "'";
     OIIO::Filesystem::IOMemReader memory(const_cast<unsigned char *>(request.content.data()), request.content.size());
     OIIO::ImageSpec wanted, spec;
     wanted["oiio:UnassociatedAlpha"] = 1;
     if (!request.content.empty() && !input->set_ioproxy(&memory))
-        return "can't be loaded: images of the format '" + std::string(request.format) + "' must be separate files";
+        return "cannot be loaded: images of the format '" + std::string(request.format) + "' must be separate files";
     if (!input->open(request.file, spec, wanted))
-        return "can't be loaded: " + input->geterror();
+        return "cannot be loaded: " + input->geterror();
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
-        return "is a deep or volume image, which can't be a texture";
+        return "is a deep or volume image, which cannot be a texture";
     if (spec.width < 1 || spec.height < 1 || spec.width > side_limit || spec.height > side_limit)
         return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; the limit is " +
                std::to_string(side_limit) + " per side, so scale it down";
@@ -51,7 +51,7 @@ std::string read(const ImageRequest &request) {
     if (!input->read_image(0, 0, 0, channels, is_float ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8, texels,
                            texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
                            const_cast<ImageRequest *>(&request)))
-        return "can't be loaded: " + input->geterror();
+        return "cannot be loaded: " + input->geterror();
     // The decoder fills in the missing part of a truncated JPEG and only notes it. Its other notes are harmless.
     if (const std::string noted = input->geterror(); noted.find("Premature end") != noted.npos)
         return "is truncated: " + noted;

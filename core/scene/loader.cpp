@@ -654,7 +654,7 @@ private:
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && !has_texcoords)
-                shape.fail("has no texture coordinates, so its material can't have textures; give it another "
+                shape.fail("has no texture coordinates, so its material cannot have textures; give it another "
                            "material, or a mesh with texture coordinates");
     }
 

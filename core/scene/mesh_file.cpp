@@ -47,7 +47,7 @@ Bytes read_whole(const std::string &name, std::uint64_t byte_limit, const Report
     const File file(name);
     struct stat status {};
     if (file.fd() < 0 || fstat(file.fd(), &status) != 0)
-        fail(name, std::string("can't be read: ") + std::strerror(errno));
+        fail(name, std::string("cannot be read: ") + std::strerror(errno));
     if (!S_ISREG(status.st_mode))
         fail(name, S_ISDIR(status.st_mode) ? "is a folder, not a mesh file" : "is not a regular file");
     const auto size = static_cast<std::uint64_t>(status.st_size);
@@ -61,7 +61,7 @@ Bytes read_whole(const std::string &name, std::uint64_t byte_limit, const Report
         if (count < 0 && errno == EINTR)
             continue;
         if (count < 0)
-            fail(name, std::string("can't be read: ") + std::strerror(errno));
+            fail(name, std::string("cannot be read: ") + std::strerror(errno));
         if (count == 0)
             fail(name, "shrank while it was read");
         done += static_cast<std::size_t>(count);

@@ -32,7 +32,7 @@ Kind kind_of(const std::filesystem::path &file) {
         return Kind::Ply;
     throw MeshError(file.string() + ": " +
                     (extension.empty() ? "a mesh file without extension" : "mesh files '*" + extension + "'") +
-                    " can't be loaded; convert it to .obj or .ply (each may be packed as .gz)");
+                    " cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)");
 }
 
 void check_content(const MeshFile &file, Kind kind) {

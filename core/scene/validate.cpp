@@ -207,7 +207,7 @@ private:
         const glm::dvec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         const double size = glm::length(x) * glm::length(y) * glm::length(z);
         if (!(std::abs(glm::dot(glm::cross(x, y), z)) > 1e-9 * size))
-            fail(name_of(i) + ": world_from_object can't be inverted");
+            fail(name_of(i) + ": world_from_object cannot be inverted");
         if (!object.moves && !object.deforms) {
             if (object.node != ARHOST_NONE || object.skin != ARHOST_NONE)
                 fail(name_of(i) + " has a node or a skin, but neither moves nor deforms");
@@ -431,7 +431,7 @@ private:
         check_floats({&light.cosine_outer, 1}, -1, 1, what + "cosine_outer");
         check_floats({&light.cosine_inner, 1}, light.cosine_outer, 1, what + "cosine_inner");
         if (light.type == ARHOST_LIGHT_DIRECTIONAL && light.falloff != ARHOST_FALLOFF_NONE)
-            fail(what + "a directional light can't have a falloff");
+            fail(what + "a directional light cannot have a falloff");
     }
 
     // "geometry 3 (object 1 'bunny')"
@@ -560,7 +560,7 @@ private:
         for (const arhost_buffer &other : {geometry.normals, geometry.texcoords, geometry.indices, geometry.joints,
                                            geometry.weights, geometry.morph_positions, geometry.morph_normals})
             if (other.count != 0 || other.offset != 0 || other.stride != 0)
-                fail("spheres can't have normals, texcoords, indices or deformation");
+                fail("spheres cannot have normals, texcoords, indices or deformation");
         if (spheres.empty())
             fail("it has no spheres");
         check_coordinates(floats_of(spheres), 4, "sphere");

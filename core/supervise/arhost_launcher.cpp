@@ -35,7 +35,7 @@ using arhost::base::UniqueFd;
     char *const argv[] = {const_cast<char *>(program), nullptr};
     const int output = fds[2].get();
     arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, launcher);
-    const char message[] = "arhost-worker can't be executed; is it installed beside arhost?\n";
+    const char message[] = "arhost-worker cannot be executed; is it installed beside arhost?\n";
     (void)!::write(STDERR_FILENO, message, sizeof message - 1);
     ::_exit(127);
 }

@@ -36,7 +36,7 @@ Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds time
 }
 
 std::string Launcher::start_error(int error) const {
-    return program_.string() + " can't be started: " + std::strerror(error) +
+    return program_.string() + " cannot be started: " + std::strerror(error) +
            "; is it installed in the same folder as arhost?";
 }
 

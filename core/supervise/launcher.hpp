@@ -53,7 +53,7 @@ public:
 // orphans of a killed launcher, which it kills.
 class Launcher final : public Starter {
 public:
-    // `program` is arhost-launcher; the first spawn starts it. Throws std::runtime_error if it can't be executed.
+    // `program` is arhost-launcher; the first spawn starts it. Throws std::runtime_error if it cannot be executed.
     // `timeout` limits each response and the final exit.
     explicit Launcher(std::filesystem::path program, std::chrono::milliseconds timeout = std::chrono::seconds(4));
     ~Launcher() override;

@@ -50,7 +50,7 @@ void Process::send_json(const Json &body, std::initializer_list<int> fds) {
     if (errno == EAGAIN)
         end("does not receive messages");
     else if (errno == ETOOMANYREFS)
-        end("can't receive its memory: this user's processes have too many file descriptors in flight "
+        end("cannot receive its memory: this user's processes have too many file descriptors in flight "
             "(ETOOMANYREFS)");
 }
 
@@ -96,7 +96,7 @@ double Process::cpu_seconds() const {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// Bounded, so that a flood of messages can't starve the frames.
+// Bounded, so that a flood of messages cannot starve the frames.
 void Process::receive_messages(int max_messages) {
     for (int i = 0; i < max_messages; ++i) {
         Message message;
@@ -125,7 +125,7 @@ void Process::receive_messages(int max_messages) {
         } catch (const ProtocolViolation &violation) {
             return end(std::string("protocol violation: ") + violation.what());
         } catch (const std::exception &error) {
-            return end(std::string("can't be served: ") + error.what());
+            return end(std::string("cannot be served: ") + error.what());
         }
     }
 }

@@ -84,7 +84,7 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
                    "plugins and conform)";
         else if (mentions("failed to map segment") || mentions("cannot allocate memory"))
             hint = " (out of memory: 'memory_mb' may be too small)";
-        refuse(file, "can't be loaded: " + reason + hint);
+        refuse(file, "cannot be loaded: " + reason + hint);
     }
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
@@ -116,7 +116,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
             refuse(file, std::string("it needs '") + *need +
-                             "', which this arhost can't allow; a plugin may "
+                             "', which this arhost cannot allow; a plugin may "
                              "need " +
                              joined(sandbox::allowances));
     check_functions(

@@ -207,7 +207,7 @@ Node Node::load(const std::filesystem::path &file) {
         stream.open(file, std::ios::binary);
         content.assign(std::istreambuf_iterator<char>(stream), {});
     } catch (const std::ios_base::failure &) {
-        throw Error(file.string() + ": can't be read: " + std::strerror(errno ? errno : EIO));
+        throw Error(file.string() + ": cannot be read: " + std::strerror(errno ? errno : EIO));
     }
     return parse(content, file.string());
 }
@@ -265,7 +265,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
             else
                 next.reset(at[parts[i]]);
         } else {
-            reject("the value above '" + parts[i] + "' is a scalar, which can't have keys");
+            reject("the value above '" + parts[i] + "' is a scalar, which cannot have keys");
         }
         if (!last)
             at.reset(next);

@@ -42,7 +42,7 @@ public:
         return *this;
     }
 
-    // Reads a file. Throws Error if it can't be read or has a syntax error.
+    // Reads a file. Throws Error if it cannot be read or has a syntax error.
     static Node load(const std::filesystem::path &file);
     // `name` is used as the file name in messages.
     static Node parse(const std::string &text, const std::string &name);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The rows of an image per submission. A driver's watchdog takes seconds of GPU work for a hang, and submitted work
-// can't be cancelled: a slow image is split into bands of rows, whose height follows the last band's duration.
+// cannot be cancelled: a slow image is split into bands of rows, whose height follows the last band's duration.
 #pragma once
 
 #include <chrono>

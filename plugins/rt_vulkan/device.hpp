@@ -91,7 +91,7 @@ public:
     };
     Buffer() = default;
     Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place);
-    // Host memory as a copy destination; empty if the device can't import it.
+    // Host memory as a copy destination; empty if the device cannot import it.
     static Buffer imported(const Device &device, void *memory, VkDeviceSize size);
 
     VkBuffer get() const { return buffer_.get(); }

@@ -332,12 +332,12 @@ void Instance::create(bool validate) {
                       std::string("no Vulkan driver: ") + install_driver + driver_variable_hint());
     if (result == VK_ERROR_LAYER_NOT_PRESENT || (validate && result == VK_ERROR_EXTENSION_NOT_PRESENT))
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                      "option 'validate': Vulkan's validation layers can't be loaded; reinstall them (Debian: "
+                      "option 'validate': Vulkan's validation layers cannot be loaded; reinstall them (Debian: "
                       "vulkan-validationlayers) or omit the option");
     if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders also return it for damaged manifests
         throw Failure(
             ARHOST_STATUS_ERROR_UNSUPPORTED,
-            "Vulkan can't be started (VK_ERROR_OUT_OF_HOST_MEMORY): memory is exhausted, or a manifest of a driver "
+            "Vulkan cannot be started (VK_ERROR_OUT_OF_HOST_MEMORY): memory is exhausted, or a manifest of a driver "
             "or layer is damaged; check vulkan/ in /usr/share and /etc and the files named by VK_LAYER_PATH, or use "
             "rt_embree" +
                 driver_variable_hint());

@@ -77,7 +77,7 @@ TEST(Conform, FailsIfTheReferenceIsMissing) {
     EXPECT_THAT(run.output(), HasSubstr("none.so' does not exist; give --reference FILE"));
 }
 
-// What is wrong with the reference is no plugin's fault.
+// An invalid reference is not the plugin's fault.
 TEST(Conform, FailsIfTheReferenceCantBeUsed) {
     ConformRun run;
     run.write("text.so", "no library");
@@ -85,8 +85,8 @@ TEST(Conform, FailsIfTheReferenceCantBeUsed) {
     for (const auto &[reference, why] :
          {std::pair<std::string, std::string>{ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
                                               "tracker_aruco.so' is a tracker but must be a ray tracer"},
-          {"text.so", "text.so' can't be used: abi.load failed: "},
-          {crashing, "can't be used: raytracer.render failed: SIGSEGV in render"}}) {
+          {"text.so", "text.so' cannot be used: abi.load failed: "},
+          {crashing, "cannot be used: raytracer.render failed: SIGSEGV in render"}}) {
         EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
                            ARHOST_PLUGIN_DIRECTORY}),
                   2);
@@ -134,7 +134,7 @@ TEST(Conform, ChecksBeforeTheRunThatReportsCanBeWritten) {
     ConformRun run;
     std::filesystem::create_directory(run.path("folder"));
     for (const auto &[file, why] : {std::pair<std::string, std::string>{"none/page", "No such file"},
-                                    {"folder", "can't write folder: it is a folder"}})
+                                    {"folder", "cannot write folder: it is a folder"}})
         for (const std::string option : {"--json", "--junit", "--html"}) {
             EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, file}), 2);
             EXPECT_THAT(run.output(), HasSubstr(why));
@@ -150,7 +150,7 @@ bool has_unfinished_file(const ConformRun &run) {
 TEST(Conform, RejectsTwoReportsInOneFile) {
     ConformRun run;
     EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", "--json", "report", "--html", "./report"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("can't write ./report: another report is written there"));
+    EXPECT_THAT(run.output(), HasSubstr("cannot write ./report: another report is written there"));
     EXPECT_FALSE(has_unfinished_file(run));
 }
 
@@ -188,7 +188,7 @@ TEST(Conform, RejectsAReportThatWouldReplaceAnInput) {
         std::vector<std::string> arguments = {plugin, "--only", "abi.load", "--reference", rt_embree};
         arguments.insert(arguments.end(), report.begin(), report.end());
         EXPECT_EQ(run.run(arguments), 2) << report[1];
-        EXPECT_THAT(run.output(), HasSubstr("can't write " + report[1] + ": it is a file that this run reads"));
+        EXPECT_THAT(run.output(), HasSubstr("cannot write " + report[1] + ": it is a file that this run reads"));
     }
     EXPECT_EQ(run.read("print.png"), "no picture");
 }
@@ -197,7 +197,7 @@ TEST(Conform, FailsIfStandardOutputCantBeWritten) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("standard output can't be written: No space left on device"));
+    EXPECT_THAT(run.output(), HasSubstr("standard output cannot be written: No space left on device"));
 }
 
 TEST(Conform, FailsIfTheListCantBeWritten) {
@@ -347,7 +347,7 @@ TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
 
 TEST(Conform, FailsInvalidDescriptors) {
     const std::array<std::array<std::string, 3>, 4> wrong = {
-        {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes, and 4096 are the most"},
+        {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes; the maximum is 4096"},
          {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
          {"option_without_key", "abi.load", "its option 1 has no key"},
          {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
@@ -374,7 +374,7 @@ TEST(Conform, RemovesControlCharactersFromPaths) {
     run.write("a\x1b[2J\xff/text.so", "no library");
     EXPECT_EQ(run.run({"a\x1b[2J\xff/text.so", "--junit", "junit.xml", "--html", "page.html"}), 1);
     for (const std::string &shown : {run.output(), run.read("junit.xml"), run.read("page.html")}) {
-        EXPECT_THAT(shown, HasSubstr("a [2J\ufffd/text.so: can't be loaded"));
+        EXPECT_THAT(shown, HasSubstr("a [2J\ufffd/text.so: cannot be loaded"));
         EXPECT_THAT(shown, HasSubstr("a\\x1b[2J\\xff/text.so")); // in the command, for the shell
         EXPECT_THAT(shown, Not(HasSubstr("\x1b")));
         EXPECT_THAT(shown, Not(HasSubstr("\xff")));
@@ -397,7 +397,7 @@ TEST(Conform, FailsAFileThatIsNotAPlugin) {
     ConformRun run;
     std::ofstream(run.path("text.so")) << "no library";
     EXPECT_EQ(run.run({"text.so"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("can't be loaded"));
+    EXPECT_THAT(run.output(), HasSubstr("cannot be loaded"));
 }
 
 TEST(Conform, PassesTheTrackers) {
@@ -526,7 +526,7 @@ TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
     const std::string plugin = run.link_wrong("caches_beside_its_library", "sink").string();
     const std::filesystem::path cache = run.path("sink_caches_beside_its_library.cache");
     EXPECT_EQ(run.run({plugin, "--only", "sink.start"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("can't write " + cache.string()));
+    EXPECT_THAT(run.output(), HasSubstr("cannot write " + cache.string()));
     EXPECT_FALSE(std::filesystem::exists(cache));
     EXPECT_EQ(run.run({plugin, "--only", "sink.start", "--sandbox", "none"}), 0);
     EXPECT_TRUE(std::filesystem::exists(cache));
@@ -535,7 +535,7 @@ TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
 TEST(Conform, NamesAnUnknownNeed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost can't allow; a plugin may need "
+    EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost cannot allow; a plugin may need "
                                         "video, usb, gpu, display, network, processes"));
 }
 

@@ -94,64 +94,65 @@ public:
                                                 path(text.substr(at, text.find(',', at) - at)));
         }
     }
-    std::set<std::string> promises(bool broken) const {
+    std::set<std::string> checks(bool violated) const {
         std::set<std::string> names;
         const nlohmann::json report = stats();
         for (const auto &[name, entry] : report.at("conformance").items())
-            if ((entry["violations"] > 0) == broken)
+            if ((entry["violations"] > 0) == violated)
                 names.insert(name);
         return names;
     }
 };
 
-void expect_broken(const Parts &parts, const std::set<std::string> &promises) {
+void expect_violations(const Parts &parts, const std::set<std::string> &checks) {
     SCOPED_TRACE(parts.text());
     LiveRun run(parts);
-    ASSERT_EQ(run.run(), 0) << run.output(); // it tells, and the video goes on
-    EXPECT_EQ(run.promises(true), promises) << run.output();
-    for (const std::string &promise : promises) {
-        const std::string component = promise.substr(0, promise.find('.'));
+    ASSERT_EQ(run.run(), 0) << run.output(); // violations are reported, and the run continues
+    EXPECT_EQ(run.checks(true), checks) << run.output();
+    for (const std::string &check : checks) {
+        const std::string component = check.substr(0, check.find('.'));
         EXPECT_THAT(run.output(),
-                    HasSubstr("warning: " + component + ": violates the contract: " + promise + ": frame "));
-        EXPECT_THAT(run.output(), HasSubstr(promise + ": violated in "));
+                    HasSubstr("warning: " + component + ": violates the contract: " + check + ": frame "));
+        EXPECT_THAT(run.output(), HasSubstr(check + ": violated in "));
     }
 }
 
-const std::set<std::string> source_promises = {"source.clock", "source.capture-time", "source.rate",
-                                               "source.frame-stays"};
-const std::set<std::string> all_promises = {
+const std::set<std::string> source_checks = {"source.clock", "source.capture-time", "source.rate",
+                                             "source.frame-stays"};
+const std::set<std::string> all_checks = {
     "source.clock",    "source.capture-time", "source.rate",      "source.frame-stays", "tracker.order",
     "tracker.numbers", "tracker.pose",        "raytracer.region", "raytracer.place",    "raytracer.image-stays"};
 
-void expect_kept(const Parts &parts, const std::set<std::string> &promises = all_promises) {
+void expect_no_violations(const Parts &parts, const std::set<std::string> &checks = all_checks) {
     SCOPED_TRACE(parts.text());
     LiveRun run(parts);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_EQ(run.promises(false), promises) << run.output();
-    EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
+    EXPECT_EQ(run.checks(false), checks) << run.output();
+    EXPECT_EQ(run.checks(true), std::set<std::string>()) << run.output();
 }
 
-// ---- in lockstep, where nothing happens --------------------------------------------------------------
+// ---- lockstep ----
 
-TEST(LiveConformance, FindsNothingWrongWithArhostsOwn) {
+TEST(LiveConformance, FindsNoViolationInShippedPlugins) {
     LiveRun run((Parts()));
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("conform: 10 of 10 contract checks passed"));
     const auto stats = run.stats();
-    for (const std::string &promise : all_promises) {
-        EXPECT_EQ(stats["conformance"][promise]["checked"], 40) << promise;
-        EXPECT_EQ(stats["conformance"][promise]["violations"], 0) << promise;
+    for (const std::string &check : all_checks) {
+        EXPECT_EQ(stats["conformance"][check]["checked"], 40) << check;
+        EXPECT_EQ(stats["conformance"][check]["violations"], 0) << check;
     }
 }
 
-TEST(LiveConformance, TellsOfASourceThatIsWrong) {
+TEST(LiveConformance, ReportsSourceViolations) {
     Parts writes_later = with_numbers("writes_later: true", "", "");
     writes_later.tracker.clear();
     writes_later.raytracer.clear();
-    writes_later.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // so that frames wait
-    expect_broken(writes_later, {"source.frame-stays"});
-    expect_broken(with_numbers("ahead_ms: 300", "", ""), {"source.capture-time"});
-    for (const auto &[defect, promise] :
+    writes_later.output =
+        "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // frames wait in the queue
+    expect_violations(writes_later, {"source.frame-stays"});
+    expect_violations(with_numbers("ahead_ms: 300", "", ""), {"source.capture-time"});
+    for (const auto &[defect, check] :
          {std::pair("changes_clocks", "source.clock"), std::pair("begins_before_0", "source.capture-time"),
           std::pair("times_jump", "source.rate"), std::pair("microseconds", "source.rate")}) {
         Parts parts;
@@ -159,26 +160,27 @@ TEST(LiveConformance, TellsOfASourceThatIsWrong) {
         parts.camera = "{width: 62, height: 46, fx: 70}";
         parts.tracker.clear();
         parts.raytracer.clear();
-        expect_broken(parts, {promise});
+        expect_violations(parts, {check});
     }
 }
 
-TEST(LiveConformance, TellsOfATrackerThatIsWrong) {
-    expect_broken(with_tracker("age_counts_frames"), {"tracker.numbers"});
-    expect_broken(with_tracker("metres"), {"tracker.pose"});
-    expect_broken(with_tracker("corners_at_half"), {"tracker.pose"});
-    expect_broken(with_numbers("", "reversed: true", ""), {"tracker.order"});
+TEST(LiveConformance, ReportsTrackerViolations) {
+    expect_violations(with_tracker("age_counts_frames"), {"tracker.numbers"});
+    expect_violations(with_tracker("metres"), {"tracker.pose"});
+    expect_violations(with_tracker("corners_at_half"), {"tracker.pose"});
+    expect_violations(with_numbers("", "reversed: true", ""), {"tracker.order"});
 }
 
-TEST(LiveConformance, TellsOfARayTracerThatIsWrong) {
-    expect_broken(with_raytracer("opaque_background"), {"raytracer.place", "raytracer.region"});
-    expect_broken(with_raytracer("small_region"), {"raytracer.region"});
+TEST(LiveConformance, ReportsRayTracerViolations) {
+    expect_violations(with_raytracer("opaque_background"), {"raytracer.place", "raytracer.region"});
+    expect_violations(with_raytracer("small_region"), {"raytracer.region"});
     Parts writes_later = with_numbers("", "", "writes_later: true");
-    writes_later.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // so that images wait
-    expect_broken(writes_later, {"raytracer.image-stays"});
+    writes_later.output =
+        "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // images wait in the queue
+    expect_violations(writes_later, {"raytracer.image-stays"});
 }
 
-TEST(LiveConformance, IsOffUnlessAskedFor) {
+TEST(LiveConformance, IsOffByDefault) {
     ArhostRun run(
         "version: 1\nsource: {plugin: source_synthetic, options: {frames: 2}}\noutputs: [{plugin: sink_null}]\n"
         "stats: stats.json\n");
@@ -187,40 +189,40 @@ TEST(LiveConformance, IsOffUnlessAskedFor) {
     EXPECT_THAT(run.output(), Not(HasSubstr("conform")));
 }
 
-// ---- where something happens -------------------------------------------------------------------------
+// ---- lens, mode live, lost markers, restarts ----
 
-TEST(LiveConformance, OfARayTracerThatTracesTheLensLooksAtNoPlace) {
+TEST(LiveConformance, SkipsPlaceIfTheRayTracerTracesTheLens) {
     Parts parts;
     parts.camera = lens;
-    std::set<std::string> promises = all_promises;
-    promises.erase("raytracer.place");
-    expect_kept(parts, promises);
+    std::set<std::string> checks = all_checks;
+    checks.erase("raytracer.place");
+    expect_no_violations(parts, checks);
 }
 
-TEST(LiveConformance, LooksAtAPinholesImageBeforeItIsBent) {
+TEST(LiveConformance, ChecksPinholeImagesBeforeTheLensWarp) {
     Parts parts = with_numbers("", "", "");
     parts.camera = lens;
-    parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // which knows of no lens
-    std::set<std::string> promises = source_promises;
-    promises.merge(std::set<std::string>{"raytracer.region", "raytracer.place", "raytracer.image-stays"});
-    expect_kept(parts, promises);
-    parts.scene = scene; // whose ball is not where the numbers are
-    expect_broken(parts, {"raytracer.place"});
+    parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // ignores the lens
+    std::set<std::string> checks = source_checks;
+    checks.merge(std::set<std::string>{"raytracer.region", "raytracer.place", "raytracer.image-stays"});
+    expect_no_violations(parts, checks);
+    parts.scene = scene; // its ball is not where rt_counter draws
+    expect_violations(parts, {"raytracer.place"});
 }
 
-TEST(LiveConformance, InModeLiveIsTheSame) {
+TEST(LiveConformance, ReportsTheSameInModeLive) {
     Parts parts;
     parts.more = "mode: live\n";
-    expect_kept(parts);
+    expect_no_violations(parts);
     parts = with_raytracer("opaque_background");
     parts.more = "mode: live\n";
-    expect_broken(parts, {"raytracer.place", "raytracer.region"});
+    expect_violations(parts, {"raytracer.place", "raytracer.region"});
     parts = with_tracker("corners_at_half");
     parts.more = "mode: live\n";
-    expect_broken(parts, {"tracker.pose"});
+    expect_violations(parts, {"tracker.pose"});
 }
 
-TEST(LiveConformance, TakesAPoseThatIsHeldForNoDefect) {
+TEST(LiveConformance, AcceptsAHeldPose) {
     Parts parts;
     parts.source =
         "{plugin: source_synthetic, options: {frames: 30, occlude_from: 10, occlude_to: 20}, conform: true}";
@@ -229,15 +231,15 @@ TEST(LiveConformance, TakesAPoseThatIsHeldForNoDefect) {
     LiveRun run(parts);
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.read("poses.jsonl"), HasSubstr("\"held\""));
-    EXPECT_EQ(run.promises(false), all_promises) << run.output();
+    EXPECT_EQ(run.checks(false), all_checks) << run.output();
 }
 
 class LiveConformanceAfterARestart : public testing::TestWithParam<const char *> {};
 
-TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
+TEST_P(LiveConformanceAfterARestart, ContinuesChecking) {
     Parts parts;
     parts.source =
-        "{plugin: source_synthetic, fps: 30, options: {frames: 100000}, conform: true}"; // for as long as it takes
+        "{plugin: source_synthetic, fps: 30, options: {frames: 100000}, conform: true}"; // longer than the test
     parts.output = "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 20}}";
     parts.more = std::string("mode: ") + GetParam() + "\n";
     LiveRun run(parts);
@@ -267,8 +269,8 @@ TEST_P(LiveConformanceAfterARestart, GoesOnLooking) {
         EXPECT_EQ(stats["restarts"][component], 1) << component;
     for (const auto &[name, entry] : stats["conformance"].items())
         EXPECT_GT(entry["checked"], before) << name;
-    EXPECT_EQ(run.promises(false), all_promises) << run.output();
-    EXPECT_EQ(run.promises(true), std::set<std::string>()) << run.output();
+    EXPECT_EQ(run.checks(false), all_checks) << run.output();
+    EXPECT_EQ(run.checks(true), std::set<std::string>()) << run.output();
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, LiveConformanceAfterARestart, testing::Values("lockstep", "live"),

@@ -78,7 +78,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"leaks_descriptors_in_render", "leaks a descriptor per frame", "fail", {"raytracer.leaks"}},
     {"writes_into_scene", "writes into the scene", "crashed", {"raytracer.start"}},
     {"starts_once",
-     "can't be started a second time",
+     "cannot be started a second time",
      "fail",
      {"raytracer.start-again", "raytracer.leaks", "raytracer.crop"}},
     {"status_0", "returns 0 from render", "fail", {"raytracer.render"}},

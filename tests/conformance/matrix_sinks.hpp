@@ -37,7 +37,7 @@ inline const std::vector<WrongPlugin> wrong_sinks = of_kind(
         {"cancelled_is_internal", "write returns INTERNAL once cancelled", "fail", {"sink.cancelled"}},
         {"start_cancelled_is_internal", "start returns INTERNAL once cancelled", "fail", {"sink.cancelled"}},
         {"starts_once",
-         "can't be started a second time",
+         "cannot be started a second time",
          "fail",
          {"sink.sizes", "sink.cancelled", "sink.leaks", "sink.files", "sink.earlier-files", "sink.restart"}},
         {"appends_to_an_old_log", "appends to an earlier run's log", "fail", {"sink.start-again"}},

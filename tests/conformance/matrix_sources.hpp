@@ -36,7 +36,7 @@ inline const std::vector<WrongPlugin> wrong_sources = of_kind(
         {"small_slot", "slots a line too small", "fail", {"source.start"}},
         {"opens_a_socket", "opens a socket in start", "fail", {"source.start"}},
         {"starts_once",
-         "can't be started a second time",
+         "cannot be started a second time",
          "fail",
          {"source.deterministic", "source.start-again", "source.leaks", "source.rate", "source.end", "source.seek",
           "source.cancelled"}},

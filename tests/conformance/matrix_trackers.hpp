@@ -30,7 +30,7 @@ inline const std::vector<WrongPlugin> wrong_trackers = of_kind(
         {"writes_the_frame", "writes into the frame", "crashed", {"tracker.track"}},
         {"writes_past_the_result", "writes a 65th marker", "crashed", {"tracker.track"}},
         {"starts_once",
-         "can't be started a second time",
+         "cannot be started a second time",
          "fail",
          {"tracker.start-again", "tracker.leaks", "tracker.unknown-id", "tracker.unusable-lens",
           "tracker.longer-structs", "tracker.cancelled", "tracker.record", "tracker.rigid", "tracker.deterministic",

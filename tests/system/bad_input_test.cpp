@@ -344,9 +344,9 @@ TEST(BadCommandLine, IsRejected) {
         std::vector<std::string> arguments;
         const char *expected;
     } const lines[] = {
-        {{"--config", "none.yaml"}, "none.yaml: can't be read: No such file or directory"},
+        {{"--config", "none.yaml"}, "none.yaml: cannot be read: No such file or directory"},
         {{"--config", "."}, "is a folder"},
-        {{"--config", "two\nlines\033[2J"}, "error: two lines [2J: can't be read"},
+        {{"--config", "two\nlines\033[2J"}, "error: two lines [2J: cannot be read"},
         {{"--config", "run.yaml", "--set", "mode"}, "key.path=value"},
         {{"--config", "run.yaml", "--set", "mode=fast"}, "--set: mode: 'fast' is not one of lockstep, live"},
         {{"--config", "run.yaml", "--set", "nonsense=1"}, "nonsense: unknown key"},
@@ -371,6 +371,6 @@ TEST(FullDisk, OnStandardOutputIsAnError) {
          {std::vector<std::string>{"schema"}, {"plugins"}, {"check", "run.yaml"}}) {
         run.start(arguments, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
         EXPECT_EQ(run.wait(), 1);
-        EXPECT_THAT(run.output(), HasSubstr("can't write to standard output"));
+        EXPECT_THAT(run.output(), HasSubstr("cannot write to standard output"));
     }
 }

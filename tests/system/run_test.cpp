@@ -271,7 +271,7 @@ TEST(Run, WritesStatisticsToDevices) {
         EXPECT_EQ(run.run(), works ? 0 : 1) << run.output();
         EXPECT_EQ(counted(run).size(), 5u);
         if (!works) {
-            EXPECT_THAT(run.output(), HasSubstr("stats: can't write "));
+            EXPECT_THAT(run.output(), HasSubstr("stats: cannot write "));
         }
     }
     EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
@@ -366,8 +366,8 @@ TEST(CommandLine, PrintsVersionHelpAndPlugins) {
     EXPECT_EQ(run.run({"plugins", "--options"}), 1) << "some test plugins are broken";
     EXPECT_THAT(run.output(), HasSubstr("rt_counter"));
     EXPECT_THAT(run.output(), HasSubstr("delay_ms"));
-    EXPECT_THAT(run.output(), HasSubstr("broken_version     can't be used: "));
-    EXPECT_THAT(run.output(), HasSubstr("no_plugin          can't be used: "));
+    EXPECT_THAT(run.output(), HasSubstr("broken_version     cannot be used: "));
+    EXPECT_THAT(run.output(), HasSubstr("no_plugin          cannot be used: "));
     EXPECT_THAT(run.output(), HasSubstr("while its library was loaded"));
     EXPECT_THAT(run.output(), HasSubstr("first                The first of three (default '1')"));
     EXPECT_THAT(run.output(), HasSubstr("Attempts attacks,  [2Jfor tests."));
@@ -398,15 +398,15 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
     EXPECT_EQ(lines_below("lister_none"), what + "no device that it could run on\n");
-    EXPECT_EQ(lines_below("lister_fail"), what + "its devices can't be listed: the driver is too old\n");
+    EXPECT_EQ(lines_below("lister_fail"), what + "its devices cannot be listed: the driver is too old\n");
     EXPECT_EQ(
         lines_below("lister_broken"),
-        what + "its devices can't be listed: it reported a device that has no name or whose struct is too short\n");
+        what + "its devices cannot be listed: it reported a device that has no name or whose struct is too short\n");
     EXPECT_THAT(lines_below("lister_crash"),
-                testing::StartsWith(what + "its devices can't be listed: killed by signal 11 "));
+                testing::StartsWith(what + "its devices cannot be listed: killed by signal 11 "));
     EXPECT_THAT(lines_below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
     EXPECT_THAT(lines_below("lister_hang"),
-                testing::StartsWith(what + "its devices can't be listed: no answer within 20 s; "));
+                testing::StartsWith(what + "its devices cannot be listed: no answer within 20 s; "));
     const std::string many = lines_below("lister_many"), text(256, '"');
     EXPECT_THAT(many, testing::StartsWith(what + "device 0: " + text + "… (integrated GPU)\n    " + text + "…\n"));
     EXPECT_THAT(many, HasSubstr("\ndevice 63: "));

@@ -367,7 +367,7 @@ TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("memory_mb: can't be enforced with 'allow: [gpu]'"));
+    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced with 'allow: [gpu]'"));
 }
 
 // Data may change between check and use. A wrong pose may result, which cannot be detected.
@@ -416,7 +416,7 @@ TEST(Sandbox, KillsAWorkerThatIgnoresSignals) {
     expect_ended(run, "hung");
 }
 
-// The host's own output files can't be redirected or blocked, even if the plugin can write to their folder.
+// The host's own output files cannot be redirected or blocked, even if the plugin can write to their folder.
 TEST(Sandbox, HostDoesNotOpenPlantedLinksOrPipes) {
     for (const char *attack : {"link", "pipe"}) {
         SCOPED_TRACE(attack);
@@ -477,10 +477,10 @@ TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {
     REQUIRE_LAYER("landlock");
     ArhostRun run;
     run.run({"plugins"});
-    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +can't be used: .*cannot open shared object file.*"
+    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*cannot open shared object file.*"
                                             "'--reads FOLDER' of plugins and conform"));
     run.run({"plugins", "--reads", ARHOST_BINARY_DIRECTORY "/tests/elsewhere"});
-    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +can't be used: .*exports no symbol 'arhost_entry'"));
+    EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*exports no symbol 'arhost_entry'"));
 }
 
 TEST(Sandbox, RejectsUnknownPermissions) {

@@ -369,7 +369,7 @@ TEST(Supervision, ASinkThatCannotWriteIsGivenUpAndOthersContinue) {
                   "options: {error_at: 5}}\n");
     EXPECT_EQ(run.run(), 1);
     EXPECT_EQ(counted(run).size(), 50u);
-    EXPECT_THAT(run.output(), HasSubstr("can't write frame 5"));
+    EXPECT_THAT(run.output(), HasSubstr("cannot write frame 5"));
 }
 
 TEST(Supervision, AFailedSourceFrameIsRetriedAndNeverSkipped) {

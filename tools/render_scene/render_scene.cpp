@@ -168,7 +168,7 @@ int main(int argc, char **argv) {
                             colour, width, cv::LINE_AA);
         std::vector<unsigned char> bytes;
         if (!cv::imencode(kind, picture, bytes))
-            throw std::runtime_error(output + ": the picture can't be encoded");
+            throw std::runtime_error(output + ": the picture cannot be encoded");
         file.write({bytes.begin(), bytes.end()});
     } catch (const std::exception &error) {
         std::fprintf(stderr, "render-scene: %s\n", base::printable(error.what()).c_str());

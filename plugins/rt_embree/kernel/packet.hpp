@@ -235,7 +235,7 @@ ARHOST_INLINE Float gather(const float *table, Int index) {
 }
 
 // Arrays of 16, as in Embree's packets. Copied register by register: GCC copies whole packets in halves of
-// registers, which the processor can't forward to the following load.
+// registers, which the processor cannot forward to the following load.
 template <class To> ARHOST_INLINE void load_registers(To &to, const void *from) {
     if constexpr (requires { to.part; }) {
         __builtin_memcpy(&to.part, from, sizeof to.part);

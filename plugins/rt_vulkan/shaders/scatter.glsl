@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Secondary rays (rt_embree's kernel/scatter.inl), on a stack of pending paths, as shaders can't recurse.
+// Secondary rays (rt_embree's kernel/scatter.inl), on a stack of pending paths, as shaders cannot recurse.
 
 // A ray and the throughput from it to the pixel.
 struct Path {

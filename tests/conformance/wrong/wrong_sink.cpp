@@ -19,7 +19,7 @@ using namespace arhost::test;
 namespace fs = std::filesystem;
 
 Failure full(const std::string &file) {
-    return Failure(ARHOST_STATUS_ERROR_IO, "can't write " + file + ": " + std::strerror(errno));
+    return Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + file + ": " + std::strerror(errno));
 }
 
 // Unbuffered.

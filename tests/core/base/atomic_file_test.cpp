@@ -76,6 +76,6 @@ TEST_F(AtomicFileTest, ReportsWhyAFileCannotBeWritten) {
     fs::create_symlink("circle", folder / "circle");
     EXPECT_THAT(error_of([&] { AtomicFile output(folder / "circle"); }), HasSubstr("circle: Too many levels"));
     EXPECT_EQ(error_of([&] { AtomicFile("/dev/full").write("x"); }),
-              "can't write /dev/full: No space left on device");
+              "cannot write /dev/full: No space left on device");
     EXPECT_EQ(error_of([&] { AtomicFile("").write("x"); }), "") << "an empty path";
 }

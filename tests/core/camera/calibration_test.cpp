@@ -216,7 +216,7 @@ TEST_F(Calibration, RejectsAnotherImageSizeAndNamesBoth) {
 
 TEST_F(Calibration, ReportsAMissingFile) {
     EXPECT_EQ(error_of([] { read_calibration("/no/camera.yaml"); }),
-              "/no/camera.yaml: can't be read: No such file or directory");
+              "/no/camera.yaml: cannot be read: No such file or directory");
 }
 
 TEST(CameraBlock, DefaultsToACentredPrincipalPoint) {

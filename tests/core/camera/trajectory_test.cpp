@@ -154,7 +154,7 @@ TEST_F(Trajectories, ErrorsNamePositionAndFix) {
 
 TEST_F(Trajectories, RejectPathsThatAreNotRegularFiles) {
     EXPECT_EQ(error_of([&] { read_trajectory(file()); }),
-              file().string() + ": can't be read: No such file or directory");
+              file().string() + ": cannot be read: No such file or directory");
     EXPECT_THAT(error_of([&] { read_trajectory(folder_.path()); }), HasSubstr("is not a regular file"));
     ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
     EXPECT_THAT(error_of([&] { read_trajectory(file()); }), HasSubstr("is not a regular file"));

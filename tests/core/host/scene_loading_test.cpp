@@ -26,7 +26,7 @@ struct FakeLoader final : supervise::Starter {
         std::tie(spawned.channel, channel) = Channel::make_pair();
         spawned.doorbell = make_doorbell().host;
         spawned.output = base::UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // silent
-        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals can't be sent to it
+        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals cannot be sent to it
         spawned.pid = 1 << 22; // above the highest that Linux gives to a process
         death = base::UniqueFd(::dup(spawned.pidfd.get()));
         return spawned;

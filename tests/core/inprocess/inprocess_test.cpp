@@ -50,7 +50,7 @@ TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
     EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'refuse' requests"));
 }
 
-// Threads can't be killed, but a worker that waits for its next frame ends by itself.
+// Threads cannot be killed, but a worker that waits for its next frame ends by itself.
 TEST(InProcess, RestartsAPluginWhoseDeviceIsLost) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "error_at: 20, error: -6"));
     run.write("scene.yaml", small_scene);

@@ -34,7 +34,7 @@ int in_child(const std::function<int()> &checks) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-// Reports by number, since a child process can't use GoogleTest's expectations.
+// Reports by number, since a child process cannot use GoogleTest's expectations.
 class Checks {
 public:
     void that(bool holds) {

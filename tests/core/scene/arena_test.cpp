@@ -247,7 +247,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ObjectTransformNotFinite", [](Arena &a) { objects(a)[0].world_from_object[11] = nan_value; },
                    "object 0 'square': a number of world_from_object is nan"},
         Corruption{"ObjectTransformFlat", [](Arena &a) { objects(a)[0].world_from_object[4] = 0; },
-                   "world_from_object can't be inverted"},
+                   "world_from_object cannot be inverted"},
         Corruption{"MaterialModel", [](Arena &a) { materials(a)[0].model = 7; },
                    "material 0: its model is unknown"},
         Corruption{"MaterialTexture", [](Arena &a) { materials(a)[0].colour_texture = 0; }, "texture 0, but there are 0"},
@@ -275,7 +275,7 @@ INSTANTIATE_TEST_SUITE_P(
                        lights(a)[0].type = ARHOST_LIGHT_DIRECTIONAL;
                        lights(a)[0].falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
                    },
-                   "can't have a falloff"},
+                   "cannot have a falloff"},
         Corruption{"LightCone", [](Arena &a) { lights(a)[0].cosine_outer = 0.5f; }, "cosine_inner is 0"},
         Corruption{"LightRadius", [](Arena &a) { lights(a)[0].radius = -1; }, "radius is -1"},
         Corruption{"LightFalloff", [](Arena &a) { lights(a)[0].falloff = 0; },
@@ -328,7 +328,7 @@ INSTANTIATE_TEST_SUITE_P(
                    [](Arena &a) {
                        geometries(a)[1].indices = {0, 0, 12};
                    },
-                   "spheres can't have normals, texcoords, indices"},
+                   "spheres cannot have normals, texcoords, indices"},
         Corruption{"PositionsOverHeader", [](Arena &a) { geometries(a)[0].positions.offset = 0; },
                    "overlaps the header"},
         Corruption{"NoSpheres", [](Arena &a) { geometries(a)[1].positions = {}; }, "it has no spheres"}),

@@ -151,13 +151,13 @@ TEST(Textures, ErrorsNameFileAndKey) {
               "s.yaml:4:32: materials.a.texture: a.png: its content is not PNG, JPEG, PPM, HDR or "
               "EXR; convert it to one of them");
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
-    EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: can't be loaded: "));
-    EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: can't be loaded: "));
+    EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: cannot be loaded: "));
+    EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: cannot be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, jpeg().size() - 3)), HasSubstr("a.jpg: is truncated: "));
     EXPECT_EQ(error("a.png", png(16385, 1, 1, "")), "s.yaml:4:32: materials.a.texture: a.png: has 16385 x 1 pixels; "
                                                     "the limit is 16384 per side, so scale it down");
     EXPECT_EQ(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: b.png}\nobjects: []\n"),
-              "s.yaml:4:32: materials.a.texture: b.png: can't be read: No such file or directory");
+              "s.yaml:4:32: materials.a.texture: b.png: cannot be read: No such file or directory");
     EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: .}\nobjects: []\n"),
                 HasSubstr("is not a regular file"));
     EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: mirror, texture: a.png}\nobjects: []\n"),
@@ -173,7 +173,7 @@ TEST(Textures, NeedTextureCoordinates) {
         Scene("a.png", png(1, 1, 1, {7}))
             .error_of("materials:\n  a: {model: diffuse, texture: a.png}\nobjects:\n  - {sphere: {radius: 1}, "
                       "material: a}\n"),
-        "s.yaml:6:14: objects[0].sphere: has no texture coordinates, so its material can't have textures; give it "
+        "s.yaml:6:14: objects[0].sphere: has no texture coordinates, so its material cannot have textures; give it "
         "another material, or a mesh with texture coordinates");
 }
 
@@ -241,6 +241,6 @@ TEST(Environments, ErrorsNameFileAndKey) {
     EXPECT_EQ(error("environment: a.png"), "s.yaml:3:14: environment: must be a map with the key 'image'");
     EXPECT_THAT(error("environment: {intensity: 2}"), HasSubstr("environment: the key 'image' is missing"));
     EXPECT_THAT(error("environment: {image: b.png}"),
-                HasSubstr("s.yaml:3:22: environment.image: b.png: can't be read"));
+                HasSubstr("s.yaml:3:22: environment.image: b.png: cannot be read"));
     EXPECT_THAT(error("environment: {image: a.png, intensity: -1}"), HasSubstr("environment.intensity: "));
 }

@@ -457,7 +457,7 @@ TEST(SceneErrors, NameTheMeshAndTheSceneLine) {
         FAIL();
     } catch (const Error &error) {
         EXPECT_EQ(error.what(),
-                  where + (folder.path() / "missing.obj").string() + ": can't be read: No such file or directory");
+                  where + (folder.path() / "missing.obj").string() + ": cannot be read: No such file or directory");
     }
 }
 

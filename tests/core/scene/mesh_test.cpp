@@ -381,8 +381,8 @@ TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
 
 TEST(MeshFile, OfAnUnsupportedFormatIsRejected) {
     EXPECT_EQ(error_of("a.stl", "solid x\n"),
-              "a.stl: mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)");
-    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension can't be loaded"));
+              "a.stl: mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)");
+    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension cannot be loaded"));
     EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is text in UTF-16; save it as UTF-8 or ASCII");
     EXPECT_EQ(error_of("a.obj", ply_start), "a.obj: is a PLY file by its content; name it .ply");
     EXPECT_EQ(error_of("a.obj", ""), "a.obj: is empty");
@@ -398,7 +398,7 @@ TEST(MeshFile, ReportsWhyItCannotBeRead) {
         }
         return "no error";
     };
-    EXPECT_EQ(error_at("/no/such.ply"), "/no/such.ply: can't be read: No such file or directory");
+    EXPECT_EQ(error_at("/no/such.ply"), "/no/such.ply: cannot be read: No such file or directory");
     std::filesystem::create_directory(folder.path() / "folder.obj");
     EXPECT_THAT(error_at(folder.path() / "folder.obj"), HasSubstr("is a folder, not a mesh file"));
     ASSERT_EQ(mkfifo((folder.path() / "fifo.obj").c_str(), 0600), 0);
@@ -508,9 +508,9 @@ TEST_P(LoaderCases, YieldAMeshOrAClearError) {
 
 namespace {
 constexpr char no_stl[] =
-    ": mesh files '*.stl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
 constexpr char no_mtl[] =
-    ": mesh files '*.mtl' can't be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": mesh files '*.mtl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
 constexpr char no_faces[] = ": contains no triangles: the header has no element 'face' with a list 'vertex_indices'";
 constexpr char only_lines[] = ": contains no triangles, only points, lines or curves";
 } // namespace

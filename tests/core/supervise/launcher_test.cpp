@@ -68,7 +68,7 @@ TEST(Launcher, ReportsAMissingProgram) {
     const Spawned spawned = launcher.spawn("/no/such/program", no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 127);
-    EXPECT_NE(all_output(spawned).find("can't be executed"), std::string::npos);
+    EXPECT_NE(all_output(spawned).find("cannot be executed"), std::string::npos);
 }
 
 TEST(Launcher, IsReplacedEachTimeItIsKilled) {
@@ -118,7 +118,7 @@ TEST(Launcher, ReportsThatItCanNotBeStarted) {
         }
         return "";
     };
-    EXPECT_EQ(reason("/no/such/program"), "/no/such/program can't be started: No such file or directory; is it "
+    EXPECT_EQ(reason("/no/such/program"), "/no/such/program cannot be started: No such file or directory; is it "
                                           "installed in the same folder as arhost?");
     EXPECT_EQ(reason("/bin/true"),
               "no process can be started: /bin/true was started 5 times and exited or did not respond each time");

@@ -123,9 +123,9 @@ TEST(Yaml, TruncatesLongValuesInMessages) {
 
 TEST(Yaml, ReportsWhyAFileCantBeRead) {
     EXPECT_EQ(error_of([] { Node::load("/no/such.yaml"); }),
-              "/no/such.yaml: can't be read: No such file or directory");
+              "/no/such.yaml: cannot be read: No such file or directory");
     EXPECT_EQ(error_of([] { Node::load("/tmp"); }), "/tmp: is a folder, not a YAML file");
-    EXPECT_EQ(error_of([] { Node::load("/proc/self/mem"); }), "/proc/self/mem: can't be read: Input/output error");
+    EXPECT_EQ(error_of([] { Node::load("/proc/self/mem"); }), "/proc/self/mem: cannot be read: Input/output error");
     EXPECT_THAT(error_of([] { Node::load("caf\xe9/lab.yaml"); }), HasSubstr("path is not valid UTF-8; rename"));
 }
 

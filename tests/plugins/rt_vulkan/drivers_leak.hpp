@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Disables leak checks; include in one file of a program. Mesa's drivers leak, and are unloaded when leaks are
-// reported, so that suppressions can't name them.
+// reported, so that suppressions cannot name them.
 #pragma once
 
 #if defined(__SANITIZE_ADDRESS__)

@@ -545,7 +545,7 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
     std::filesystem::remove(file);
-    std::filesystem::create_directory(file); // rename() can't replace it
+    std::filesystem::create_directory(file); // rename() cannot replace it
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(files(), std::vector{file}) << "no temporary file is left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");

@@ -17,7 +17,7 @@ namespace arhost::test {
 inline const bool compiles_quickly =
     ::setenv("GALLIVM_PERF", "nopt", 0) == 0 && ::setenv("LP_NATIVE_VECTOR_WIDTH", "128", 0) == 0;
 
-// Why rt_vulkan can't be created with `path` on this machine; "" if it can.
+// Why rt_vulkan cannot be created with `path` on this machine; "" if it can.
 inline std::string no_vulkan(const std::string &path = "auto") {
     PluginUnderTest plugin("rt_vulkan");
     return plugin.create({{"path", path}}) == ARHOST_STATUS_OK ? "" : plugin.log();

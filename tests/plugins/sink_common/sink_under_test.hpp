@@ -246,7 +246,7 @@ private:
 inline std::string read_text(const std::filesystem::path &file) {
     std::ifstream in(file, std::ios::binary);
     if (!in)
-        throw std::runtime_error("can't read " + file.string());
+        throw std::runtime_error("cannot read " + file.string());
     return {std::istreambuf_iterator<char>(in), {}};
 }
 

@@ -84,7 +84,7 @@ inline FilmFrame to_bgr(const AVFrame &frame) {
 inline Film read_film(const std::filesystem::path &path) {
     AVFormatContext *format = nullptr;
     if (avformat_open_input(&format, path.c_str(), nullptr, nullptr) < 0)
-        throw std::runtime_error("can't open " + path.string());
+        throw std::runtime_error("cannot open " + path.string());
     const auto close = [](AVFormatContext *p) { avformat_close_input(&p); };
     const std::unique_ptr<AVFormatContext, decltype(close)> owner(format, close);
     if (avformat_find_stream_info(format, nullptr) < 0 || format->nb_streams != 1)

@@ -77,7 +77,7 @@ class XObserver {
 public:
     explicit XObserver(const std::string &display) : display_(XOpenDisplay(display.c_str())) {
         if (!display_)
-            throw std::runtime_error("can't connect to " + display);
+            throw std::runtime_error("cannot connect to " + display);
     }
     ~XObserver() { XCloseDisplay(display_); }
     XObserver(const XObserver &) = delete;
@@ -154,7 +154,7 @@ private:
         XImage *image = XGetImage(display_, drawable, 0, 0, static_cast<unsigned>(width),
                                   static_cast<unsigned>(height), AllPlanes, ZPixmap);
         if (!image || image->bits_per_pixel != 32)
-            throw std::runtime_error("can't take a screenshot");
+            throw std::runtime_error("cannot take a screenshot");
         Screenshot shot{width, height, {}};
         for (int y = 0; y < height; ++y)
             for (int x = 0; x < width; ++x) {

@@ -32,7 +32,7 @@ public:
     void start(const arhost_sink_setup &setup) {
         file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | (setup.first_sequence ? 0 : O_TRUNC), 0644);
         if (file_ < 0)
-            throw Failure(ARHOST_STATUS_ERROR_IO, path_ + " can't be opened");
+            throw Failure(ARHOST_STATUS_ERROR_IO, path_ + " cannot be opened");
         std::array<char, 160> line{};
         if (::pread(file_, line.data(), line.size() - 1, 0) > 0)
             std::sscanf(line.data(), "%" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64, &next_, &frames_, &overlaid_,
@@ -60,7 +60,7 @@ public:
             line.data(), line.size(), "%020" PRIu64 " %020" PRIu64 " %020" PRIu64 " %020" PRIu64 " %020" PRId64 "\n",
             next_, frames_, overlaid_, wrong_, std::int64_t(now / std::chrono::nanoseconds(1)));
         if (::pwrite(file_, line.data(), static_cast<std::size_t>(size), 0) != size)
-            throw Failure(ARHOST_STATUS_ERROR_IO, path_ + " can't be written");
+            throw Failure(ARHOST_STATUS_ERROR_IO, path_ + " cannot be written");
         faults_.at(sequence);
         return ARHOST_STATUS_OK;
     }
