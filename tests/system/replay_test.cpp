@@ -322,7 +322,7 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
         {replay("none.txt"), "none.txt: cannot be read: No such file or directory"},
         {replay("."), "is not a regular file"},
         {replay("garbage.txt"), "garbage.txt:2:1: is not valid JSON; delete the line"},
-        {replay("empty.txt"), "empty.txt: has no frame"},
+        {replay("empty.txt"), "empty.txt: contains no frames"},
         {replay("nan.txt"), "nan.txt:1:5: 'nan' is not a number"},
         {replay("scene.yaml"), "scene.yaml:1:1: 'version:' is not a number"},
         {replay("t.txt", {"--scene", "none.yaml"}), "--scene: raytracer.scene: there is no scene file"},

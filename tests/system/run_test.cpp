@@ -397,7 +397,7 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     };
     EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(lines_below("lister_none"), what + "no device that it could run on\n");
+    EXPECT_EQ(lines_below("lister_none"), what + "no device that it can run on\n");
     EXPECT_EQ(lines_below("lister_fail"), what + "its devices cannot be listed: the driver is too old\n");
     EXPECT_EQ(
         lines_below("lister_broken"),
