@@ -34,10 +34,13 @@ std::vector<WrongPlugin> failing(std::vector<WrongPlugin> plugins) {
     std::erase_if(plugins, [](const WrongPlugin &plugin) { return plugin.found_by.empty(); });
     return plugins;
 }
-std::vector<WrongPlugin> sample(std::vector<WrongPlugin> plugins, const std::string &also) {
-    std::erase_if(plugins,
-                  [&](const WrongPlugin &plugin) { return !plugin.found_by.empty() && plugin.defect != also; });
-    return plugins;
+std::vector<WrongPlugin> sample(const std::vector<WrongPlugin> &plugins) {
+    constexpr std::size_t stride = 16;
+    std::vector<WrongPlugin> chosen;
+    for (std::size_t i = 0; i < plugins.size(); ++i)
+        if (plugins[i].found_by.empty() || i % stride == 0)
+            chosen.push_back(plugins[i]);
+    return chosen;
 }
 const auto defect = [](const auto &info) { return info.param.defect; };
 
@@ -45,10 +48,10 @@ INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixTargeted, testing::ValuesIn(failing(wr
 INSTANTIATE_TEST_SUITE_P(Tracker, MatrixTargeted, testing::ValuesIn(failing(wrong_trackers)), defect);
 INSTANTIATE_TEST_SUITE_P(Source, MatrixTargeted, testing::ValuesIn(failing(wrong_sources)), defect);
 INSTANTIATE_TEST_SUITE_P(Sink, MatrixTargeted, testing::ValuesIn(failing(wrong_sinks)), defect);
-INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixWhole, testing::ValuesIn(sample(wrong_plugins, "miss_alpha_1")), defect);
-INSTANTIATE_TEST_SUITE_P(Tracker, MatrixWhole, testing::ValuesIn(sample(wrong_trackers, "half_a_pixel")), defect);
-INSTANTIATE_TEST_SUITE_P(Source, MatrixWhole, testing::ValuesIn(sample(wrong_sources, "stale_times")), defect);
-INSTANTIATE_TEST_SUITE_P(Sink, MatrixWhole, testing::ValuesIn(sample(wrong_sinks, "writes_frames_in_pairs")), defect);
+INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixWhole, testing::ValuesIn(sample(wrong_plugins)), defect);
+INSTANTIATE_TEST_SUITE_P(Tracker, MatrixWhole, testing::ValuesIn(sample(wrong_trackers)), defect);
+INSTANTIATE_TEST_SUITE_P(Source, MatrixWhole, testing::ValuesIn(sample(wrong_sources)), defect);
+INSTANTIATE_TEST_SUITE_P(Sink, MatrixWhole, testing::ValuesIn(sample(wrong_sinks)), defect);
 
 struct Table {
     std::string source; // in wrong/
