@@ -41,7 +41,7 @@ void expect_to_be_cancelled(const Context &context, Host &host, const char *call
     expect_ok_or_cancelled(call, status == ARHOST_STATUS_END ? ARHOST_STATUS_OK : status,
                            "cancelled during the call");
     if (returned - cancelled > limit)
-        throw Failure(fmt::format("cancelled during the call, {} returned after {:.1f} s; the limit is {:.3g} s",
+        throw Failure(fmt::format("cancelled during the call, {} returned {:.1f} s later; the limit is {:.3g} s",
                                   call, std::chrono::duration<double>(returned - cancelled).count(), limit.count()));
 }
 

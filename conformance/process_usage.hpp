@@ -53,8 +53,8 @@ private:
 // Describes what has grown from `before` to `after`; empty if nothing has. Memory may grow by allowed_kib, because
 // allocators keep some.
 inline std::string growth(const ProcessUsage &before, const ProcessUsage &after, long allowed_kib) {
-    const auto grown = [](long from, long to, const char *what) {
-        return fmt::format("from {} {} to {}", from, what, to);
+    const auto grown = [](long from, long to, const char *unit) {
+        return fmt::format("from {} {} to {}", from, unit, to);
     };
     if (after.descriptors > before.descriptors)
         return grown(before.descriptors, after.descriptors, "open descriptors");

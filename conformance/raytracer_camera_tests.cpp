@@ -18,11 +18,11 @@ glm::dvec2 find_centroid(const Picture &picture) {
     return *at;
 }
 
-void expect_near(const glm::dvec2 &actual, const glm::dvec2 &expected, double tolerance, const std::string &what,
+void expect_near(const glm::dvec2 &actual, const glm::dvec2 &expected, double tolerance, const std::string &object,
                  const Picture &picture) {
     if (glm::length(actual - expected) > tolerance)
-        throw Failure(fmt::format("{} is at ({:.3f}, {:.3f}) px; expected ({:.3f}, {:.3f})", what, actual.x, actual.y,
-                                  expected.x, expected.y))
+        throw Failure(fmt::format("{} is at ({:.3f}, {:.3f}) px; expected ({:.3f}, {:.3f})", object, actual.x,
+                                  actual.y, expected.x, expected.y))
             .with("rendered", picture)
             .at(static_cast<unsigned>(std::max(0.0, std::round(actual.x))),
                 static_cast<unsigned>(std::max(0.0, std::round(actual.y))));

@@ -340,7 +340,7 @@ void order(Context &context) {
             if (before && file.frame == before->frame)
                 throw Failure(fmt::format("frame {} is in both '{}' and '{}'", file.frame, before->name, file.name));
             if (before && file.frame < before->frame)
-                throw Failure(fmt::format("frame {} is in '{}', but the later frame {} is in '{}'", before->frame,
+                throw Failure(fmt::format("frame {} is in '{}', but the earlier frame {} is in '{}'", before->frame,
                                           before->name, file.frame, file.name));
             before = &file;
         }
@@ -584,7 +584,7 @@ constexpr Test tests[] = {
      gate, 60s, of_files<restart>, true},
     {"sink.full-disk", "On a full disk it reports an error and leaves no incomplete file.", kind, same, 60s,
      of_files<full_disk>},
-    {"sink.slow-disk", "On a slow disk, the frame is also in a file when write returns OK.", kind, "sink.every-frame",
+    {"sink.slow-disk", "Also on a slow disk, the frame is in a file when write returns OK.", kind, "sink.every-frame",
      60s, slow_disk},
     {"sink.speed", "The median time of write at 640×480 is at most 100 ms; otherwise a warning.", kind, gate, 120s,
      speed},

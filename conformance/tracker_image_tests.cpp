@@ -205,9 +205,9 @@ void no_marker(Context &context) {
     const std::vector<Print> prints = prints_of(context.prints);
     Tracker tracker(context);
     tracker.start(wide_camera(), listed(prints));
-    const auto expect_nothing = [&](const std::string &what, const auto &code) {
+    const auto expect_nothing = [&](const std::string &content, const auto &code) {
         const Grey image = filled(320, 256, code);
-        expect_none(tracker.track_first(image), "in " + what, image);
+        expect_none(tracker.track_first(image), "in " + content, image);
     };
     for (const int grey : {0, 255, 128})
         expect_nothing(fmt::format("an image of code {}", grey), [&](auto, auto) { return grey; });
@@ -319,8 +319,7 @@ constexpr Test tests[] = {
      "Images of one pixel, one row, one column and other small sizes are rejected, or nothing is detected.", kind,
      gate, 20s, sizes},
     {"tracker.stride", "Padding between rows is ignored.", kind, pose_gate, 20s, stride},
-    {"tracker.formats", "In colour formats, the grey plane is read at its given address.", kind, pose_gate, 20s,
-     formats},
+    {"tracker.formats", "In colour formats, it reads the separate grey plane.", kind, pose_gate, 20s, formats},
 };
 
 } // namespace

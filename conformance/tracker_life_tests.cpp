@@ -67,11 +67,11 @@ void unknown_id(Context &context) {
 void unusable_lens(Context &context) {
     const Print print = prints_of(context.prints).front();
     Tracker tracker(context);
-    const auto expect_rejected = [&](const char *what, const arhost_intrinsics &camera) {
+    const auto expect_rejected = [&](const char *description, const arhost_intrinsics &camera) {
         if (const arhost_status status = tracker.try_start(camera, {{print.id, side_mm}});
             status != ARHOST_STATUS_ERROR_CONFIGURATION && status != ARHOST_STATUS_ERROR_UNSUPPORTED)
-            throw Failure(fmt::format("with {}, start returned {}; expected CONFIGURATION or UNSUPPORTED", what,
-                                      status_name(status)));
+            throw Failure(fmt::format("with {}, start returned {}; expected CONFIGURATION or UNSUPPORTED",
+                                      description, status_name(status)));
     };
     const auto lens = [](arhost_distortion model, std::uint32_t count) {
         arhost_intrinsics camera = wide_camera();
