@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The suite is tested: a correct plugin passes, each wrong one fails the tests named for it.
+// Tests the suite: a correct plugin passes, and each wrong one fails the tests listed for it.
 #include "matrix_run.hpp"
 #include "matrix_sinks.hpp"
 #include "matrix_sources.hpp"
@@ -15,18 +15,18 @@ namespace {
 
 using testing::HasSubstr;
 
-// Per push, each wrong plugin runs the tests that must find it. Those that must pass, and a sample of the others, run
-// the whole suite; exhaustive_test.cpp runs it for all.
+// Per push, each wrong plugin runs the tests that must find its defect. Plugins that must pass, and one failing
+// plugin per kind, run the whole suite; exhaustive_test.cpp runs it for all.
 class MatrixTargeted : public testing::TestWithParam<WrongPlugin> {};
 class MatrixWhole : public testing::TestWithParam<WrongPlugin> {};
 
-TEST_P(MatrixTargeted, FailsTheTestsThatMustFindIt) {
+TEST_P(MatrixTargeted, FailsTheListedTests) {
     std::string tests;
     for (const std::string &test : GetParam().found_by)
         tests += (tests.empty() ? "" : ",") + test;
     expect_found(GetParam(), tests);
 }
-TEST_P(MatrixWhole, FailsTheseTestsAndNoOthers) {
+TEST_P(MatrixWhole, FailsExactlyTheListedTests) {
     expect_found(GetParam(), whole_suite(GetParam()));
 }
 
@@ -70,7 +70,7 @@ TEST(MatrixTable, HasAWrongPluginForEveryTest) {
     EXPECT_EQ(covered, ConformRun::test_names());
 }
 
-TEST(MatrixTable, HasEveryDefectOfTheWrongPlugins) {
+TEST(MatrixTable, ListsEveryDefectOfTheWrongPlugins) {
     for (const Table &table : tables) {
         const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conformance/wrong/" + table.source);
         for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
@@ -90,7 +90,7 @@ TEST(ConformanceDocument, HasTheMatrix) {
             std::string tests;
             for (const std::string &test : wrong.found_by)
                 tests += (tests.empty() ? "`" : ", `") + test + "`";
-            text += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+            text += "| " + wrong.description + " | " + wrong.verdict + " | " + tests + " |\n";
         }
         EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(text));
     }
