@@ -17,7 +17,8 @@ void add(std::vector<Key> &keys, const std::string &prefix, const std::vector<Ke
     }
 }
 
-// Adds a component: its `own` keys and those that every component has. `example`: a plugin of its kind.
+// Adds the keys of a component: its `own` keys and the keys that every component has. `example` is the name of a
+// plugin of this kind.
 void add_component(std::vector<Key> &keys, const Key &component, const std::string &example,
                    const std::vector<Key> &own) {
     const std::string prefix = component.path + (component.type == list ? "[]." : ".");
@@ -134,7 +135,7 @@ const std::vector<Key> &table() {
     return keys;
 }
 
-// "a.b[].c" → "a.b[]", "c".
+// Splits "a.b[].c" into "a.b[]" and "c".
 std::pair<std::string_view, std::string_view> split(std::string_view path) {
     const std::size_t dot = path.rfind('.');
     if (dot == std::string_view::npos)
