@@ -174,7 +174,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             configuration.source->fps = fps->real(0, 10'000);
             if (configuration.source->fps > 0 &&
                 configuration.source->fps < 1e-6) // the duration of a frame in ns must fit in 64 bits
-                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, is " + fps->text());
+                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, but is " + fps->text());
         }
     }
     if (const auto mode = root.find("mode"))

@@ -96,8 +96,9 @@ TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
                             "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
     EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("film.mkv' is truncated: it ends after frame "));
-    EXPECT_THAT(run.output(),
-                HasSubstr("again.yaml:2:9: source: its input is truncated; the frames before are kept"));
+    EXPECT_THAT(
+        run.output(),
+        HasSubstr("again.yaml:2:9: source: the input is truncated; the frames before the truncation are kept"));
     const std::string poses = run.read("poses.jsonl");
     const auto kept = std::count(poses.begin(), poses.end(), '\n');
     EXPECT_GT(kept, 10);

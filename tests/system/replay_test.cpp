@@ -200,7 +200,8 @@ TEST(Replay, ReadsTheDissertationsFormat) {
         EXPECT_EQ(lines[30]["eye"], nlohmann::json::parse("[0, 0, 529]"));
         EXPECT_TRUE(lines[11]["eye"].is_null());
         EXPECT_EQ(run.stats()["frames"]["augmented"], 20);
-        EXPECT_EQ(run.output().find("t.txt:31: ignores the truncated last line") != std::string::npos, cut);
+        EXPECT_EQ(run.output().find("t.txt:31: the last line is truncated and was ignored") != std::string::npos,
+                  cut);
     }
 }
 
@@ -339,8 +340,8 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
         {replay("t.txt", {"--scene", "scene.yaml", "--stats", "t.txt"}),
          "--stats: stats: 't.txt' is a file that this run reads"},
         {replay("t.txt", {"--config", "pure.yaml", "--with-pipeline"}),
-         "--with-pipeline needs a 'source' and a 'tracker'; pure.yaml lacks them"},
-        {{"--config", "live.yaml"}, "live.yaml:2:7: mode: live needs a 'source' that sets the pace"},
+         "--with-pipeline needs a 'source' and a 'tracker'; pure.yaml lacks at least one of them"},
+        {{"--config", "live.yaml"}, "live.yaml:2:7: mode: mode live needs a 'source', which sets the frame rate"},
         {{"--config", "tracker.yaml"}, "tracker.yaml:3:10: tracker: a tracker needs a 'source'"},
         {{"--config", "same.yaml"}, "is a file that this run reads; choose another path"},
         {{"--config", "stats.yaml"}, "stats.yaml:3:8: stats: "},
@@ -371,6 +372,6 @@ TEST(Replay, CanBeChecked) {
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
     run.write("t.txt", run.read("t.txt") + "{\"frame\"");
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: ignores the truncated last line"));
+    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: the last line is truncated and was ignored"));
     EXPECT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
 }

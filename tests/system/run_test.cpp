@@ -397,16 +397,15 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     };
     EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(lines_below("lister_none"), what + "no device that it can run on\n");
-    EXPECT_EQ(lines_below("lister_fail"), what + "its devices cannot be listed: the driver is too old\n");
-    EXPECT_EQ(
-        lines_below("lister_broken"),
-        what + "its devices cannot be listed: it reported a device that has no name or whose struct is too short\n");
+    EXPECT_EQ(lines_below("lister_none"), what + "found no device that the plugin can run on\n");
+    EXPECT_EQ(lines_below("lister_fail"), what + "cannot list the devices: the driver is too old\n");
+    EXPECT_EQ(lines_below("lister_broken"),
+              what + "cannot list the devices: it reported a device that has no name or whose struct is too short\n");
     EXPECT_THAT(lines_below("lister_crash"),
-                testing::StartsWith(what + "its devices cannot be listed: killed by signal 11 "));
+                testing::StartsWith(what + "cannot list the devices: killed by signal 11 "));
     EXPECT_THAT(lines_below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
     EXPECT_THAT(lines_below("lister_hang"),
-                testing::StartsWith(what + "its devices cannot be listed: no answer within 20 s; "));
+                testing::StartsWith(what + "cannot list the devices: did not respond within 20 s; "));
     const std::string many = lines_below("lister_many"), text(256, '"');
     EXPECT_THAT(many, testing::StartsWith(what + "device 0: " + text + "… (integrated GPU)\n    " + text + "…\n"));
     EXPECT_THAT(many, HasSubstr("\ndevice 63: "));
@@ -434,6 +433,7 @@ TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {
                  "0, 0]}}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("rt_counter does not support lens distortion: the host distorts its images"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("rt_counter does not support lens distortion: the host warps the rendered images"));
     expect_every_frame_augmented(run, 5);
 }

@@ -468,9 +468,10 @@ TEST(Sandbox, WarnsIfAnOutputMayWriteToTheWorkingDirectory) {
     ArhostRun run(counting("lockstep", "frames: 3", "", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:40: outputs[0].path: 'sink_counter' can write all of '"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("run.yaml:6:40: outputs[0].path: 'sink_counter' may write to everything in and below '"));
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "outputs[0].path=out/counted.txt"}), 0) << run.output();
-    EXPECT_THAT(run.output(), Not(HasSubstr("can write all of")));
+    EXPECT_THAT(run.output(), Not(HasSubstr("may write to everything")));
 }
 
 TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {

@@ -119,10 +119,10 @@ TEST(Coordinates, ErrorsInYamlNameTheLine) {
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [0, 0, 0]}\n"); }),
               "lab.yaml:4:25: rotations[0].axis: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: .nan, axis: [1, 0, 0]}\n"); }),
-              "lab.yaml:4:15: rotations[0].degrees: must be a finite number, is .nan");
+              "lab.yaml:4:15: rotations[0].degrees: must be a finite number, but is .nan");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [1, 0]}\n"); }),
-              "lab.yaml:4:25: rotations[0].axis: must be a list of 3 numbers, has 2");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 4\n"); }), "lab.yaml:2:5: rt: must be 1 to 3, is 4");
+              "lab.yaml:4:25: rotations[0].axis: must be a list of 3 numbers, but has 2");
+    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 4\n"); }), "lab.yaml:2:5: rt: must be 1 to 3, but is 4");
     EXPECT_EQ(error_of([] { parsed("ar: 1\n"); }), "lab.yaml:1:1: the key 'rt' is missing");
     EXPECT_EQ(
         error_of([] { parsed("ar: 1\nrt: 2\n"); }),

@@ -195,7 +195,7 @@ TEST(CameraFromMarker, RejectsInvalidPoses) {
     expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1e200; });
     expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = mt[5] = mt[10] = 0; });
     expect_rejected("the pose's rotation is left-handed", [](double *mt) { mt[10] = -1; });
-    expect_rejected("the pose is more than 1000 km away", [](double *mt) { mt[14] = -1.1e9; });
+    expect_rejected("the pose is more than 1000 km from the camera", [](double *mt) { mt[14] = -1.1e9; });
 }
 
 TEST(CameraFromMarker, AcceptsARotationThatIsOrthonormalTo1e6) {

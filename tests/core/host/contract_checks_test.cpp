@@ -148,7 +148,8 @@ TEST(MarkerChecks, PassForACorrectTracker) {
 
 TEST(MarkerChecks, FailForAWrongTracker) {
     EXPECT_EQ(violations_of({marker(7, 40), marker(4, 80)}),
-              "tracker.order: frame 12: marker 4 is not in the order of the configuration's list");
+              "tracker.order: frame 12: marker 4 is reported out of order; markers must be in the order of the "
+              "configuration's list");
     const auto expect = [](void (*alter)(arhost_marker &), const char *expected) {
         EXPECT_THAT(violations_of({altered(alter)}), HasSubstr(expected));
     };
@@ -157,13 +158,14 @@ TEST(MarkerChecks, FailForAWrongTracker) {
     expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is detected, but its age is 3 frames");
     expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
     expect([](arhost_marker &m) { m.mt[14] = -0.5; },
-           "tracker.pose: frame 12: marker 4: its reprojection error is reported as 0.000 px"); // metres
+           "tracker.pose: frame 12: marker 4: the reported reprojection error is 0.000 px"); // metres
     expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
     expect([](arhost_marker &m) { m.reprojection_px = 1; },
-           "its reprojection error is reported as 1.000 px and is 0.000 px");
+           "the reported reprojection error is 1.000 px, but the actual one is 0.000 px");
     expect([](arhost_marker &m) { m.corners_px[1][0] = 1e200; },
-           "its reprojection error is reported as 0.000 px and is inf px");
-    EXPECT_THAT(violations_of({marker(4, 40)}), HasSubstr("its reprojection error is reported as 0.000 px and is "))
+           "the reported reprojection error is 0.000 px, but the actual one is inf px");
+    EXPECT_THAT(violations_of({marker(4, 40)}),
+                HasSubstr("the reported reprojection error is 0.000 px, but the actual one is "))
         << "half the side";
 }
 
@@ -173,7 +175,7 @@ TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
     };
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 99'990'000'000), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
-              "source.capture-time: frame 0: was captured 0.250 s after its arrival");
+              "source.capture-time: frame 0: has a capture time 0.250 s after its arrival at the host");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "any delay is allowed";
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, INT64_MIN), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "media time is unrelated to the current time";
@@ -200,10 +202,10 @@ TEST(SourceChecks, RequireTheConfiguredRate) {
     EXPECT_EQ(configured({{0}, {100 * ms}, {200 * ms}}), "");
     EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "it may start at any time";
     EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count";
-    EXPECT_EQ(
-        configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
-        "source.rate: frame 2: is 0.400 s after the previous frame; 10 fps and 0 skipped frames require 0.100 s");
-    EXPECT_THAT(configured({{0}, {0}}), HasSubstr("is 0.000 s after the previous frame"));
+    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
+              "source.rate: frame 2: has a media time 0.400 s after the previous frame, but 10 fps and 0 skipped "
+              "frames require 0.100 s");
+    EXPECT_THAT(configured({{0}, {0}}), HasSubstr("has a media time 0.000 s after the previous frame"));
     EXPECT_THAT(configured({{0}, {100 * ms, 1}}), HasSubstr("1 skipped frames require 0.200 s"));
 }
 
@@ -216,8 +218,8 @@ TEST(SourceChecks, RequireRealTimeInModeLive) {
         return violations_of_times({10, false, true}, ARHOST_CLOCK_MEDIA, times, 2000 * ms);
     };
     EXPECT_EQ(live({{0}, {100 * ms}, {1000 * ms}}), "");
-    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}),
-              "source.rate: frame 2: is 10.000 s after the first frame, but arrived 2.000 s after the start");
+    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}), "source.rate: frame 2: has a media time 10.000 s after the "
+                                                      "first frame, but arrived only 2.000 s after the start");
 }
 
 TEST(SourceChecks, DoNotCheckTheRateOfALiveSource) {
@@ -252,9 +254,10 @@ TEST(OverlayChecks, PassForACorrectRayTracer) {
 TEST(OverlayChecks, FailOutsideTheRegionAndTheObjects) {
     View view;
     view.set(100, 50, 255);
-    EXPECT_EQ(view.violations({300, 200, 60, 70}),
-              "raytracer.region: frame 2: pixel (100, 50): alpha is 255 outside the region, which is 60 x 70 px from "
-              "(300, 200)");
+    EXPECT_EQ(
+        view.violations({300, 200, 60, 70}),
+        "raytracer.region: frame 2: pixel (100, 50) is outside the reported region, but has alpha 255; the region is "
+        "60 x 70 px at (300, 200)");
     EXPECT_EQ(view.violations(),
               "raytracer.place: frame 2: pixel (100, 50): alpha is 255, but all virtual objects are "
               "between (297, 201) and (363, 269)");

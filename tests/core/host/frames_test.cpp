@@ -48,7 +48,7 @@ TEST(FrameInfo, IsRejectedWithoutAClock) {
 TEST(FrameInfo, IsRejectedIfItsTimeRunsBackwards) {
     EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 5, now_ns - 5), nullptr);
     EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 6, now_ns - 5),
-                 "a frame's capture time runs backwards");
+                 "a frame's capture time is before that of the previous frame");
 }
 
 TEST(FrameInfo, IsRejectedIfALiveTimeIsFarInTheFuture) {
