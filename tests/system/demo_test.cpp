@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The demonstration, and videos that the real plugins write and read.
+// Tests of the demonstration (config/demo.yaml), and of videos that the real plugins write and read.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -53,7 +53,7 @@ TEST(Demo, WritesItsFourFiles) {
     EXPECT_EQ(stats["frames"]["augmented"], 42);
 }
 
-// Moving objects are rendered at the frame's capture time, end to end.
+// Tests all components together: moving objects must be rendered at the capture time of the frame.
 TEST(Motion, IsRenderedAtTheFramesTime) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
