@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bad input results in one message with position and fix, exit status 2, and no output file.
+// Tests that bad input results in a message that names the position and the fix, exit status 2, and no output file.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ std::string replaced(std::string text, const std::string &from, const std::strin
     return text.replace(at, from.size(), to);
 }
 
-// Takes more than half a second to parse.
+// Returns a configuration that takes more than half a second to parse.
 std::string big_scene() {
     std::string text = "version: 1\nnumbers: [0";
     for (int i = 0; i < 300'000; ++i)
@@ -33,7 +33,7 @@ std::string big_scene() {
 struct Case {
     const char *name;
     std::string yaml, scene;
-    std::vector<std::string> expected; // parts of the message
+    std::vector<std::string> expected; // texts that the error message must contain
 };
 
 const std::vector<Case> cases = {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Recording the camera poses of a run, and rendering them again.
+// Tests that record the camera poses of a run and replay them.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 
 const std::string scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml";
 
-// The real plugins on a small synthetic video; the marker is occluded in the middle.
+// Returns a configuration of the real plugins for a small synthetic video. The marker is occluded for some frames.
 std::string recording(const std::string &frames = "40") {
     return "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, frames: " + frames +
            ", occlude_from: 12, occlude_to: 22}}\n"
@@ -25,7 +25,7 @@ std::string recording(const std::string &frames = "40") {
            "- {plugin: sink_images, path: \"recorded/%03d.png\"}\n- {plugin: sink_poses, path: recorded.jsonl}\n";
 }
 
-// The same with a trajectory instead of a tracker.
+// Returns the same configuration with a trajectory instead of the tracker.
 const std::string replay_of_it = "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, "
                                  "frames: 100, occlude_from: 12, "
                                  "occlude_to: 22}}\n"
@@ -52,7 +52,7 @@ std::vector<nlohmann::json> lines_of(const ArhostRun &run, const std::string &fi
     return lines;
 }
 
-// Records `frames` frames of the counting plugins.
+// Records `frames` frames of the *_counter plugins.
 void record_counted(ArhostRun &run, int frames, const std::string &tracker = "",
                     const std::string &format = "arhost") {
     run.write("run.yaml", counting("lockstep", "frames: " + std::to_string(frames), tracker, "") +
@@ -72,7 +72,7 @@ TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
     run.write("replay.yaml", replay_of_it);
     ASSERT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
     expect_same_images(run, 40);
-    EXPECT_FALSE(run.exists("replayed/040.png")) << "the run ends with the trajectory";
+    EXPECT_FALSE(run.exists("replayed/040.png")) << "the run must end at the end of the trajectory";
     EXPECT_EQ(run.read("again.trajectory"), run.read("run.trajectory"));
     int lost = 0;
     const auto lines = lines_of(run, "run.trajectory");
@@ -86,7 +86,7 @@ TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
 TEST(Replay, WithPipelineRunsTheTrackerButUsesTheRecordedPoses) {
     ArhostRun run(recording());
     ASSERT_EQ(run.run(), 0) << run.output();
-    // Without the occlusion, the tracker finds more than it did.
+    // Without the occlusion, the tracker finds the marker in more frames than in the recorded run.
     run.write("chain.yaml", recording("100") + "stats: recorded.stats.json\n");
     ASSERT_EQ(
         run.run({"replay", "--trajectory", "run.trajectory", "--config", "chain.yaml", "--with-pipeline", "--set",

@@ -22,7 +22,7 @@ protected:
         std::ofstream(folder_.path() / "camera.yaml") << text;
         return folder_.path() / "camera.yaml";
     }
-    // The error of reading `text`, without the folder name.
+    // Returns the error message for a calibration file with the contents `text`, without the name of the folder.
     std::string error_in(const std::string &text, std::optional<Size> expected = {}) const {
         const auto file = write(text);
         const std::string message = error_of([&] { read_calibration(file, expected); });
@@ -40,7 +40,7 @@ arhost_intrinsics parsed(const std::string &text) {
     return parse_camera(yaml::Node::parse(text, "lab.yaml"));
 }
 
-// A calibration with the given distortion lines.
+// Returns a calibration file that ends with `lines`, which describe the distortion.
 std::string with_distortion(const std::string &lines) {
     return "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
            "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
@@ -124,7 +124,7 @@ TEST_F(Calibration, DetectsFisheyeByItsModelKey) {
               ARHOST_DISTORTION_FISHEYE);
     EXPECT_EQ(read_calibration(write(with_distortion("fisheye_model: 1\n" + four))).distortion,
               ARHOST_DISTORTION_FISHEYE);
-    // A fisheye lens with coefficients of 0 still has distortion.
+    // With the fisheye model, a lens distorts even if all coefficients are 0.
     EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + no_distortion))).distortion,
               ARHOST_DISTORTION_FISHEYE);
 }
@@ -233,7 +233,8 @@ TEST(CameraBlock, DefaultsToACentredPrincipalPoint) {
 
 TEST(CameraBlock, AcceptsAFieldOfViewInsteadOfFocalLengths) {
     const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, vertical_fov_degrees: 45, cx: 400}");
-    // The image's edges are half a pixel beyond the outermost centres, 300 px from its middle.
+    // The upper and lower edges of the image are half a pixel outside the outermost pixel centres, 300 px from the
+    // centre.
     EXPECT_NEAR(intrinsics.fx, 724.2640687, 1e-6);
     EXPECT_EQ(intrinsics.fy, intrinsics.fx);
     EXPECT_EQ(intrinsics.cx, 400);
@@ -301,7 +302,7 @@ TEST(CameraBlock, RequiresWidthAndHeightTogether) {
               "lab.yaml:1:1: width and height must be set together; set both or neither");
 }
 
-// The examples of docs/camera.md.
+// Tests the examples in docs/camera.md.
 TEST(CameraDocumentation, HasValidExamples) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";

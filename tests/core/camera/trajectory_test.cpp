@@ -37,7 +37,7 @@ protected:
         std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
         return read_trajectory(file());
     }
-    // The message without the file name that it starts with.
+    // Returns the error message without the file name at its start.
     std::string error(const std::string &text) const {
         const std::string message = error_of([&] { read(text); });
         EXPECT_THAT(message, testing::StartsWith(file().string() + ":"));
@@ -187,7 +187,7 @@ TEST_F(Trajectories, OfTheDissertationIgnoreATruncatedLastLine) {
         EXPECT_EQ(trajectory.frames.size(), 1u) << record.substr(0, cut);
         EXPECT_EQ(trajectory.warning, file().string() + ":2: the last line is truncated and was ignored");
     }
-    // The blank after the ninth number shows that it is complete.
+    // A blank after the ninth number proves that the number is complete.
     const Trajectory whole = read(record + record.substr(0, record.size() - 1));
     EXPECT_EQ(whole.frames.size(), 2u);
     EXPECT_EQ(whole.warning, "");

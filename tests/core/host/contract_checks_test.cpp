@@ -20,7 +20,7 @@ constexpr arhost_intrinsics lens{
 constexpr arhost_marker_config listed[] = {{sizeof(arhost_marker_config), 4, 80},
                                            {sizeof(arhost_marker_config), 7, 40}};
 
-// Seen from the front, half a metre away.
+// Returns a marker that faces the camera at a distance of half a metre.
 arhost_marker marker(int id, double side_mm) {
     arhost_marker m{};
     m.id = id;
@@ -64,7 +64,8 @@ struct Time {
     std::int64_t capture_ns;
     std::uint32_t skipped = 0;
 };
-// Frames from 0 on that come at `now_ns`, of a source that was started at 0.
+// Frames of a source that was started at time 0. Frame numbers start at 0, and the host receives each frame at
+// `now_ns`.
 std::string violations_of_times(const SourceChecks::Rate &rate, arhost_clock clock, const std::vector<Time> &times,
                                 std::int64_t now_ns) {
     SourceChecks source(rate, 0);
@@ -85,7 +86,7 @@ arhost_marker altered(void (*alter)(arhost_marker &)) {
     return m;
 }
 
-// A ball of 10 mm radius at the origin, seen from 200 mm in front of it.
+// A scene with a ball of 10 mm radius at the origin; the camera is 200 mm in front of the ball.
 struct View {
     explicit View(std::optional<arhost_role> role = ARHOST_ROLE_VIRTUAL)
         : scene(scene_with(role)), pixels(640 * 480 * 4) {}
@@ -106,7 +107,7 @@ struct View {
     std::string violations(const Region &region = {0, 0, 640, 480}) const {
         const OverlayChecks overlay(scene.scene());
         ContractChecks checks;
-        for (std::uint64_t frame = 0; frame < 16; ++frame) // each row once
+        for (std::uint64_t frame = 0; frame < 16; ++frame) // 16 frames, so that each row is checked once
             overlay.check(checks, frame, camera, region, {pixels.data(), 640 * 4});
         return ::violations(checks);
     }
@@ -131,13 +132,13 @@ TEST(MarkerChecks, PassForACorrectTracker) {
     EXPECT_EQ(violations_of({}), "");
     EXPECT_EQ(violations_of({marker(4, 80), marker(7, 40)}), "");
     EXPECT_EQ(violations_of({marker(7, 40)}), "");
-    // An error of a tenth of a pixel, reported as such.
+    // A marker with an error of 0.1 px that reports this error correctly.
     EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
                   m.corners_px[0][0] += 0.2;
                   m.reprojection_px = 0.1;
               })}),
               "");
-    // A predicted marker has no detected corners.
+    // A predicted marker has no detected corners, so its reprojection error is not checked.
     EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
                   m.state = ARHOST_MARKER_PREDICTED;
                   m.age_frames = 2;
@@ -158,7 +159,8 @@ TEST(MarkerChecks, FailForAWrongTracker) {
     expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is detected, but its age is 3 frames");
     expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
     expect([](arhost_marker &m) { m.mt[14] = -0.5; },
-           "tracker.pose: frame 12: marker 4: the reported reprojection error is 0.000 px"); // metres
+           "tracker.pose: frame 12: marker 4: the reported reprojection error is 0.000 px"); // the pose is in metres
+                                                                                             // instead of mm
     expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
     expect([](arhost_marker &m) { m.reprojection_px = 1; },
            "the reported reprojection error is 1.000 px, but the actual one is 0.000 px");
@@ -166,7 +168,7 @@ TEST(MarkerChecks, FailForAWrongTracker) {
            "the reported reprojection error is 0.000 px, but the actual one is inf px");
     EXPECT_THAT(violations_of({marker(4, 40)}),
                 HasSubstr("the reported reprojection error is 0.000 px, but the actual one is "))
-        << "half the side";
+        << "the marker's side is half as long as configured";
 }
 
 TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
@@ -200,8 +202,8 @@ TEST(SourceChecks, RequireTheConfiguredRate) {
         return violations_of_times({10, true, false}, ARHOST_CLOCK_MEDIA, times, 0);
     };
     EXPECT_EQ(configured({{0}, {100 * ms}, {200 * ms}}), "");
-    EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "it may start at any time";
-    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count";
+    EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "media time may start at any value";
+    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count as frames";
     EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
               "source.rate: frame 2: has a media time 0.400 s after the previous frame, but 10 fps and 0 skipped "
               "frames require 0.100 s");
@@ -246,8 +248,8 @@ TEST(SampleHash, DetectsAnyChangeWithinSixteenFrames) {
 TEST(OverlayChecks, PassForACorrectRayTracer) {
     View view;
     view.set(330, 235, 255); // the ball's centre
-    view.set(330, 206, 90);  // its edge: 10 mm are 30 px
-    view.set(10, 10, 153);   // a shadow somewhere else
+    view.set(330, 206, 90);  // the ball's edge: 10 mm correspond to 30 px
+    view.set(10, 10, 153);   // a shadow, which may be anywhere
     EXPECT_EQ(view.violations(), "");
 }
 
@@ -274,7 +276,7 @@ TEST(OverlayChecks, DoNotTreatACatcherAsAVirtualObject) {
 
 TEST(OverlayChecks, SkipPlacesBehindTheCamera) {
     View view;
-    view.camera.eye[1] = -5; // inside the ball
+    view.camera.eye[1] = -5; // the camera is inside the ball
     view.set(1, 1, 255);
     EXPECT_EQ(view.violations(), "");
 }

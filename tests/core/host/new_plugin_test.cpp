@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What `arhost new-plugin` writes and rejects; tests/sdk tests the skeletons.
+// Tests what `arhost new-plugin` writes and rejects. tests/sdk builds and tests the skeletons.
 #include "host/new_plugin.hpp"
 
 #include "plugin_under_test.hpp"

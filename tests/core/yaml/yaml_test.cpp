@@ -63,7 +63,7 @@ TEST(Yaml, RejectsASecondDocument) {
     EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: YAML syntax: a second"));
 }
 
-// yaml-cpp accepts the end of the text as the closing quote, which would swallow the keys in between.
+// yaml-cpp accepts the end of the text as the closing quote; all keys after the opening quote would be lost silently.
 TEST(Yaml, RejectsUnterminatedQuotes) {
     const auto error = [](const std::string &text) { return error_of([&] { Node::parse(text, "a.yaml"); }); };
     const std::string why = "YAML syntax: this quoted value is not terminated";
