@@ -371,7 +371,7 @@ TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced with 'allow: [gpu]'"));
+    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced together with 'allow: [gpu]'"));
 }
 
 // The plugin changes data between the host's check and use. This may result in a wrong pose, which cannot be

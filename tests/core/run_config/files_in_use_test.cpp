@@ -115,7 +115,7 @@ TEST_F(FilesInUseTest, AcceptsPatternsInMissingFolders) {
 TEST_F(FilesInUseTest, RecognisesFilesOfOtherOutputs) {
     FilesInUse files;
     files.write(node("a.mp4"));
-    EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output writes '"));
+    EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output already writes '"));
     file("f-0001.png");
     fs::create_hard_link(folder / "f-0001.png", folder / "f-0002.png");
     EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "")

@@ -141,7 +141,7 @@ TEST(Yaml, OverridesValuesFromTheCommandLine) {
               "--set: raytracer.options.samples: must be 8 to 16, but is 4");
     EXPECT_THAT(error_of([&] { node.override_value("mode.x", "1"); }), HasSubstr("the parent of 'x' is a scalar"));
     EXPECT_THAT(error_of([&] { node.override_value("outputs[7].path", "1"); }),
-                HasSubstr("not an index of a list of 1"));
+                HasSubstr("not a valid index; the number of elements in the list is 1"));
 }
 
 TEST(Yaml, ErrorsNameTheOverridingOption) {
