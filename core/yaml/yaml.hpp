@@ -97,9 +97,10 @@ public:
 
     // Return absolute UTF-8 paths without `.` and `..`. A `..` after a symbolic link refers to the parent of the
     // link's target, as in the kernel's path resolution.
-    std::filesystem::path
-    input_path() const; // relative to the document's folder; if set with `--set`: to the working directory
-    std::filesystem::path output_path() const; // relative to the working directory
+    // input_path: relative to the document's folder; if the value was set with `--set`, to the working directory.
+    // output_path: relative to the working directory.
+    std::filesystem::path input_path() const;
+    std::filesystem::path output_path() const;
 
 private:
     struct Document {
