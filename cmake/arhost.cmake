@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Compile options for all targets, and functions that add libraries, plugins and tests.
 
-# All clones share one cache: paths are relative to the clone.
+# Makes paths relative to the clone, so that all clones can share one compiler cache.
 find_program(CCACHE ccache)
 if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1
@@ -17,19 +17,19 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
   # GCC 12 falsely reports overlapping copies in std::string's operator+ (GCC bug 105651).
   add_compile_options(-Wno-restrict)
 endif()
-# Reproducible pixels and poses on every machine and at every call site.
+# These options make pixels and poses reproducible on every machine and at every call site.
 add_compile_options(-ffp-contract=off)
 if(ARHOST_SANITIZE)
   add_compile_options(-fsanitize=${ARHOST_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${ARHOST_SANITIZE})
 endif()
-# For tests and the conformance suite: omits pointer checks, which reduces their compile time to a third.
+# Options for tests and the conformance suite. Omits the sanitizers' pointer checks, which reduces compile time to a third.
 set(ARHOST_UNCHECKED_POINTERS)
 if(ARHOST_SANITIZE MATCHES undefined)
   set(ARHOST_UNCHECKED_POINTERS -fno-sanitize=null,alignment,vptr,object-size)
 endif()
 
-# Same layout as an installed arhost, so that programs find each other.
+# Uses the folder layout of an installed arhost, so that the programs find each other.
 set(ARHOST_PLUGIN_DIRECTORY ${CMAKE_BINARY_DIR}/lib/arhost/plugins)
 add_custom_target(plugins COMMENT "All plugins")
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# arhost_add_plugin(name SOURCES … [LIBRARIES …]): a plugin, <name>.so, that exports arhost_entry and nothing else.
-# Part of the SDK's CMake package, and of arhost's own build.
+# arhost_add_plugin(name SOURCES … [LIBRARIES …]) builds a plugin, <name>.so, that exports only arhost_entry. Used by the SDK's
+# CMake package and by arhost's own build.
 #   ARHOST_PLUGIN_DIRECTORY          output folder; default: the current binary folder
 #   ARHOST_PLUGIN_INSTALL_DIRECTORY  install folder; if unset, the plugin is not installed
 set(ARHOST_PLUGIN_MAP ${CMAKE_CURRENT_LIST_DIR}/plugin.map)

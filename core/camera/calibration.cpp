@@ -35,13 +35,13 @@ arhost_intrinsics intrinsics_for(const Size &size) {
 void set_focal_length(double &to, double value, const Node &node) {
     if (!(value > 0)) {
         std::ostringstream message;
-        message << "the focal length must be greater than 0 px, is " << value;
+        message << "the focal length must be greater than 0 px, but is " << value;
         node.fail(message.str());
     }
     to = value;
 }
 
-// Square pixels; the field of view spans the image from its upper to its lower edge.
+// Sets the focal lengths for square pixels. `degrees` is the angle between the upper and the lower edge of the image.
 void set_vertical_fov(arhost_intrinsics &to, double degrees) {
     to.fx = to.fy = to.height / 2.0 / std::tan(degrees / 2 * std::numbers::pi / 180);
 }
@@ -57,7 +57,7 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
     const std::string count = std::to_string(k.size());
     if (model == ARHOST_DISTORTION_FISHEYE) {
         if (k.size() != 4)
-            node.fail("the fisheye model has 4 coefficients (k1 k2 k3 k4), not " + count);
+            node.fail("the fisheye model needs 4 coefficients (k1 k2 k3 k4), not " + count);
     } else {
         if (k.size() == 14) {
             if (!std::all_of(k.begin() + 12, k.end(), zero))
@@ -65,11 +65,12 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
             k = k.first(12);
         }
         if (!k.empty() && k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12)
-            node.fail("the Brown model has 4, 5, 8 or 12 coefficients "
+            node.fail("the Brown model needs 4, 5, 8 or 12 coefficients "
                       "(k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]]), not " +
                       count);
         if (model == ARHOST_DISTORTION_NONE && !std::all_of(k.begin(), k.end(), zero))
-            node.fail("the model is none, but a coefficient is not 0; set the model to brown or fisheye");
+            node.fail(
+                "the distortion model is 'none', but a coefficient is not 0; set the model to brown or fisheye");
         model = std::all_of(k.begin(), k.end(), zero) ? ARHOST_DISTORTION_NONE : ARHOST_DISTORTION_BROWN;
         if (model == ARHOST_DISTORTION_NONE)
             k = {};
@@ -79,8 +80,8 @@ void set_distortion(arhost_intrinsics &to, arhost_distortion model, std::span<co
     std::copy(k.begin(), k.end(), to.coefficients);
 }
 
-// Finds a key regardless of case and underscores, which differ between programs and releases: camera_matrix,
-// Camera_Matrix, cameraMatrix.
+// Finds a key, ignoring case and underscores, because programs and releases spell the keys differently:
+// camera_matrix, Camera_Matrix, cameraMatrix.
 std::optional<Node> find(const Node &root, std::initializer_list<std::string_view> names) {
     for (const auto &[key, value] : root.entries()) {
         std::string plain;
@@ -93,7 +94,7 @@ std::optional<Node> find(const Node &root, std::initializer_list<std::string_vie
     return std::nullopt;
 }
 
-// A list of numbers, or a matrix of OpenCV ({rows, cols, dt, data}) or ROS ({rows, cols, data}).
+// Reads a list of numbers, or a matrix of OpenCV ({rows, cols, dt, data}) or ROS ({rows, cols, data}).
 std::vector<double> numbers(const Node &node) {
     if (node.is_sequence())
         return node.reals();
@@ -110,7 +111,7 @@ std::vector<double> numbers(const Node &node) {
 void read_camera_matrix(arhost_intrinsics &to, const Node &node) {
     const std::vector<double> k = numbers(node);
     if (k.size() != 9)
-        node.fail("must be a 3×3 matrix, has " + std::to_string(k.size()) + " numbers");
+        node.fail("must be a 3×3 matrix with 9 numbers, but has " + std::to_string(k.size()) + " numbers");
     if (k[1] != 0)
         node.fail("skew (row 1, column 2) is not supported and must be 0");
     if (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
@@ -129,7 +130,7 @@ arhost_distortion model_of(const Node &root) {
             return ARHOST_DISTORTION_NONE;
         return name == "fisheye" || name == "equidistant" ? ARHOST_DISTORTION_FISHEYE : ARHOST_DISTORTION_BROWN;
     }
-    const auto fisheye = find(root, {"fisheyemodel"}); // OpenCV's calibration sample
+    const auto fisheye = find(root, {"fisheyemodel"}); // key written by OpenCV's calibration sample program
     return fisheye && fisheye->integer(0, 1) ? ARHOST_DISTORTION_FISHEYE : ARHOST_DISTORTION_BROWN;
 }
 
@@ -151,7 +152,7 @@ Size size_of(const Node &root, std::optional<Size> expected) {
 std::optional<Size> size_next_to_file(const Node &node) {
     const auto width = node.find("width"), height = node.find("height");
     if (width.has_value() != height.has_value())
-        node.fail("width and height go together; set both or neither");
+        node.fail("width and height must be set together; set both or neither");
     if (!width)
         return std::nullopt;
     return Size{side(*width), side(*height)};
@@ -162,7 +163,8 @@ std::optional<Size> size_next_to_file(const Node &node) {
 arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected) {
     const Node root = Node::load(file);
     if (!root.is_map())
-        root.fail("is not a YAML calibration; let OpenCV's FileStorage write it to a file named *.yaml");
+        root.fail("is not a calibration in YAML format; for YAML, give OpenCV's FileStorage a file name that ends in "
+                  ".yaml");
     arhost_intrinsics intrinsics = intrinsics_for(size_of(root, expected));
     const auto matrix = find(root, {"cameramatrix", "k"});
     if (!matrix)
@@ -187,7 +189,7 @@ arhost_intrinsics parse_camera(const Node &node) {
     arhost_intrinsics intrinsics = intrinsics_for({side(node.require("width")), side(node.require("height"))});
     if (const auto fov = node.find("vertical_fov_degrees")) {
         if (node.find("fx") || node.find("fy"))
-            fov->fail("replaces fx and fy; keep either it or them");
+            fov->fail("must not be combined with fx and fy; remove either this key or those two");
         set_vertical_fov(intrinsics, fov->real(0.01, 179));
     } else {
         const Node fx = node.require("fx"), fy = node.find("fy").value_or(fx);

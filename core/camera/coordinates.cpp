@@ -42,7 +42,7 @@ std::string problem_with_profiles(const Coordinates &coordinates) {
     return "";
 }
 
-// Cosine and sine; exact for multiples of 90°.
+// Returns the cosine and sine, which are exact for multiples of 90°.
 std::pair<double, double> cos_sin(double degrees) {
     const double reduced = std::remainder(degrees, 360.0); // -180 to 180
     if (reduced == 0)
@@ -55,10 +55,10 @@ std::pair<double, double> cos_sin(double degrees) {
     return {std::cos(radians), std::sin(radians)};
 }
 
-// Rodrigues' rotation formula.
+// Returns the rotation matrix, computed with Rodrigues' rotation formula.
 glm::dmat4 matrix_of(const Rotation &rotation) {
     const glm::dvec3 size = glm::abs(rotation.axis);
-    // Divide by the largest component first, so that no square overflows or underflows.
+    // Divides by the largest component first, so that squaring neither overflows nor underflows.
     const glm::dvec3 n = glm::normalize(rotation.axis / std::max({size.x, size.y, size.z}));
     const auto [c, s] = cos_sin(rotation.degrees);
     const glm::dvec3 t = (1 - c) * n;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The coordinate profiles of the dissertation (figure 7): the axes of the tracker's and the ray tracer's world, and
-// the rotations between them.
+// The coordinate profiles of the dissertation (figure 7): the directions of the axes in the tracker's and the ray
+// tracer's world coordinates, and the rotations between the two.
 #pragma once
 
 #include "yaml/yaml.hpp"
@@ -16,7 +16,7 @@
 
 namespace arhost::camera {
 
-// World axes, all right-handed. The numbers are only compared.
+// Profiles: directions of the world axes, all right-handed. Profile numbers are only compared for equality.
 inline constexpr int profile_z_up = 1; // x right, y back, z up: the marker frame
 inline constexpr int profile_y_up = 2; // x right, y up, z front
 inline constexpr int profile_other = 3;
@@ -26,23 +26,24 @@ struct Rotation {
     glm::dvec3 axis; // any length except 0
 };
 
-// If `ar` and `rt` differ, MT becomes MT·R1·R2 before inversion; if they are equal, MT is unchanged.
+// If `ar` and `rt` differ, MT (the marker's pose) is replaced with MT·R1·R2 before it is inverted; if they are equal,
+// MT is used unchanged.
 struct Coordinates {
-    int ar = profile_z_up;           // of the tracker's world
-    int rt = profile_z_up;           // of the ray tracer's world, i.e. the scene
-    std::vector<Rotation> rotations; // R1, R2: none if ar equals rt, else one or two
+    int ar = profile_z_up;           // profile of the tracker's world
+    int rt = profile_z_up;           // profile of the ray tracer's world, i.e. of the scene
+    std::vector<Rotation> rotations; // R1, R2: empty if `ar` equals `rt`, otherwise one or two rotations
 };
 
-// The default for a scene's axes: no rotation for z-up, 90° about x for y-up.
+// Returns the default for a scene's axes: no rotation for z-up, 90° about x for y-up.
 Coordinates default_for(arhost_axes scene_axes);
 
-// "" if the coordinates are valid, else a sentence for the user that says how to fix them.
+// Returns "" if the coordinates are valid, otherwise a message that says how to fix them.
 std::string problem_with(const Coordinates &coordinates);
 
-// {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [1, 0, 0]}]}; throws yaml::Error.
+// Reads, for example, {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [1, 0, 0]}]}. Throws yaml::Error.
 Coordinates parse_coordinates(const yaml::Node &node);
 
-// R1·R2, or the identity if the profiles are equal.
+// Returns R1·R2, or the identity if the profiles are equal.
 glm::dmat4 rotation_of(const Coordinates &coordinates);
 
 } // namespace arhost::camera

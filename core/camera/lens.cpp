@@ -9,7 +9,7 @@
 namespace arhost::camera {
 namespace {
 
-// (x'', y'') of a direction with z > 0.
+// Returns the distorted normalized image coordinates (x'', y'') of a direction with z > 0.
 glm::dvec2 distort(const arhost_intrinsics &intrinsics, const glm::dvec3 &d) {
     shading::Vec3 p{d.x / d.z, d.y / d.z, 1};
     if (intrinsics.distortion == ARHOST_DISTORTION_BROWN)

@@ -12,8 +12,9 @@
 
 namespace arhost::camera {
 
-// The pixel of a point in OpenCV camera axes (x right, y down, z forward; mm). None if z ≤ 0. As in OpenCV, a Brown
-// polynomial that folds back far outside the image is not detected.
+// Returns the pixel to which a point in OpenCV camera axes (x right, y down, z forward; mm) is projected; nullopt if
+// z ≤ 0. Far outside the image, a Brown polynomial may stop increasing and map points back into the image; as in
+// OpenCV, this is not detected.
 std::optional<glm::dvec2> project(const arhost_intrinsics &intrinsics, const glm::dvec3 &point_in_camera);
 
 // Transforms a point of the ray tracer's world (mm) to OpenCV camera axes.

@@ -26,7 +26,7 @@ const char *problem_with(const double (&mt)[16]) {
     if (glm::determinant(rotation) < 0)
         return "the pose's rotation is left-handed";
     if (std::max({std::abs(mt[12]), std::abs(mt[13]), std::abs(mt[14])}) > distance_limit_mm)
-        return "the pose is more than 1000 km away";
+        return "the pose is more than 1000 km from the camera";
     return nullptr;
 }
 
@@ -34,8 +34,9 @@ std::optional<arhost_camera> camera_from_marker(const double (&mt)[16], const Co
                                                 const arhost_intrinsics &intrinsics) {
     if (problem_with(mt))
         return std::nullopt;
-    const glm::dmat4 cp = glm::inverse(glm::make_mat4(mt) * rotation_of(coordinates)); // equation 3.2
-    const glm::dvec3 eye(cp[3]), look_at = eye - glm::dvec3(cp[2]), up(cp[1]);         // 3.3, 3.4, 3.5
+    const glm::dmat4 cp =
+        glm::inverse(glm::make_mat4(mt) * rotation_of(coordinates));           // equation 3.2 of the dissertation
+    const glm::dvec3 eye(cp[3]), look_at = eye - glm::dvec3(cp[2]), up(cp[1]); // equations 3.3 to 3.5
     arhost_camera camera{};
     camera.struct_size = sizeof camera;
     for (int i = 0; i < 3; ++i) {

@@ -19,21 +19,21 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double dissertation_fps = 30; // frame rate of its camera
+constexpr double dissertation_fps = 30; // frame rate of the camera used in the dissertation
 
-// A line and its position.
+// A line of a trajectory file and its position.
 struct Line {
     const std::filesystem::path &file;
-    std::size_t number; // from 1
+    std::size_t number; // counts from 1
     std::string_view text;
-    bool ended; // has a line end; else the file may be truncated here
+    bool ended; // the line has a line end; if not, the file may be truncated in this line
 
     [[noreturn]] void fail(std::size_t column, const std::string &message) const {
         throw yaml::Error(file.string() + ":" + std::to_string(number) + ":" + std::to_string(column) + ": " +
                           message);
     }
     std::string truncation_warning() const {
-        return file.string() + ":" + std::to_string(number) + ": ignores the truncated last line";
+        return file.string() + ":" + std::to_string(number) + ": the last line is truncated and was ignored";
     }
 };
 
@@ -50,16 +50,16 @@ std::vector<Line> lines_of(const std::filesystem::path &file, std::string_view t
     return lines;
 }
 
-// "" if ray tracers can use the view, else the problem.
+// Returns "" if ray tracers can use the view, otherwise a description of the problem.
 std::string problem_with(const View &view) {
     const glm::dvec3 eye = glm::make_vec3(view.eye_mm), up = glm::make_vec3(view.up);
     const glm::dvec3 backwards = eye - glm::make_vec3(view.look_at_mm);
     if (!(glm::length(backwards) > 0))
         return "look_at must differ from eye";
-    constexpr double limit_mm = 1e9; // as in scenes
+    constexpr double limit_mm = 1e9; // the same limit as for scenes
     for (const double number : {eye.x, eye.y, eye.z, view.look_at_mm[0], view.look_at_mm[1], view.look_at_mm[2]})
         if (!(std::abs(number) <= limit_mm))
-            return "eye and look_at must be within 1e9 mm";
+            return "the coordinates of eye and look_at must be between -1e9 and 1e9 mm";
     if (!(glm::length(glm::cross(up, backwards)) > 1e-9 * glm::length(up) * glm::length(backwards)))
         return "up must not be 0 or parallel to the line of sight";
     return "";
@@ -67,7 +67,7 @@ std::string problem_with(const View &view) {
 
 // ---- arhost's format -------------------------------------------------------------------------------
 
-// A member of a line's JSON object; errors name its position.
+// A member of the JSON object in a line. Error messages contain the position of the member.
 class Member {
 public:
     Member(const Line &line, const Json &object, const char *key) : line_(line), key_(key) {
@@ -82,11 +82,11 @@ public:
     }
     bool is_null() const { return value_->is_null(); }
     std::int64_t integer() const {
-        if (value_->is_structured()) // never print it: its nesting depth is unlimited
+        if (value_->is_structured()) // not printed, because dump() would recurse without limit
             fail("must be a whole number");
         if (!value_->is_number_integer() ||
             (value_->is_number_unsigned() && value_->get<std::uint64_t>() > std::uint64_t(INT64_MAX)))
-            fail("must be a whole number, is " + value_->dump(-1, ' ', false, Json::error_handler_t::replace));
+            fail("must be a whole number, but is " + value_->dump(-1, ' ', false, Json::error_handler_t::replace));
         return value_->get<std::int64_t>();
     }
     void read(double (&to)[3]) const {
@@ -124,12 +124,13 @@ TrajectoryFrame frame_of(const Line &line, const Json &object) {
     return frame;
 }
 
-// JSON is valid YAML, so the camera is read and errors are reported as in a configuration.
+// Reads the header with the YAML parser (JSON is valid YAML), so that the camera is read and its errors are reported
+// as in a configuration.
 void read_header(Trajectory &to, const Line &line) {
     const yaml::Node header = yaml::Node::parse(std::string(line.text), line.file.string());
     header.require("format").choice({"arhost-trajectory"});
     if (const yaml::Node version = header.require("version"); version.integer() != 1)
-        version.fail("must be 1: this arhost reads no other version");
+        version.fail("must be 1, the only version that this arhost can read");
     header.require("unit").choice({"mm"});
     to.clock = header.require("clock").choice({"media", "monotonic"}) == "media" ? ARHOST_CLOCK_MEDIA
                                                                                  : ARHOST_CLOCK_MONOTONIC;
@@ -140,7 +141,8 @@ void read_header(Trajectory &to, const Line &line) {
 Trajectory read_arhost(const std::vector<Line> &lines) {
     Trajectory trajectory;
     if (!lines.front().ended)
-        lines.front().fail(lines.front().text.size() + 1, "the first line is truncated: the file contains no frame");
+        lines.front().fail(lines.front().text.size() + 1,
+                           "the first line is truncated, and the file contains no frame");
     read_header(trajectory, lines.front());
     for (const Line &line : std::span(lines).subspan(1)) {
         Json object;
@@ -160,9 +162,11 @@ Trajectory read_arhost(const std::vector<Line> &lines) {
             const TrajectoryFrame &before = trajectory.frames.back();
             if (frame.frame <= before.frame)
                 Member(line, object, "frame")
-                    .fail("must be greater than in the previous line, " + std::to_string(before.frame));
+                    .fail("must be greater than the frame number of the previous line, " +
+                          std::to_string(before.frame));
             if (frame.capture_ns < before.capture_ns)
-                Member(line, object, "capture_ns").fail("must not be less than in the previous line");
+                Member(line, object, "capture_ns")
+                    .fail("must not be less than the capture time in the previous line");
         }
         trajectory.frames.push_back(frame);
     }
@@ -171,7 +175,7 @@ Trajectory read_arhost(const std::vector<Line> &lines) {
 
 // ---- the dissertation's format ----------------------------------------------------------------------------
 
-// The numbers of a line; empty if it has none.
+// Returns the numbers of a line; empty if the line has none.
 std::vector<double> numbers_of(const Line &line) {
     std::vector<double> numbers;
     const char *const begin = line.text.data(), *const end = begin + line.text.size();
@@ -183,14 +187,14 @@ std::vector<double> numbers_of(const Line &line) {
         double number = 0;
         const auto [stopped, error] = std::from_chars(at, word_end, number);
         if (error != std::errc() || stopped != word_end || !std::isfinite(number)) {
-            if (!line.ended && word_end == end) // a truncated number such as "-" or "1e"
+            if (!line.ended && word_end == end) // the line ends in a truncated number such as "-" or "1e"
                 return {};
             line.fail(column, "'" + std::string(at, std::min<std::ptrdiff_t>(word_end - at, 30) + at) +
                                   "' is not a number; a line has nine (eye, look_at, up), or none for a frame "
                                   "without a camera");
         }
         if (numbers.size() == 9)
-            line.fail(column, "has more than nine numbers (three each for eye, look_at and up)");
+            line.fail(column, "the line has more than nine numbers (three each for eye, look_at and up)");
         numbers.push_back(number);
         at = word_end;
     }
@@ -202,7 +206,7 @@ Trajectory read_dissertation(const std::vector<Line> &lines) {
     trajectory.fps = dissertation_fps;
     for (const Line &line : lines) {
         const std::vector<double> numbers = numbers_of(line);
-        // A ninth number without a following blank may lack digits.
+        // If no blank follows the ninth number, its last digits may be missing.
         if (!line.ended && (numbers.size() < 9 || !(line.text.ends_with(' ') || line.text.ends_with('\t')))) {
             trajectory.warning = line.truncation_warning();
             break;
@@ -219,7 +223,7 @@ Trajectory read_dissertation(const std::vector<Line> &lines) {
             frame.view = view;
         } else if (!numbers.empty()) {
             line.fail(line.text.size() + 1,
-                      "has " + std::to_string(numbers.size()) + " numbers; eye, look_at and up need nine");
+                      "the line has " + std::to_string(numbers.size()) + " numbers; eye, look_at and up need nine");
         }
         trajectory.frames.push_back(frame);
     }

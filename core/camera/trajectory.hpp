@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Recorded cameras of a run, for replay: as the ray tracer received them, after the mapping, in scene coordinates.
-// Two formats (docs/trajectories.md): arhost's own, which the plugin sink_trajectory writes, and the dissertation's.
+// Reads the recorded cameras of a run, which can then be replayed. The cameras are in scene coordinates, as the ray
+// tracer received them. There are two formats (docs/trajectories.md): the one that the plugin sink_trajectory writes,
+// and the one of the dissertation.
 #pragma once
 
 #include <arhost/camera.h>
@@ -23,24 +24,26 @@ struct View {
 struct TrajectoryFrame {
     std::uint64_t frame; // frame number in the run
     std::int64_t capture_ns;
-    std::optional<View> view; // none: no marker was visible
+    std::optional<View> view; // nullopt if no marker was visible
 };
 
 struct Trajectory {
-    std::vector<TrajectoryFrame> frames; // at least one, ascending, without dropped frames
-    // None if the file has no timestamps; capture_ns then counts from 0 at `fps` frames per second.
+    std::vector<TrajectoryFrame>
+        frames; // at least one; by ascending frame number; frames that the run dropped are missing
+    // nullopt if the file has no timestamps; capture_ns is then computed from 0 at `fps` frames per second.
     std::optional<arhost_clock> clock;
-    double fps = 0;                              // nominal; 0: unknown
-    std::optional<arhost_intrinsics> intrinsics; // none if the file lacks them
-    std::string warning;                         // "", or a non-fatal problem, for the user
+    double fps = 0;                              // nominal frame rate; 0: unknown
+    std::optional<arhost_intrinsics> intrinsics; // nullopt if the file lacks them
+    std::string warning;                         // message about a non-fatal problem, or ""
 
-    // The first frame with this or a higher number, or nullptr.
+    // Returns the first frame whose number is at least `frame`, or nullptr.
     const TrajectoryFrame *at_or_after(std::uint64_t frame) const;
     std::uint64_t end() const { return frames.back().frame + 1; }
 };
 
-// Detects the format by the first character. Ignores a truncated last line with a warning; any other problem throws
-// yaml::Error, which names file, line, column and fix.
+// Reads a file in either format, which is detected from the first character. A truncated last line is ignored and
+// results in a warning. Any other problem is thrown as yaml::Error, whose message names file, line and column, and
+// how to fix the problem.
 Trajectory read_trajectory(const std::filesystem::path &file);
 
 arhost_camera camera_of(const View &view, const arhost_intrinsics &intrinsics);

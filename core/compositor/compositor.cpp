@@ -67,7 +67,7 @@ void composite(const arhost_frame_format &format, const std::uint8_t *const plan
     const std::size_t row_bytes = 3 * std::size_t(format.width);
     for (std::size_t y = 0; y < format.height; ++y) {
         std::uint8_t *to = out.bgr + y * out.stride;
-        const std::uint8_t *from = to; // converted rows are blended in place
+        const std::uint8_t *from = to; // a row that was converted to BGR is blended in place
         const bool blending = contains(inside, inside.x, y);
         if (format.pixel_format != ARHOST_PIXEL_FORMAT_BGR8) {
             convert_row(format, matrix, planes, y, to);

@@ -20,7 +20,7 @@ LensWarp::LensWarp(const arhost_intrinsics &lens) : pinhole_(lens) {
     const std::size_t width = lens.width, height = lens.height;
     sources_.resize(width * height, {no_source, no_source});
     warped_.resize(4 * width * height);
-    double max_x = 1e-3, max_y = 1e-3; // on the plane z = 1
+    double max_x = 1e-3, max_y = 1e-3; // extent of the lens's view on the plane z = 1
     for (std::size_t y = 0; y < height; ++y)
         for (std::size_t x = 0; x < width; ++x) {
             const auto ray = distortion.ray({static_cast<double>(x), static_cast<double>(y)});
@@ -47,7 +47,7 @@ LensWarp::LensWarp(const arhost_intrinsics &lens) : pinhole_(lens) {
 ImageView LensWarp::warp(const ImageView &image, const Region &region) {
     const std::size_t width = pinhole_.width, height = pinhole_.height;
     std::memset(warped_.data(), 0, warped_.size());
-    // The region comes from an untrusted worker: clip it to the image.
+    // The region comes from an untrusted worker, so it is clipped to the image.
     const auto right = static_cast<float>(std::min<std::uint64_t>(std::uint64_t{region.x} + region.width, width));
     const auto bottom = static_cast<float>(std::min<std::uint64_t>(std::uint64_t{region.y} + region.height, height));
     const auto left = static_cast<float>(region.x), top = static_cast<float>(region.y);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// For ray tracers without lens distortion: they render a pinhole image with a slightly larger field of view, which is
-// warped to the real lens before compositing.
+// Supports ray tracers that cannot render lens distortion: such a ray tracer renders a pinhole image with a slightly
+// larger field of view, and the host warps this image to the real lens before compositing.
 #pragma once
 
 #include "compositor/compositor.hpp"
@@ -16,8 +16,8 @@ class LensWarp {
 public:
     explicit LensWarp(const arhost_intrinsics &lens);
 
-    // Intrinsics to render with: same image size, no distortion, field of view large enough for all that the lens
-    // sees within 76° of its axis.
+    // Returns the intrinsics of the pinhole image: same image size, no distortion, and a field of view that contains
+    // everything that the lens sees within 76° of its optical axis.
     const arhost_intrinsics &pinhole() const { return pinhole_; }
 
     // Warps the pinhole image to the lens, bilinearly with premultiplied alpha; alpha is 0 where the pinhole image
@@ -25,11 +25,11 @@ public:
     ImageView warp(const ImageView &image, const Region &region);
 
 private:
-    struct Point { // px in the pinhole image; outside of it if there is no data
+    struct Point { // px in the pinhole image; a position outside the image means that there is no data
         float x, y;
     };
     arhost_intrinsics pinhole_;
-    std::vector<Point> sources_; // per pixel of the lens image
+    std::vector<Point> sources_; // for each pixel of the lens image, the corresponding point of the pinhole image
     std::vector<std::uint8_t> warped_;
 };
 

@@ -85,10 +85,10 @@ std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsi
     return {};
 }
 
-// Bounding rectangle of a projected box, in px.
 struct Rectangle {
     glm::dvec2 min{1e30}, max{-1e30};
 };
+// Returns the bounds of the box in a pinhole camera's image; nullopt if a corner is not in front of the camera.
 std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera &camera) {
     Rectangle bounds;
     for (int corner = 0; corner < 8; ++corner) {

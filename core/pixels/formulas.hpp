@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Integer pixel arithmetic; the SIMD kernels of rows.cpp give the same bytes.
+// Integer pixel arithmetic. The SIMD kernels in rows.cpp must produce the same bytes.
 #pragma once
 
 #include <arhost/frame.h>
@@ -14,19 +14,20 @@ struct Bgr {
     std::uint8_t b, g, r;
 };
 
-// B over A (equation 3.6). 255 is odd, so there are no rounding ties.
+// Blends B over A (equation 3.6 of the dissertation). Rounding has no ties, because 255 is odd.
 constexpr std::uint8_t blended(int a, int b, int alpha) {
     return static_cast<std::uint8_t>((a * (255 - alpha) + b * alpha + 127) / 255);
 }
 
-// Y'CbCr to R'G'B'. The factors b are for (a·b + 2^14) >> 15, with a = y·2^7 for luma and a = u·2^8 or v·2^8 for
-// chroma, so that products are in units of 1/64 and fit 16 bits.
+// Factors for converting Y'CbCr to R'G'B'. A factor b is used as (a·b + 2^14) >> 15, where a is y·2^7 for luma, and
+// u·2^8 or v·2^8 for chroma. The results are in units of 1/64 and fit in 16 bits.
 struct YuvMatrix {
     std::int16_t y_offset;
     std::int16_t yy, rv, gu, gv, bu;
 };
 
-// `kr`, `kb`: luma weights of red and blue, the only difference between ITU-R BT.601-7 §2.5 and BT.709-6 §3.
+// Computes the factors. `kr` and `kb` are the luma weights of red and blue; ITU-R BT.601-7 §2.5 and BT.709-6 §3
+// differ only in these weights.
 constexpr YuvMatrix yuv_matrix(double kr, double kb, bool limited) {
     const auto rounded = [](double x) { return static_cast<std::int16_t>(x + 0.5); };
     const double kg = 1 - kr - kb;
@@ -53,9 +54,9 @@ constexpr Bgr bgr_from_yuv(const YuvMatrix &m, int y, int u, int v) {
             byte(luma + product(cv, m.rv))};
 }
 
-// 0.299, 0.587 and 0.114 (ITU-R BT.601-7 §2.5.1) in 1/65536; their sum is 1.
+// 0.299, 0.587 and 0.114 (ITU-R BT.601-7 §2.5.1) in units of 1/65536. The sum is 65536.
 constexpr std::uint16_t red_weight = 19595, green_weight = 38470, blue_weight = 7471;
-// Half a code, plus the mean error of the three truncations.
+// Half a grey level, plus the mean error of the three truncations.
 constexpr std::uint16_t grey_rounding = 129;
 
 constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {
@@ -68,7 +69,7 @@ constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {
 constexpr std::uint8_t full_range(int y) {
     return static_cast<std::uint8_t>(((std::clamp(y, 16, 235) - 16) * 255 + 109) / 219);
 }
-// The same as (t·2^8·gain >> 16 + 64) >> 7 for t = 0 to 219.
+// Gain for t = y − 16: ((t·2^8·gain >> 16) + 64) >> 7 equals full_range(y) for t = 0 to 219.
 constexpr std::uint16_t full_range_gain = 38155;
 
 } // namespace arhost

@@ -21,7 +21,7 @@ void fill_grey(const arhost_frame_format &format, const std::uint8_t *const plan
             rows::grey_from_yuyv(from, format.yuv_range != ARHOST_YUV_RANGE_FULL, to, format.width);
             break;
         default:
-            return; // plane 0 serves as the grey plane
+            return; // plane 0 is already the grey plane
         }
     }
 }

@@ -72,8 +72,9 @@ using V8 = hn::Vec<decltype(d8)>;
 using V16 = hn::Vec<decltype(d16)>;
 using VI16 = hn::Vec<decltype(di16)>;
 
-// Calls chunk(in, out) for consecutive runs of as many pixels as a vector has bytes. `pair_bytes[i]`: bytes per two
-// pixels of in[i]. The remainder is processed in stack buffers, so that nothing past the row is accessed.
+// Divides a row into chunks of as many pixels as a vector has bytes, and calls chunk(in, out) for each of them.
+// `pair_bytes[i]` is the number of bytes that in[i] has for two pixels. The last, incomplete chunk is processed in
+// stack buffers, so that no bytes past the end of the row are accessed.
 template <std::size_t streams, std::size_t out_bytes, class Chunk>
 HWY_INLINE void for_each_chunk(std::array<Bytes, streams> in, const std::array<std::size_t, streams> &pair_bytes,
                                std::uint8_t *out, std::size_t count, const Chunk &chunk) {
@@ -96,7 +97,8 @@ HWY_INLINE void for_each_chunk(std::array<Bytes, streams> in, const std::array<s
     std::memcpy(out, rest_out, out_bytes * count);
 }
 
-// Bytes are processed as the low and high halves of 16-bit lanes.
+// low_bytes and high_bytes keep only the low or the high byte of each 16-bit lane. even and odd widen the bytes at
+// even or odd positions to 16 bits.
 HWY_INLINE V16 low_bytes(V16 v) {
     return hn::And(v, hn::Set(d16, 0x00ff));
 }
@@ -110,8 +112,8 @@ HWY_INLINE V16 odd(V8 v) {
     return hn::ShiftRight<8>(hn::BitCast(d16, v));
 }
 
-// round(x / 255) in the high byte, for x = 0 to 255² (J. Blinn, "Three Wrongs Make a Right", IEEE Computer Graphics &
-// Applications 15(6), 1995).
+// Returns round(x / 255) in the high byte of each lane, for x = 0 to 255² (J. Blinn, "Three Wrongs
+// Make a Right", IEEE Computer Graphics & Applications 15(6), 1995).
 HWY_INLINE V16 over_255_times_256(V16 x) {
     const V16 t = hn::Add(x, hn::Set(d16, 128));
     return hn::Add(t, hn::ShiftRight<8>(t));
@@ -135,7 +137,7 @@ private:
 
 HWY_INLINE void blend_chunk(Bytes bgr, Bytes rgba, std::uint8_t *out) {
     const std::size_t lanes = hn::Lanes(d8), quarter = hn::Lanes(d32);
-    // Fast paths: most of an overlay is empty, and most of the rest opaque.
+    // Fast paths, because most pixels of an overlay are transparent and most of the others are opaque.
     const auto *pixels = reinterpret_cast<const std::uint32_t *>(rgba);
     const auto p0 = hn::LoadU(d32, pixels), p1 = hn::LoadU(d32, pixels + quarter);
     const auto p2 = hn::LoadU(d32, pixels + 2 * quarter), p3 = hn::LoadU(d32, pixels + 3 * quarter);
@@ -179,8 +181,8 @@ void bgr_from_rgb(Bytes rgb, std::uint8_t *bgr, std::size_t count) {
     });
 }
 
-// Two neighbouring pixels share a chroma sample, so even and odd pixels are in separate vectors. Saturating addition
-// is safe: such sums are clamped to 255 anyway.
+// Two adjacent pixels share a chroma sample, so the even and the odd pixels are processed in separate vectors.
+// Saturating addition gives the same result as exact addition, because the sums are clamped to 255 afterwards.
 class YuvConverter {
 public:
     HWY_INLINE explicit YuvConverter(const YuvMatrix &matrix) : m_(matrix) {}
@@ -241,7 +243,7 @@ void bgr_from_i420(Bytes y, Bytes u, Bytes v, const YuvMatrix &matrix, std::uint
     });
 }
 
-// Inputs are in the high bytes of the lanes, as MulHigh drops the low half of products.
+// The inputs must be in the high bytes of the lanes, because MulHigh returns only the upper half of each product.
 HWY_INLINE V16 weighted(V16 r, V16 g, V16 b) {
     const V16 sum =
         hn::Add(hn::MulHigh(r, hn::Set(d16, red_weight)),
@@ -274,7 +276,7 @@ void grey_from_rgb(Bytes rgb, std::uint8_t *grey, std::size_t count) {
 
 HWY_INLINE V16 expanded(V16 y) {
     const V16 above = hn::Min(hn::SaturatedSub(y, hn::Set(d16, 16)), hn::Set(d16, 219));
-    const V16 scaled = hn::MulHigh(hn::ShiftLeft<8>(above), hn::Set(d16, full_range_gain)); // in 1/128
+    const V16 scaled = hn::MulHigh(hn::ShiftLeft<8>(above), hn::Set(d16, full_range_gain)); // in units of 1/128
     return hn::ShiftRight<7>(hn::Add(scaled, hn::Set(d16, 64)));
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// SIMD kernels for `count` pixels of a row, using the best available instruction set, with the results of
-// formulas.hpp. They access no bytes outside those pixels and need no alignment.
+// SIMD kernels that process `count` pixels of a row and produce the same results as formulas.hpp. They use the best
+// instruction set that the machine has, do not access bytes outside these pixels, and need no alignment.
 #pragma once
 
 #include "pixels/formulas.hpp"
@@ -11,10 +11,10 @@
 
 namespace arhost::rows {
 
-// out = B over A. `bgr` may be `out`.
+// Blends `rgba` over `bgr` and writes the result to `out`, which may be the same buffer as `bgr`.
 void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count);
 
-// To BGR. For YUV, `count` must be even; chroma is replicated.
+// Convert to BGR. For YUV formats, `count` must be even, and chroma is replicated.
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count);
 void bgr_from_rgb(const std::uint8_t *rgb, std::uint8_t *bgr, std::size_t count);
 void bgr_from_yuyv(const std::uint8_t *yuyv, const YuvMatrix &matrix, std::uint8_t *bgr, std::size_t count);
@@ -23,7 +23,7 @@ void bgr_from_nv12(const std::uint8_t *y, const std::uint8_t *uv, const YuvMatri
 void bgr_from_i420(const std::uint8_t *y, const std::uint8_t *u, const std::uint8_t *v, const YuvMatrix &matrix,
                    std::uint8_t *bgr, std::size_t count);
 
-// To grey, full range.
+// Convert to full-range grey.
 void grey_from_bgr(const std::uint8_t *bgr, std::uint8_t *grey, std::size_t count);
 void grey_from_rgb(const std::uint8_t *rgb, std::uint8_t *grey, std::size_t count);
 void grey_from_yuyv(const std::uint8_t *yuyv, bool limited, std::uint8_t *grey, std::size_t count);

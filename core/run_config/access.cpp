@@ -11,8 +11,9 @@ namespace {
 namespace fs = std::filesystem;
 using base::real_path;
 
-// Grants the output's folder, as outputs are written to a temporary file there and renamed; for a link, also the
-// folder of its target.
+// Grants write access to the folder of the output file, because an output is written to a temporary file in that
+// folder and then renamed. If the output file is a symbolic link, also grants access to the folder of the link's
+// target.
 void allow_write(sandbox::Policy &policy, const fs::path &file) {
     policy.writable.push_back(file.parent_path());
     if (const fs::path folder = real_path(file).parent_path(); folder != policy.writable.back())
@@ -43,7 +44,8 @@ void add_environment(sandbox::Policy &policy, const yaml::Node &variables) {
     for (const yaml::Node &variable : variables.items()) {
         const std::string name = variable.text();
         if (!sandbox::is_variable_name(name))
-            variable.fail("must be a variable's name only; its value is taken from arhost's environment");
+            variable.fail("must be the name of a variable, without '=' and value; the value is taken from arhost's "
+                          "environment");
         policy.environment.insert(name);
     }
 }
@@ -82,8 +84,9 @@ std::string warning_of_output(const yaml::Node &path, const std::string &plugin)
     const char *home = std::getenv("HOME");
     for (const fs::path &wide : {real_path(home ? home : "/"), real_path(".")})
         if (sandbox::contains(folder, wide))
-            return path.where() + ": " + path.path() + ": '" + plugin + "' can write all of '" + folder.string() +
-                   "' and below; give it its own folder, as in 'path: output/" + file.filename().string() + "'";
+            return path.where() + ": " + path.path() + ": '" + plugin + "' may write to everything in and below '" +
+                   folder.string() + "'; give this output its own folder, as in 'path: output/" +
+                   file.filename().string() + "'";
     return "";
 }
 

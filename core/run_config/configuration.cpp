@@ -14,7 +14,7 @@
 namespace arhost::run_config {
 namespace {
 
-// The default of an integer key.
+// Returns the default value of an integer key.
 std::int64_t default_of(std::string_view path) {
     const std::string_view text = key_at(path).default_value;
     std::int64_t value = 0;
@@ -46,7 +46,7 @@ base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     return limits;
 }
 
-// Settings that all components share.
+// Settings that apply to all components.
 struct Shared {
     PluginPath plugin_path;
     base::RestartLimits restart;
@@ -55,8 +55,9 @@ struct Shared {
 
 ComponentConfiguration parse_component(const yaml::Node &node, const std::string &schema_path, const Shared &shared) {
     if (const auto conform = node.find("conform"); conform && schema_path == "outputs[]")
-        conform->fail("an output returns nothing that could be checked at run time; check its plugin with "
-                      "'arhost conform PLUGIN.so' (docs/conformance.md)");
+        conform->fail(
+            "is not available for outputs, as they return no results to check at run time; check the plugin with "
+            "'arhost conform PLUGIN.so' (docs/conformance.md)");
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
         node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {},
@@ -79,7 +80,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     if (component.policy.memory_bytes && component.policy.allows("gpu"))
         node.require("memory_mb")
-            .fail("cannot be enforced with 'allow: [gpu]', as GPU drivers map large regions; remove one of the two");
+            .fail("cannot be enforced together with 'allow: [gpu]', as GPU drivers map large regions; remove one of "
+                  "the two");
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
     return component;
@@ -120,7 +122,7 @@ FilesInUse files_read_by(const Configuration &configuration) {
     if (configuration.source) {
         read_all_of(*configuration.source);
         if (const auto path = path_of(configuration.source->node))
-            files.read_numbered(path->input_path()); // a pattern: its files, besides the readable folder
+            files.read_numbered(path->input_path()); // for a printf pattern, also registers the matching files
     }
     if (configuration.tracker)
         read_all_of(*configuration.tracker);
@@ -171,15 +173,16 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         if (const auto fps = node->find("fps")) {
             configuration.source->fps = fps->real(0, 10'000);
             if (configuration.source->fps > 0 &&
-                configuration.source->fps < 1e-6) // the period in ns must fit in 64 bits
-                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, is " + fps->text());
+                configuration.source->fps < 1e-6) // the duration of a frame in ns must fit in 64 bits
+                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, but is " + fps->text());
         }
     }
     if (const auto mode = root.find("mode"))
         configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
     if (configuration.mode == Mode::live && !configuration.source)
-        root.require("mode").fail("live needs a 'source' that sets the pace; without one, a trajectory is traced "
-                                  "in lockstep");
+        root.require("mode").fail(
+            "mode live needs a 'source', which sets the frame rate; without a source, a trajectory "
+            "can only be rendered in mode lockstep");
     configuration.frames =
         static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
     if (const auto node = root.find("camera")) {
@@ -198,7 +201,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("tracker")) {
         configuration.tracker = parse_tracker(*node, shared);
         if (!configuration.source)
-            node->fail("a tracker needs a 'source' of frames");
+            node->fail("a tracker needs a 'source' that delivers frames");
     }
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
@@ -222,7 +225,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             configuration.files.write(*path);
             const std::filesystem::path &plugin = output.plugins.front();
             if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
-                continue; // built-in plugins are trusted here
+                continue; // no warning for built-in plugins, which are trusted
             if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
                 configuration.warnings.push_back(warning);
         }
@@ -234,18 +237,19 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
         if (const auto node = root.find(key)) {
-            *file = base::real_path(node->text()); // a link stays; its target is replaced
+            *file = base::real_path(node->text()); // if it is a symbolic link, the link's target is replaced
             std::error_code error;
             const auto type = std::filesystem::status(**file, error).type();
             using enum std::filesystem::file_type;
             if (type != regular && type != not_found && type != character)
                 node->fail("'" + node->text() +
-                           "' is not a regular file, or cannot be accessed; choose another path");
-            if (type != character) // /dev/null may be used for both
+                           (error ? "' cannot be accessed: " + error.message() : "' is not a regular file") +
+                           "; choose another path");
+            if (type != character) // character devices such as /dev/null may be used several times
                 configuration.files.write(*node);
         }
     if (!configuration.source && !configuration.raytracer)
-        trajectory_node->fail("a trajectory needs a 'source' of frames or a 'raytracer' to trace it");
+        trajectory_node->fail("a trajectory needs a 'source' that delivers frames or a 'raytracer' that renders it");
     return configuration;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Configuration files: parsing, and all checks that need no plugin (docs/config.md).
+// Parses configuration files (docs/config.md) and does all checks for which no plugin must be loaded.
 #pragma once
 
 #include "base/limits.hpp"
@@ -24,9 +24,9 @@ namespace arhost::run_config {
 
 enum class Mode { lockstep, live };
 
-// Settings that every component has.
+// Settings that all kinds of components have in common.
 struct ComponentConfiguration {
-    yaml::Node node;                            // its YAML map, for error messages
+    yaml::Node node;                            // the component's YAML map, for error messages
     std::vector<std::filesystem::path> plugins; // shared objects: the plugin, then its fallback
     std::optional<yaml::Node> path, options;
     base::Limits limits;
@@ -52,9 +52,9 @@ struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
     sandbox::Mode sandbox = sandbox::Mode::permissive;
-    std::uint64_t frames = 0;                       // 0: all
-    std::optional<SourceConfiguration> source{};    // none: black frames, with a trajectory
-    std::optional<camera::Trajectory> trajectory{}; // poses that replace the tracker's
+    std::uint64_t frames = 0;                       // maximum number of frames; 0: no limit
+    std::optional<SourceConfiguration> source{};    // nullopt only with a trajectory; the frames are then black
+    std::optional<camera::Trajectory> trajectory{}; // camera poses to use instead of the tracker's
     std::optional<arhost_intrinsics> camera{};      // always set with a trajectory
     std::optional<yaml::Node> camera_node{};
     std::optional<TrackerConfiguration> tracker{};
@@ -64,16 +64,17 @@ struct Configuration {
     std::chrono::milliseconds max_latency{500};
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
-    FilesInUse files{};                                       // excluding those that the scene refers to
+    FilesInUse files{};                                       // without the files to which the scene refers
 };
 
-// The options to create a component's plugin with. `candidate`: 0 is the plugin, 1 its fallback, which gets its own
-// defaults. Throws yaml::Error if the plugin has the wrong kind, needs a permission that is not allowed, or does not
-// accept the options.
+// Returns the option values for creating a component's plugin. `candidate` is 0 for the plugin itself and 1 for the
+// fallback, for which the configured options are ignored and all options have their defaults. Throws yaml::Error if
+// the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options.
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
                                           const ComponentConfiguration &component, std::size_t candidate);
 
-// Throws yaml::Error at the first error. `built_in_plugins`: folder of the built-in plugins.
+// Parses and checks a configuration. Throws yaml::Error at the first error. `built_in_plugins` is the folder of the
+// built-in plugins.
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins);
 
 } // namespace arhost::run_config

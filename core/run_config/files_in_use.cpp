@@ -16,14 +16,15 @@ bool are_digits(std::string_view text) {
     return text.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-// nullopt if no sink accepts `name` as a numbered name.
+// Parses a file name with a printf pattern; returns nullopt if sinks would not accept `name` as a pattern.
 std::optional<NumberedName> numbered_name(const std::string &name) try {
     return NumberedName(name);
 } catch (const std::invalid_argument &) {
     return std::nullopt;
 }
 
-// Whether two names can refer to one file. Two numbered names can if they differ by digits alone (f0%d, f%d).
+// Returns whether two file names or patterns can produce the same name. Two patterns can if they differ only in
+// digits, as f0%d and f%d do.
 bool can_collide(const std::string &a, const std::string &b) {
     const auto p = numbered_name(a), q = numbered_name(b);
     if (!p || !q)
@@ -39,7 +40,7 @@ bool can_collide(const std::string &a, const std::string &b) {
 std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
     if (const auto pattern = numbered_name(file_or_pattern.filename())) {
-        std::error_code ignored; // an unreadable folder is reported by its user
+        std::error_code ignored; // the component that uses an unreadable folder reports it
         for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
              entry.increment(ignored))
             if (pattern->number(entry->path().filename().string()))
@@ -48,7 +49,7 @@ std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
     return files;
 }
 
-// Name or pattern, with links resolved.
+// Returns the file name or pattern that the output writes, with symbolic links resolved.
 fs::path written_by(const yaml::Node &output) {
     const fs::path path = output.output_path();
     return numbered_name(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
@@ -80,7 +81,7 @@ void FilesInUse::write(const yaml::Node &output) {
     const std::vector<FileIdentity> files = files_of(output.output_path());
     for (const FileIdentity &file : files)
         if (const Use *use = find(file); use && use->output)
-            output.fail("another output writes '" + output.text() + "' already; choose another path");
+            output.fail("another output already writes '" + output.text() + "'; choose another path");
         else if (use)
             refuse(output, use->path);
     const fs::path path = written_by(output);

@@ -12,30 +12,31 @@
 
 namespace arhost::run_config {
 
-// Ensures that an output overwrites no file that the run reads or that another output writes, also via symbolic or
-// hard links. A printf pattern (frame-%04d.png) stands for each matching file that exists. All functions throw
-// yaml::Error about the output.
+// Ensures that no output overwrites a file that the run reads or that another output writes. Detects symbolic and
+// hard links to the same file. A printf pattern (frame-%04d.png) represents all existing files that match it. All
+// functions throw yaml::Error, whose position is that of the output.
 class FilesInUse {
 public:
-    // Absolute path of a file or folder.
+    // Registers a file or folder that the run reads. `file` must be an absolute path.
     void read(const std::filesystem::path &file);
     void read_numbered(const std::filesystem::path &file_or_pattern);
-    // `output`: file or pattern.
+    // Registers an output; its value is a file name or a pattern.
     void write(const yaml::Node &output);
 
-    // For a file that a worker reports, after all calls of write(). Compares only, as the worker is not trusted.
+    // Checks a file that a worker has reported as read. To be called after all calls of write(). Only compares names
+    // and inode numbers and does not access the file, because the worker is not trusted.
     void check_read(const base::FileIdentity &file) const;
 
 private:
     struct Use {
         std::string path;
-        std::optional<yaml::Node> output; // the writer; nothing: the file is read
+        std::optional<yaml::Node> output; // the output that writes the file; nullopt if the run reads the file
     };
     const Use *find(const base::FileIdentity &file) const;
     void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output);
 
     std::vector<yaml::Node> outputs_;
-    std::map<std::string, Use> uses_; // keys: real path, and device:inode
+    std::map<std::string, Use> uses_; // each file has two keys: its real path and its "device:inode"
 };
 
 } // namespace arhost::run_config

@@ -39,7 +39,7 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
     return value;
 }
 
-// An invalid default is reported as the plugin's error.
+// Parses a default value. The message about an invalid default names the plugin, not the configuration.
 ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, 0, 0.0, ""};
@@ -59,14 +59,14 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
     if (options)
         options->allow_keys(keys);
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
-        path->fail(plugin.id + " takes no path");
+        path->fail(plugin.id + " has no option 'path'; remove this key");
 
     std::vector<ipc::OptionValue> values;
     for (const ipc::OptionDeclaration &declared : plugin.options) {
         std::optional<yaml::Node> value = options ? options->find(declared.key) : std::nullopt;
         if (declared.key == "path" && path) {
             if (value)
-                value->fail("the path is already given next to 'plugin'; keep one of them");
+                value->fail("the path is also given by the key 'path' next to 'plugin'; remove one of them");
             value = path;
         }
         if (value)

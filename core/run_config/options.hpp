@@ -11,9 +11,10 @@
 
 namespace arhost::run_config {
 
-// A value for every declared option, in the descriptor's order. `options`: the YAML map, if any. `path`: the
-// component's `path:` key, a shorthand for the option of that name. Throws yaml::Error for unknown keys, wrong types,
-// values out of range, and missing required options; the latter error names `owner`.
+// Returns a value for every option that the plugin declares, in the order of the descriptor. `options` is the YAML
+// map of the configured options, if any. `path` is the component's key `path:`, which sets the option of the same
+// name. Throws yaml::Error for unknown keys, wrong types, values out of range, and missing required options. The
+// position of the last of these errors is that of `owner`.
 std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
                                               const std::optional<yaml::Node> &options,
                                               const std::optional<yaml::Node> &path, const yaml::Node &owner);

@@ -16,11 +16,11 @@ public:
     // Search order: `extra`, the colon-separated environment variable ARHOST_PLUGIN_PATH, `built_in`.
     PluginPath(std::vector<std::filesystem::path> extra, std::filesystem::path built_in);
 
-    // The shared object for a plugin name, or for a path (with a "/" or ending in ".so") relative to the
-    // configuration file. Throws yaml::Error if it does not exist.
+    // Returns the shared object for the value of `node`: a plugin name, or a path (contains "/" or ends in ".so")
+    // that is relative to the configuration file. Throws yaml::Error if the file does not exist.
     std::filesystem::path resolve(const yaml::Node &node) const;
 
-    // All plugin files; for duplicate names, the first in search order.
+    // Returns all plugin files. Of files with the same name, only the first in search order is included.
     std::vector<std::filesystem::path> all() const;
 
 private:

@@ -17,7 +17,8 @@ void add(std::vector<Key> &keys, const std::string &prefix, const std::vector<Ke
     }
 }
 
-// Adds a component: its `own` keys and those that every component has. `example`: a plugin of its kind.
+// Adds the keys of a component: its `own` keys and the keys that every component has. `example` is the name of a
+// plugin of this kind.
 void add_component(std::vector<Key> &keys, const Key &component, const std::string &example,
                    const std::vector<Key> &own) {
     const std::string prefix = component.path + (component.type == list ? "[]." : ".");
@@ -28,11 +29,12 @@ void add_component(std::vector<Key> &keys, const Key &component, const std::stri
         {{"options", free_map, false, "", "The plugin's own options; `arhost plugins --options` lists them."},
          {"allow", list, false, "nothing",
           "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
-         {"reads", list, false, "", "Additional files and folders that it may read."},
-         {"writes", list, false, "", "Additional folders that it may write to."},
-         {"environment", list, false, "", "Additional environment variables that it receives (docs/security.md)."},
+         {"reads", list, false, "", "Additional files and folders that the plugin may read."},
+         {"writes", list, false, "", "Additional folders that the plugin may write to."},
+         {"environment", list, false, "",
+          "Additional environment variables that the plugin receives (docs/security.md)."},
          {"memory_mb", integer, false, "0",
-          "Limit of its private memory, in MiB; 0: three quarters of the machine's memory."},
+          "Limit of the plugin's private memory, in MiB; 0: three quarters of the machine's memory."},
          {"deadline_ms", integer, false, "5000", "Timeout for one frame, in ms."},
          {"start_deadline_ms", integer, false, "10000", "Timeout without progress during start, in ms."},
          {"stop_deadline_ms", integer, false, "30000", "Timeout without progress during shutdown, in ms."}});
@@ -40,8 +42,8 @@ void add_component(std::vector<Key> &keys, const Key &component, const std::stri
 
 std::vector<Key> make_table() {
     const Key conform = {"conform", boolean, false, "false",
-                         "Check each result and report contract violations (docs/conformance.md)."};
-    const Key fallback = {"fallback", text, false, "", "Plugin that takes over after this one is given up."};
+                         "Check the plugin's results and report contract violations (docs/conformance.md)."};
+    const Key fallback = {"fallback", text, false, "", "Plugin to use after this one has failed too often."};
     std::vector<Key> keys = {
         {"version", integer, true, "", "Version of this format: 1."},
         {"mode",
@@ -54,30 +56,33 @@ std::vector<Key> make_table() {
          text,
          false,
          "permissive",
-         "`permissive`: every layer that the machine supports. `strict`: all layers, or no run. `none`: for "
-         "debuggers.",
+         "`permissive`: every layer that the machine supports. `strict`: all layers; the run fails if one is "
+         "missing. `none`: no sandbox, for debuggers.",
          {"permissive", "strict", "none"}},
-        {"frames", integer, false, "0", "Stop after this many frames; 0: at the end of the source."},
-        {"plugin_path", list, false, "", "Folders to search for plugins before the built-in one."},
+        {"frames", integer, false, "0", "Stop after this many frames; 0: stop at the end of the source."},
+        {"plugin_path", list, false, "", "Folders to search for plugins before the folder of built-in plugins."},
     };
     add_component(keys,
-                  {"source", map, false, "", "Where frames come from. Optional with a `trajectory`: black frames."},
+                  {"source", map, false, "",
+                   "Where frames come from. Optional if there is a `trajectory`; the frames are then black."},
                   "source_synthetic",
                   {{"path", input_path, false, "", "Input file or printf pattern, for plugins that read files."},
                    {"fps", real, false, "0", "Frames per second; 0: the source's own rate."},
                    conform});
     add(keys, "",
         {{"trajectory", input_path, false, "",
-          "File with camera poses to use instead of the tracker's (docs/trajectories.md)."},
+          "File with camera poses, which are used instead of those of the tracker (docs/trajectories.md)."},
          {"camera", map, false, "from the trajectory or the source", "Camera intrinsics (docs/camera.md)."},
          {"camera.file", input_path, false, "", "Calibration file in OpenCV's YAML format."},
          {"camera.width", integer, false, "", "Image width that the intrinsics refer to, in px."},
-         {"camera.height", integer, false, "", "Image height, in px."},
+         {"camera.height", integer, false, "", "Image height that the intrinsics refer to, in px."},
          {"camera.fx", real, false, "", "Horizontal focal length, in px."},
          {"camera.fy", real, false, "fx", "Vertical focal length, in px."},
-         {"camera.vertical_fov_degrees", real, false, "", "Replaces fx and fy for an uncalibrated camera."},
-         {"camera.cx", real, false, "(width − 1) / 2", "Principal point, in px; pixel centres are at integers."},
-         {"camera.cy", real, false, "(height − 1) / 2", "Principal point, in px."},
+         {"camera.vertical_fov_degrees", real, false, "",
+          "Vertical field of view, in degrees; replaces fx and fy if the camera is not calibrated."},
+         {"camera.cx", real, false, "(width − 1) / 2",
+          "Horizontal position of the principal point, in px; pixel centres are at integers."},
+         {"camera.cy", real, false, "(height − 1) / 2", "Vertical position of the principal point, in px."},
          {"camera.distortion", map, false, "none", "Lens distortion."},
          {"camera.distortion.model",
           text,
@@ -86,7 +91,7 @@ std::vector<Key> make_table() {
           "`none`, `brown` (OpenCV's calib3d) or `fisheye` (OpenCV's fisheye).",
           {"none", "brown", "fisheye"}},
          {"camera.distortion.coefficients", reals, false, "",
-          "In OpenCV's order: k1 k2 p1 p2 k3 …; fisheye: k1 k2 k3 k4."}});
+          "Coefficients in OpenCV's order: k1 k2 p1 p2 k3 …; for `fisheye`: k1 k2 k3 k4."}});
     add_component(
         keys, {"tracker", map, false, "no tracking", "Finds the markers."}, "tracker_aruco",
         {{"markers", list, true, "", "The markers; the first visible one anchors the scene."},
@@ -134,7 +139,7 @@ const std::vector<Key> &table() {
     return keys;
 }
 
-// "a.b[].c" → "a.b[]", "c".
+// Splits "a.b[].c" into "a.b[]" and "c".
 std::pair<std::string_view, std::string_view> split(std::string_view path) {
     const std::size_t dot = path.rfind('.');
     if (dot == std::string_view::npos)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The table of all configuration keys: source of the parser's allowed keys, of the table in docs/config.md, and of
-// the JSON Schema for editors.
+// The table of all configuration keys. The parser's lists of allowed keys, the table in docs/config.md and the JSON
+// Schema for editors are generated from it.
 #pragma once
 
 #include <span>
@@ -16,19 +16,19 @@ enum class Type { map, list, text, input_path, output_path, integer, real, boole
 struct Key {
     std::string path; // "tracker.markers[].id": "[]" stands for each element of a list
     Type type;
-    bool required;                  // if its parent map is present
-    std::string_view default_value; // "": none
-    std::string meaning;            // one sentence, with the unit
+    bool required;                  // whether the key is required if its parent map is present
+    std::string_view default_value; // "" if there is no default
+    std::string meaning;            // description in one sentence, including the unit
     std::vector<std::string_view> choices{};
 };
 
 std::span<const Key> schema();
 
-// The keys of the map at `path`; "" is the root, "outputs[]" one output.
+// Returns the keys of the map at `path`. "" is the root; "outputs[]" is any element of the list "outputs".
 std::vector<std::string_view> keys_of(std::string_view path);
 const Key &key_at(std::string_view path);
 
-std::string schema_as_markdown();    // the table of docs/config.md
-std::string schema_as_json_schema(); // docs/arhost.schema.json
+std::string schema_as_markdown();    // the table in docs/config.md
+std::string schema_as_json_schema(); // the contents of docs/arhost.schema.json
 
 } // namespace arhost::run_config

@@ -45,7 +45,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-// "outputs[0].path" → "outputs", "0", "path"
+// Splits "outputs[0].path" into "outputs", "0" and "path".
 std::vector<std::string> split_path(const std::string &path) {
     std::vector<std::string> parts(1);
     for (const char c : path) {
@@ -57,7 +57,7 @@ std::vector<std::string> split_path(const std::string &path) {
     return parts;
 }
 
-// Quotes a value for messages.
+// Returns a value in quotation marks, for messages.
 std::string in_quotes(const std::string &text) {
     return "'" + base::printable(text, 200) + "'";
 }
@@ -68,7 +68,7 @@ std::string position_in(const std::string &name, const YAML::Mark &mark) {
 
 std::filesystem::path without_dots(const std::filesystem::path &path) {
     std::filesystem::path result;
-    std::error_code error; // a missing file is not a link
+    std::error_code error; // a missing file is treated as a file that is not a link
     for (const std::filesystem::path &part : std::filesystem::absolute(path)) {
         if (part == ".." && std::filesystem::is_symlink(result, error))
             if (const auto target = std::filesystem::weakly_canonical(result, error); !error)
@@ -86,11 +86,11 @@ YAML::Mark mark_of(const std::string &text, std::size_t position) {
     mark.pos = static_cast<int>(position);
     mark.line = static_cast<int>(std::count(text.begin(), text.begin() + mark.pos, '\n'));
     const std::size_t line = position == 0 ? std::string::npos : text.rfind('\n', position - 1);
-    mark.column = static_cast<int>(position - (line + 1)); // line + 1 is 0 in the first
+    mark.column = static_cast<int>(position - (line + 1)); // in the first line, `line` is npos, so line + 1 is 0
     return mark;
 }
 
-// Collects the document starts, and detects an unterminated quoted value.
+// Collects the positions at which documents start, and detects an unterminated quoted value.
 class Marks : public YAML::EventHandler {
 public:
     std::vector<YAML::Mark> documents;
@@ -102,7 +102,8 @@ public:
     void OnAlias(const YAML::Mark &, YAML::anchor_t) override {}
     void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t, const std::string &) override {
         std::size_t i = static_cast<std::size_t>(std::max(mark.pos, 0));
-        while (i < text_.size() && (text_[i] == '&' || text_[i] == '!')) // node properties precede the value
+        while (i < text_.size() &&
+               (text_[i] == '&' || text_[i] == '!')) // skips anchors and tags, which precede the value
             i = skip_blanks(text_[i] == '!' && is_quote(i + 1) ? i + 1 : text_.find_first_of(" \t\r\n,[]{}", i));
         if (is_quote(i))
             last_quote_ = i;
@@ -113,14 +114,15 @@ public:
     void OnMapStart(const YAML::Mark &, const std::string &, YAML::anchor_t, YAML::EmitterStyle::value) override {}
     void OnMapEnd() override {}
 
-    // yaml-cpp accepts the end of the text as the end of a quoted value.
+    // Returns the start of an unterminated quoted value. yaml-cpp does not report it: it accepts the end of the text
+    // as the end of the value.
     std::optional<YAML::Mark> unterminated_quote() const {
         if (!last_quote_)
             return std::nullopt;
         const char quote = text_[*last_quote_];
         for (std::size_t i = *last_quote_ + 1; i < text_.size(); ++i)
             if ((quote == '"' && text_[i] == '\\') || (quote == '\'' && text_.compare(i, 2, "''") == 0))
-                ++i; // escaped
+                ++i; // skips the escaped character
             else if (text_[i] == quote)
                 return std::nullopt;
         return mark_of(text_, *last_quote_);
@@ -128,7 +130,7 @@ public:
 
 private:
     bool is_quote(std::size_t i) const { return i < text_.size() && (text_[i] == '"' || text_[i] == '\''); }
-    std::size_t skip_blanks(std::size_t i) const { // and comments
+    std::size_t skip_blanks(std::size_t i) const { // also skips comments
         while ((i = text_.find_first_not_of(" \t\r\n", i)) < text_.size() && text_[i] == '#')
             i = text_.find('\n', i);
         return i;
@@ -138,7 +140,7 @@ private:
     std::optional<std::size_t> last_quote_;
 };
 
-// Throws YAML::ParserException, also for errors that yaml-cpp accepts.
+// Parses the text. Throws YAML::ParserException, also for errors that yaml-cpp does not report.
 YAML::Node read(std::string text) {
     while (text.starts_with("\xef\xbb\xbf")) // the byte order mark, which YAML::Mark does not count
         text.erase(0, 3);
@@ -162,18 +164,19 @@ YAML::Node read(std::string text) {
             throw YAML::ParserException(*quote, "this quoted value is not terminated");
     };
     try {
-        // Not YAML::LoadAll: for "[1], 2" it produces documents forever, since the comma starts one and is never
-        // consumed.
+        // Does not use YAML::LoadAll, because it does not return for "[1], 2": the comma starts a new document but is
+        // never consumed, so LoadAll produces documents without end.
         while (marks.documents.size() < 2 && parser.HandleNextDocument(marks)) {
         }
     } catch (const YAML::Exception &) {
-        expect_quotes_terminated(); // a better error than the one at the end of the text
+        expect_quotes_terminated(); // reports the start of the value instead of the end of the text
         throw;
     }
     expect_quotes_terminated();
     if (marks.documents.size() > 1)
-        throw YAML::ParserException(marks.documents[1],
-                                    "a second document starts here; keep one (remove the '---' or this content)");
+        throw YAML::ParserException(
+            marks.documents[1],
+            "a second document starts here; the file must contain only one (remove the '---' or this content)");
     return YAML::Load(text);
 }
 
@@ -196,7 +199,8 @@ Node Node::load(const std::filesystem::path &file) {
         throw Error(file.string() + ": is a folder, not a YAML file");
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
         throw Error(file.string() + ": is not a regular file");
-    if (!base::is_utf8(std::filesystem::absolute(file).native())) // paths in it would not be valid either
+    if (!base::is_utf8(
+            std::filesystem::absolute(file).native())) // relative paths in the file would not be valid UTF-8 either
         throw Error(std::filesystem::absolute(file).string() +
                     ": the file's path is not valid UTF-8; rename the file or the folder");
     std::string content;
@@ -241,7 +245,7 @@ void Node::override_text(const std::string &path, const std::string &text, const
 
 void Node::replace(const std::string &path, const YAML::Node &value, const std::string &option) {
     YAML::Node at = node_;
-    std::string canonical; // in the format of Node::path()
+    std::string canonical; // the key path in the format of Node::path()
     const std::vector<std::string> parts = split_path(path);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool last = i + 1 == parts.size();
@@ -254,7 +258,8 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
             std::size_t index = 0;
             const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), index);
             if (error != std::errc() || *end != '\0' || index >= at.size())
-                reject("'" + parts[i] + "' is not an index of a list of " + std::to_string(at.size()));
+                reject("'" + parts[i] + "' is not a valid index; the number of elements in the list is " +
+                       std::to_string(at.size()));
             if (last)
                 at[index] = value;
             else
@@ -265,7 +270,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
             else
                 next.reset(at[parts[i]]);
         } else {
-            reject("the value above '" + parts[i] + "' is a scalar, which cannot have keys");
+            reject("the parent of '" + parts[i] + "' is a scalar, which cannot have keys");
         }
         if (!last)
             at.reset(next);
@@ -274,7 +279,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
 }
 
 std::string Node::option() const {
-    std::string nearest_option; // the longest path comes last
+    std::string nearest_option; // of several matching paths, the longest comes last in the map
     for (const auto &[path, option] : document_->overrides)
         if (path_.starts_with(path) &&
             (path_.size() == path.size() || path_[path.size()] == '.' || path_[path.size()] == '['))
@@ -306,7 +311,7 @@ void Node::allow_keys(std::span<const std::string_view> keys) const {
         if (std::find(keys.begin(), keys.end(), known[0]) == keys.end()) {
             const std::string near = nearest(key, keys);
             value.fail("unknown key; " +
-                       (near.empty() ? "known here: " + listed(keys) : "did you mean '" + near + "'?"));
+                       (near.empty() ? "known keys: " + listed(keys) : "did you mean '" + near + "'?"));
         }
         if (!seen.insert(key).second)
             value.fail("duplicate key; keep one of them");
@@ -328,11 +333,11 @@ Node Node::require(std::string_view key) const {
 
 std::vector<std::pair<std::string, Node>> Node::entries() const {
     if (!node_.IsMap())
-        fail(is_null() ? "is empty, must be a map of keys" : "must be a map of keys");
+        fail(is_null() ? "must be a map of keys, but is empty" : "must be a map of keys");
     std::vector<std::pair<std::string, Node>> found;
     for (const auto &entry : node_) {
         if (!entry.first.IsScalar())
-            fail("a key must be plain text");
+            fail("the keys of a map must be scalars");
         const std::string key = entry.first.Scalar();
         found.emplace_back(key, Node(entry.second, child_path(path_, key), document_));
     }
@@ -350,7 +355,7 @@ std::vector<Node> Node::items() const {
 
 std::string Node::scalar(const char *expected) const {
     if (!node_.IsScalar())
-        fail(std::string("must be ") + expected + (node_.IsNull() ? ", is empty" : ""));
+        fail(std::string("must be ") + expected + (node_.IsNull() ? ", but is empty" : ""));
     return node_.Scalar();
 }
 
@@ -360,7 +365,7 @@ bool Node::boolean() const {
         return true;
     if (text == "false")
         return false;
-    fail("must be true or false, is " + in_quotes(text));
+    fail("must be true or false, but is " + in_quotes(text));
 }
 
 std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
@@ -368,9 +373,9 @@ std::int64_t Node::integer(std::int64_t minimum, std::int64_t maximum) const {
     std::int64_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-        fail("must be a whole number, is " + in_quotes(text));
+        fail("must be a whole number, but is " + in_quotes(text));
     if (value < minimum || value > maximum)
-        fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", is " +
+        fail("must be " + std::to_string(minimum) + " to " + std::to_string(maximum) + ", but is " +
              base::printable(text, 200));
     return value;
 }
@@ -380,12 +385,12 @@ double Node::real(double minimum, double maximum) const {
     std::string digits = text.substr(text.starts_with('+') ? 1 : 0);
     if (const std::size_t dot = digits.find('.');
         dot != std::string::npos && std::isalpha(static_cast<unsigned char>(digits[dot + 1])))
-        digits.erase(dot, 1); // YAML's .inf and .nan
+        digits.erase(dot, 1); // converts YAML's .inf and .nan
     double value = 0;
     const char *end_of_text = digits.data() + digits.size();
     const auto [end, error] = std::from_chars(digits.data(), end_of_text, value);
     if (error == std::errc::invalid_argument || end != end_of_text)
-        fail("must be a number, is " + in_quotes(text));
+        fail("must be a number, but is " + in_quotes(text));
     std::ostringstream range;
     if (std::isfinite(minimum) && std::isfinite(maximum))
         range << minimum << " to " << maximum;
@@ -395,10 +400,10 @@ double Node::real(double minimum, double maximum) const {
         range << "at most " << maximum;
     const bool too_small = error != std::errc() && std::abs(std::strtod(digits.c_str(), nullptr)) < 1;
     if (error != std::errc() || !std::isfinite(value))
-        fail((too_small ? "must not be that close to 0" : "must be a finite number") +
-             (range.str().empty() ? "" : ", " + range.str()) + ", is " + base::printable(text, 200));
+        fail((too_small ? "must not be so close to 0" : "must be a finite number") +
+             (range.str().empty() ? "" : ", " + range.str()) + ", but is " + base::printable(text, 200));
     if (value < minimum || value > maximum)
-        fail("must be " + range.str() + ", is " + base::printable(text, 200));
+        fail("must be " + range.str() + ", but is " + base::printable(text, 200));
     return value;
 }
 
@@ -406,7 +411,7 @@ std::string Node::text() const {
     std::string value = scalar("text");
     if (value.empty())
         fail("must not be empty");
-    if (value.find('\0') != std::string::npos) // the kernel would truncate names there
+    if (value.find('\0') != std::string::npos) // the kernel would truncate a file name at the NUL
         fail("must not contain a NUL character");
     return value;
 }
@@ -431,7 +436,7 @@ std::vector<double> Node::reals() const {
 std::vector<double> Node::reals(std::size_t count) const {
     std::vector<double> values = reals();
     if (values.size() != count)
-        fail("must be a list of " + std::to_string(count) + " numbers, has " + std::to_string(values.size()));
+        fail("must be a list of " + std::to_string(count) + " numbers, but has " + std::to_string(values.size()));
     return values;
 }
 
@@ -445,7 +450,7 @@ std::filesystem::path Node::output_path() const {
 
 std::filesystem::path Node::path_below(const std::filesystem::path &folder) const {
     std::filesystem::path path = without_dots(folder / text());
-    if (!base::is_utf8(path.native())) // plugins get paths as UTF-8
+    if (!base::is_utf8(path.native())) // the plugin interface requires UTF-8 paths
         fail("the path " + in_quotes(path) + " is not valid UTF-8; rename the file or the folder");
     return path;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// YAML with source positions: every error names file, line, column and key, and says how to fix it. Used for
-// configurations, scenes and calibrations.
+// Reads YAML and keeps the source positions: every error message names file, line, column and key, and says how to
+// fix the error. Used for configurations, scenes and calibrations.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -28,7 +28,7 @@ public:
     using std::runtime_error::runtime_error;
 };
 
-// A value in a document. Cheap to copy; keeps its document alive.
+// A value in a document. Is cheap to copy and keeps the document alive.
 class Node {
 public:
     Node(const Node &) = default;
@@ -44,29 +44,31 @@ public:
 
     // Reads a file. Throws Error if it cannot be read or has a syntax error.
     static Node load(const std::filesystem::path &file);
-    // `name` is used as the file name in messages.
+    // Parses `text`. `name` is used as the file name in error messages.
     static Node parse(const std::string &text, const std::string &name);
 
-    // A scalar without a file.
+    // Creates a scalar that is not from a file. `name` is used as the file name in error messages.
     static Node scalar(const std::string &text, const std::string &name);
 
-    // Replaces or adds the value at a key path ("tracker.options.dictionary", "outputs[0].path"), for `--set` and
-    // other options. Errors about it then name the option instead of a line. Call it on the root.
+    // Replaces or adds the value at a key path ("tracker.options.dictionary", "outputs[0].path"). Implements `--set`
+    // and other options. Error messages about this value name the option instead of a line. Must be called on the
+    // root.
     void override_value(const std::string &path, const std::string &value, const std::string &option = "--set");
-    // The same with plain text, which is not parsed as YAML.
+    // Like override_value, but `text` is used as it is and not parsed as YAML.
     void override_text(const std::string &path, const std::string &text, const std::string &option);
 
     bool is_map() const { return node_.IsMap(); }
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
     bool is_null() const { return node_.IsNull(); }
-    bool is_overridden() const { return !option().empty(); } // it or an ancestor
-    const std::string &path() const { return path_; }        // from the root, "" for the root itself
+    bool is_overridden() const { return !option().empty(); } // this node or an ancestor
+    const std::string &path() const { return path_; }        // key path from the root; "" for the root itself
     std::filesystem::path file() const;
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
-    // Maps. `allow_keys` rejects unknown keys (suggesting the nearest one) and duplicates; call it before lookups.
+    // For maps. `allow_keys` rejects duplicate keys and unknown keys (and suggests the most similar known key); it
+    // must be called before the lookups.
     void allow_keys(std::span<const std::string_view> keys) const;
     void allow_keys(std::initializer_list<std::string_view> keys) const {
         allow_keys(std::span(keys.begin(), keys.size()));
@@ -75,16 +77,17 @@ public:
     Node require(std::string_view key) const;
     std::vector<std::pair<std::string, Node>> entries() const; // in file order
 
-    std::vector<Node> items() const; // of a sequence
+    std::vector<Node> items() const; // elements of a sequence
 
-    // Scalars, with an optional inclusive range.
+    // For scalars. The optional range includes both ends.
     bool boolean() const;
     std::int64_t integer(std::int64_t minimum = std::numeric_limits<std::int64_t>::min(),
                          std::int64_t maximum = std::numeric_limits<std::int64_t>::max()) const;
     double real(double minimum = -std::numeric_limits<double>::infinity(),
-                double maximum = std::numeric_limits<double>::infinity()) const; // finite
-    std::string text() const;                                                    // not empty
-    // One of `choices`; the error lists them and suggests the nearest.
+                double maximum = std::numeric_limits<double>::infinity()) const; // a finite number
+    std::string text() const;                                                    // a text that is not empty
+    // Returns the value, which must be one of `choices`. The error message lists the choices and suggests the most
+    // similar one.
     std::string choice(std::span<const std::string_view> choices) const;
     std::string choice(std::initializer_list<std::string_view> choices) const {
         return choice(std::span(choices.begin(), choices.size()));
@@ -92,21 +95,23 @@ public:
     std::vector<double> reals() const;                  // a sequence of finite numbers
     std::vector<double> reals(std::size_t count) const; // exactly `count` numbers
 
-    // Absolute UTF-8 paths without `.` and `..`; `..` after a symbolic link resolves from its target, as in the
-    // kernel.
-    std::filesystem::path input_path() const;  // relative to the document's file (from `--set`: as below)
-    std::filesystem::path output_path() const; // relative to the working directory
+    // Return absolute UTF-8 paths without `.` and `..`. A `..` after a symbolic link refers to the parent of the
+    // link's target, as in the kernel's path resolution.
+    // input_path: relative to the document's folder; if the value was set with `--set`, to the working directory.
+    // output_path: relative to the working directory.
+    std::filesystem::path input_path() const;
+    std::filesystem::path output_path() const;
 
 private:
     struct Document {
         std::string name;
-        std::map<std::string, std::string> overrides; // key path → option that set it
+        std::map<std::string, std::string> overrides; // maps a key path to the option that set it
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}
     std::string scalar(const char *expected) const;
     std::filesystem::path path_below(const std::filesystem::path &folder) const;
-    std::string option() const; // the option that overrides this node, or ""
+    std::string option() const; // the option that overrides this node; "" if there is none
     void replace(const std::string &path, const YAML::Node &value, const std::string &option);
 
     YAML::Node node_;
@@ -114,7 +119,7 @@ private:
     std::shared_ptr<Document> document_;
 };
 
-// The most similar candidate ("dictionary" for "dictionry"), or "" if none is similar.
+// Returns the candidate that is most similar to `word` ("dictionary" for "dictionry"), or "" if none is similar.
 std::string nearest(std::string_view word, std::span<const std::string_view> candidates);
 
 } // namespace arhost::yaml

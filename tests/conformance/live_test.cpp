@@ -113,7 +113,7 @@ void expect_violations(const Parts &parts, const std::set<std::string> &checks) 
         const std::string component = check.substr(0, check.find('.'));
         EXPECT_THAT(run.output(),
                     HasSubstr("warning: " + component + ": violates the contract: " + check + ": frame "));
-        EXPECT_THAT(run.output(), HasSubstr(check + ": violated in "));
+        EXPECT_THAT(run.output(), HasSubstr(check + ": contract violated in "));
     }
 }
 

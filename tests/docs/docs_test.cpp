@@ -41,7 +41,7 @@ TEST(Documentation, ContainsOnlyValidConfigurations) {
         for (const std::string &block : yaml_blocks(read_file(document))) {
             ArhostRun run;
             fs::create_directory_symlink(root / "config", run.path("config"));
-            // In the document's folder, as paths are relative to the file.
+            // The configuration is saved in the document's folder, because its paths are relative to its own folder.
             const std::string file = (fs::relative(document, root).parent_path() / "snippet.yaml").string();
             run.write(file, block);
             EXPECT_EQ(run.run({"check", file}), 0) << document << ":\n" << block << run.output();
@@ -56,7 +56,7 @@ TEST(Documentation, DemonstrationWorksWithTheOtherTracker) {
     EXPECT_EQ(run.run({"check", demo, "--set", "tracker.plugin=tracker_apriltag"}), 0) << run.output();
 }
 
-// Runs every command in docs/trajectories.md in order, on a few frames.
+// Runs all commands in docs/trajectories.md in order, with only a few frames.
 TEST(Documentation, ContainsWorkingRecordAndReplayCommands) {
     const std::string document = read_file(root / "docs/trajectories.md");
     ArhostRun run;
@@ -105,7 +105,7 @@ TEST(Documentation, NamesExistingCommands) {
         EXPECT_EQ(::access((root / command).c_str(), X_OK), 0) << command;
 }
 
-// Without a camera, config/lab.yaml fails with a hint.
+// On a machine without a camera, config/lab.yaml must fail with a message that says how to proceed.
 TEST(Documentation, LabConfigurationReportsAMissingCamera) {
     if (fs::exists("/dev/video0"))
         GTEST_SKIP() << "this machine has a camera";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Loads a plugin into the test process and calls it like arhost-worker, without processes and shared memory. For unit
-// tests of plugins; tests/system tests the whole pipeline.
+// For unit tests of plugins: loads a plugin into the test process and calls it in the same way as arhost-worker does,
+// but without child processes and shared memory. The tests in tests/system test the entire pipeline.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -23,8 +23,8 @@
 
 namespace arhost::test {
 
-// Real photos and meshes, which are not in the repository. A test that needs them begins with
-// ARHOST_REQUIRE_SHARED_DATA("markers/julia").
+// Returns a path in the folder of real photos and meshes, which are not in the repository. A test that needs them
+// must begin with, for example, ARHOST_REQUIRE_SHARED_DATA("markers/julia").
 inline std::filesystem::path shared_data(const std::string &relative) {
     return std::filesystem::path(ARHOST_SHARED_DATA) / relative;
 }
@@ -32,7 +32,7 @@ inline std::filesystem::path shared_data(const std::string &relative) {
     if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
     GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is missing"
 
-// A temporary folder.
+// A temporary folder, which is deleted by the destructor.
 class ScratchFolder {
 public:
     ScratchFolder() {
@@ -97,12 +97,12 @@ public:
                  &on_log,      &on_progress,       &on_cancelled, &on_extension};
     }
     ~PluginUnderTest() {
-        destroy(); // no dlclose: sanitizers need its symbols at exit
+        destroy(); // does not call dlclose, because sanitizers need the plugin's symbols at exit
     }
     PluginUnderTest(const PluginUnderTest &) = delete;
     PluginUnderTest &operator=(const PluginUnderTest &) = delete;
 
-    // `overrides`: option values as text; all others get their defaults.
+    // Creates the plugin's instance. `overrides` has option values as text; all other options have their defaults.
     arhost_status create(const std::map<std::string, std::string> &overrides = {}) {
         const arhost_descriptor &descriptor = *plugin_->descriptor;
         std::vector<arhost_option> options;
@@ -125,7 +125,7 @@ public:
             options.push_back(value);
         }
         if (used != overrides.size())
-            throw std::runtime_error("an option that the descriptor does not declare");
+            throw std::runtime_error("the test sets an option that the descriptor does not declare");
         return plugin_->create(&host_, options.data(), static_cast<uint32_t>(options.size()), &instance_);
     }
     void destroy() {
@@ -139,11 +139,11 @@ public:
     }
     const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
     arhost_instance *instance() const { return instance_; }
-    // Cancels after `after` further calls of the host's `cancelled`.
+    // Makes the host's function `cancelled` return true after `after` more calls.
     void cancel(int after = 0) { cancelled_after_ = cancel_checks_ + after; }
     void reset_cancel() { cancelled_after_ = std::numeric_limits<int>::max(); }
 
-    // All messages so far, one line each: "severity text".
+    // Returns all log messages so far, one per line, in the format "severity text".
     std::string log() const {
         std::lock_guard lock(mutex_);
         return log_;

@@ -7,7 +7,8 @@
 
 namespace arhost::test {
 
-// False for a zombie: without an init process, nobody may reap it.
+// Returns whether a process is running. Returns false for a zombie, which may remain forever if there is no init
+// process to reap it.
 inline bool is_alive(pid_t pid) {
     std::ifstream status("/proc/" + std::to_string(pid) + "/status");
     std::string word;

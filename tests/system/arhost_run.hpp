@@ -51,7 +51,7 @@ public:
     bool exists(const std::string &name) const { return std::filesystem::exists(path(name)); }
     nlohmann::json stats() const { return nlohmann::json::parse(read("stats.json")); }
 
-    // Starts `arhost ARGUMENTS`. `prepare` is called in the child before exec.
+    // Starts `arhost ARGUMENTS`. `prepare` is called in the child process before exec.
     void start(
         std::vector<std::string> arguments = {"--config", "run.yaml"}, const std::function<void()> &prepare = [] {}) {
         pid_ = ::fork();
@@ -72,7 +72,8 @@ public:
             ::_exit(127);
         }
     }
-    // The exit status, 128 + the signal that killed it, or -1 after `limit`.
+    // Waits for arhost to exit. Returns its exit status, 128 + the number of the signal that killed it, or -1 if it
+    // is still running after `limit`.
     int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
         const auto end = std::chrono::steady_clock::now() + limit;
         while (std::chrono::steady_clock::now() < end) {
@@ -101,7 +102,7 @@ public:
         return found.empty() ? 0 : found.front();
     }
 
-    // The current worker of a plugin (the process has the plugin's id as its name), or 0.
+    // Returns the pid of a plugin's current worker, whose process name is the plugin's id; 0 if there is none.
     pid_t worker(const std::string &plugin) const {
         for (const pid_t launcher : children(pid_))
             for (const pid_t candidate : children(launcher))
@@ -136,17 +137,18 @@ private:
     pid_t pid_ = 0;
 };
 
-// Like kill(2), but throws for pid 0, which would signal the whole process group.
+// Like kill(2), but throws if pid is 0, because kill(0, …) signals the entire process group.
 inline void send_signal(pid_t pid, int signal) {
     if (pid <= 0)
         throw std::runtime_error("no process to signal");
     ::kill(pid, signal);
 }
 
-// Long enough that only plugins that hang on purpose exceed it, even on a busy machine.
+// Timeout for a frame. It is so long that, even on a busy machine, only plugins that hang on purpose exceed it.
 inline constexpr std::chrono::milliseconds counting_deadline{3000};
 
-// A configuration of the counting plugins; counted.txt has a line for every frame.
+// Returns a configuration with the *_counter plugins. Arguments are their options. The run writes one line per frame
+// to counted.txt.
 inline std::string counting(const std::string &mode, const std::string &source, const std::string &tracker,
                             const std::string &raytracer, const std::string &more = "",
                             std::chrono::milliseconds deadline = counting_deadline) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bad input results in one message with position and fix, exit status 2, and no output file.
+// Tests that bad input results in a message that names the position and the fix, exit status 2, and no output file.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ std::string replaced(std::string text, const std::string &from, const std::strin
     return text.replace(at, from.size(), to);
 }
 
-// Takes more than half a second to parse.
+// Returns a configuration that takes more than half a second to parse.
 std::string big_scene() {
     std::string text = "version: 1\nnumbers: [0";
     for (int i = 0; i < 300'000; ++i)
@@ -33,7 +33,7 @@ std::string big_scene() {
 struct Case {
     const char *name;
     std::string yaml, scene;
-    std::vector<std::string> expected; // parts of the message
+    std::vector<std::string> expected; // texts that the error message must contain
 };
 
 const std::vector<Case> cases = {
@@ -45,12 +45,12 @@ const std::vector<Case> cases = {
     {"ConformOfAnOutput",
      replaced(good, "path: counted.txt", "path: counted.txt, conform: true"),
      small_scene,
-     {"run.yaml:6:", "outputs[0].conform: an output returns nothing", "arhost conform PLUGIN.so"}},
+     {"run.yaml:6:", "outputs[0].conform: is not available for outputs", "arhost conform PLUGIN.so"}},
     {"DuplicateKey", good + "mode: live\n", small_scene, {"run.yaml:8:", "mode", "duplicate key"}},
     {"WrongType",
      replaced(good, "side_mm: 80", "side_mm: wide"),
      small_scene,
-     {"run.yaml:4:", "tracker.markers[0].side_mm", "must be a number, is 'wide'"}},
+     {"run.yaml:4:", "tracker.markers[0].side_mm", "must be a number, but is 'wide'"}},
     {"MarkerTwice",
      replaced(good, "[{id: 3, side_mm: 80}]", "[{id: 3, side_mm: 80}, {id: 3, side_mm: 60}]"),
      small_scene,
@@ -81,7 +81,7 @@ const std::vector<Case> cases = {
     {"OptionOutOfRange",
      replaced(good, "frames: 5", "width: 0"),
      small_scene,
-     {"run.yaml:3:", "source.options.width", "must be 1 to 4096, is 0"}},
+     {"run.yaml:3:", "source.options.width", "must be 1 to 4096, but is 0"}},
     {"OptionMissing",
      replaced(good, ", path: counted.txt", ""),
      small_scene,
@@ -89,7 +89,7 @@ const std::vector<Case> cases = {
     {"PathForAPluginWithoutPath",
      replaced(good, "source_counter,", "source_counter, path: x,"),
      small_scene,
-     {"run.yaml:3:", "source_counter takes no path"}},
+     {"run.yaml:3:", "source_counter has no option 'path'"}},
     {"PluginRejectsOptions",
      replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"),
      small_scene,
@@ -139,7 +139,10 @@ const std::vector<Case> cases = {
      good + "timeline: ./counted.txt\n",
      small_scene,
      {"run.yaml:", "timeline", "choose another path"}},
-    {"TwoDocuments", good + "---\nmode: live\n", small_scene, {"a second document starts here; keep one"}},
+    {"TwoDocuments",
+     good + "---\nmode: live\n",
+     small_scene,
+     {"a second document starts here; the file must contain only one"}},
     {"SceneSyntax", good, "version: 1\nobjects: [", {"scene.yaml:", "YAML syntax"}},
     {"SceneWithMissingMesh",
      good,
@@ -168,11 +171,11 @@ const std::vector<Case> cases = {
     {"TwoOutputsToOneFile",
      replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, path: ./counted.txt}"),
      small_scene,
-     {"run.yaml:6:", "another output writes './counted.txt' already"}},
+     {"run.yaml:6:", "another output already writes './counted.txt'"}},
     {"TwoOutputsToOneFileByAnOption",
      replaced(good, "path: counted.txt}", "path: counted.txt}, {plugin: sink_counter, options: {path: counted.txt}}"),
      small_scene,
-     {"run.yaml:6:", "another output writes 'counted.txt' already"}},
+     {"run.yaml:6:", "another output already writes 'counted.txt'"}},
     {"StatisticsOverTheScene",
      good.substr(0, good.find("stats:")) + "stats: ./scene.yaml\n",
      small_scene,
@@ -184,7 +187,7 @@ const std::vector<Case> cases = {
     {"TimelineOverTheStatistics",
      good + "timeline: stats.json\n",
      small_scene,
-     {"run.yaml:8:11: timeline: another output writes 'stats.json' already"}},
+     {"run.yaml:8:11: timeline: another output already writes 'stats.json'"}},
     {"TimelineIsAFolder",
      good + "timeline: .\n",
      small_scene,
@@ -241,11 +244,11 @@ const std::vector<Case> cases = {
     {"FpsIsNotANumber",
      replaced(good, "source_counter,", "source_counter, fps: .nan,"),
      small_scene,
-     {"run.yaml:3:", "source.fps: must be a finite number, 0 to 10000, is .nan"}},
+     {"run.yaml:3:", "source.fps: must be a finite number, 0 to 10000, but is .nan"}},
     {"FpsTooSmall",
      replaced(good, "source_counter,", "source_counter, fps: 1e-300,"),
      small_scene,
-     {"run.yaml:3:", "source.fps: must be 0 (the source's own rate) or 1e-06 to 10000, is 1e-300"}},
+     {"run.yaml:3:", "source.fps: must be 0 (the source's own rate) or 1e-06 to 10000, but is 1e-300"}},
     {"SceneIsAFifo",
      replaced(good, "scene.yaml", "fifo.obj"),
      small_scene,
@@ -353,7 +356,7 @@ TEST(BadCommandLine, IsRejected) {
         {{"--config", "run.yaml", "--ar", "1", "--rt", "2", "--g1", "90"}, "axis"},
         {{"--config", "run.yaml", "--x1", "1"}, "need --g1"},
         {{"--config", "run.yaml", "--set", "outputs.0.plugin=x"}, "--set: outputs[0].plugin: there is no plugin"},
-        {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 needs --g1"},
+        {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 sets the second rotation and needs --g1"},
         {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
         {{"--config", "run.yaml", "--no\033[2J"}, "not expected: --no [2J"},
         {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "not valid UTF-8"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The demonstration, and videos that the real plugins write and read.
+// Tests of the demonstration (config/demo.yaml), and of videos that the real plugins write and read.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -53,7 +53,7 @@ TEST(Demo, WritesItsFourFiles) {
     EXPECT_EQ(stats["frames"]["augmented"], 42);
 }
 
-// Moving objects are rendered at the frame's capture time, end to end.
+// Tests all components together: moving objects must be rendered at the capture time of the frame.
 TEST(Motion, IsRenderedAtTheFramesTime) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
@@ -96,8 +96,9 @@ TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
                             "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
     EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("film.mkv' is truncated: it ends after frame "));
-    EXPECT_THAT(run.output(),
-                HasSubstr("again.yaml:2:9: source: its input is truncated; the frames before are kept"));
+    EXPECT_THAT(
+        run.output(),
+        HasSubstr("again.yaml:2:9: source: the input is truncated; the frames before the truncation are kept"));
     const std::string poses = run.read("poses.jsonl");
     const auto kept = std::count(poses.begin(), poses.end(), '\n');
     EXPECT_GT(kept, 10);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Mode live: the newest frame is processed, and the video never waits for a backend.
+// Tests of mode live: stages process the newest frame, and the video never waits for a tracker or ray tracer.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// Frames are in order and each overlay belongs to its frame.
+// Checks that frames are in order and that each overlay belongs to its frame.
 void expect_own_overlays_in_order(const std::vector<CountedLine> &lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         ASSERT_EQ(lines[i].video, lines[i].sequence);
@@ -29,7 +29,7 @@ bool is_plain(const CountedLine &line) {
     return line.overlay == "none";
 }
 
-std::uint64_t dropped(const nlohmann::json &stats) { // sum over all stages
+std::uint64_t dropped(const nlohmann::json &stats) { // sum over all stages of the pipeline
     std::uint64_t sum = 0;
     for (const auto &[stage, count] : stats["frames"]["dropped"].items())
         sum += count.get<std::uint64_t>();
@@ -46,7 +46,7 @@ TEST(Live, ASlowRayTracerDropsFramesAndCountsThem) {
     expect_own_overlays_in_order(lines);
     const auto stats = run.stats();
     EXPECT_EQ(stats["frames"]["in"], 120);
-    // 300 ms per frame at 30 fps: eight of nine frames are dropped on any machine.
+    // At 30 fps and 300 ms per image, at least eight of nine frames are dropped on any machine.
     EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
     EXPECT_EQ(dropped(stats) + lines.size(), 120u) << "each frame is either shown or counted as dropped\n"
                                                    << stats.dump(1);
@@ -65,7 +65,7 @@ TEST(Live, CancelsAnUnneededImageAtTheEnd) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
-// The real plugins at 30 fps; at 64 samples per pixel the ray tracer is too slow on any machine.
+// Uses the real plugins at 30 fps. With 64 samples per pixel, the ray tracer cannot keep up on any machine.
 TEST(Live, ShownFramesEqualThoseOfLockstep) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "takes minutes under a sanitizer";
@@ -96,7 +96,8 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
 }
 
 TEST(Live, VideoContinuesWhileABackendHangs) {
-    // Hangs in the first of frames 20 to 29 that it gets; they have passed when its deadline expires.
+    // The ray tracer hangs at the first frame between 20 and 29 that it receives. When its timeout expires, the
+    // source has passed frame 29, so the restarted ray tracer does not hang again.
     ArhostRun run(
         counting("live", "frames: 120", "", "hang_at: 20, hang_until: 30", "live: {max_latency_ms: 150}\n"));
     run.write("scene.yaml", small_scene);
@@ -105,7 +106,7 @@ TEST(Live, VideoContinuesWhileABackendHangs) {
     expect_own_overlays_in_order(lines);
     EXPECT_GE(std::ranges::count_if(lines, is_plain), 5) << "plain video must continue until the deadline";
     EXPECT_TRUE(std::ranges::any_of(lines, [](const auto &line) { return line.sequence > 30 && !is_plain(line); }))
-        << "the overlay must come back";
+        << "overlays must be shown again after the restart";
     EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
 }
 
@@ -152,7 +153,7 @@ TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
     wait_for_frames(10);
     const pid_t source = run.worker("source_synthetic");
     send_signal(source, SIGSTOP);
-    std::this_thread::sleep_for(std::chrono::milliseconds(400)); // 20 frames
+    std::this_thread::sleep_for(std::chrono::milliseconds(400)); // the duration of 20 frames
     send_signal(source, SIGCONT);
     wait_for_frames(5);
     send_signal(source, SIGKILL);
@@ -160,7 +161,7 @@ TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
     const auto stats = run.stats();
     EXPECT_EQ(stats["restarts"]["source"], 1) << run.output();
     EXPECT_GE(stats["frames"]["dropped"]["source"], 15);
-    // Each frame is delivered or reported as skipped, except possibly the last ones.
+    // Each frame is either delivered or reported as skipped; only the last frames may be missing.
     EXPECT_LE(stats["frames"]["in"].get<int>() + stats["frames"]["dropped"]["source"].get<int>(), 250);
     for (const auto &[promise, entry] : stats["conformance"].items())
         EXPECT_EQ(entry["violations"], 0) << promise;

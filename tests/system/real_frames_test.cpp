@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The real plugins on a real camera sequence: tag36h11 board, 40 frames (shared/data/markers/rbt_sequence).
+// Runs the real plugins on a recorded camera sequence of 40 frames of a tag36h11 board
+// (shared/data/markers/rbt_sequence).
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>

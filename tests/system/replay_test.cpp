@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Recording the camera poses of a run, and rendering them again.
+// Tests that record the camera poses of a run and replay them.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 
 const std::string scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml";
 
-// The real plugins on a small synthetic video; the marker is occluded in the middle.
+// Returns a configuration of the real plugins for a small synthetic video. The marker is occluded for some frames.
 std::string recording(const std::string &frames = "40") {
     return "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, frames: " + frames +
            ", occlude_from: 12, occlude_to: 22}}\n"
@@ -25,7 +25,7 @@ std::string recording(const std::string &frames = "40") {
            "- {plugin: sink_images, path: \"recorded/%03d.png\"}\n- {plugin: sink_poses, path: recorded.jsonl}\n";
 }
 
-// The same with a trajectory instead of a tracker.
+// Returns the same configuration with a trajectory instead of the tracker.
 const std::string replay_of_it = "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, "
                                  "frames: 100, occlude_from: 12, "
                                  "occlude_to: 22}}\n"
@@ -52,7 +52,7 @@ std::vector<nlohmann::json> lines_of(const ArhostRun &run, const std::string &fi
     return lines;
 }
 
-// Records `frames` frames of the counting plugins.
+// Records `frames` frames of the *_counter plugins.
 void record_counted(ArhostRun &run, int frames, const std::string &tracker = "",
                     const std::string &format = "arhost") {
     run.write("run.yaml", counting("lockstep", "frames: " + std::to_string(frames), tracker, "") +
@@ -72,7 +72,7 @@ TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
     run.write("replay.yaml", replay_of_it);
     ASSERT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
     expect_same_images(run, 40);
-    EXPECT_FALSE(run.exists("replayed/040.png")) << "the run ends with the trajectory";
+    EXPECT_FALSE(run.exists("replayed/040.png")) << "the run must end at the end of the trajectory";
     EXPECT_EQ(run.read("again.trajectory"), run.read("run.trajectory"));
     int lost = 0;
     const auto lines = lines_of(run, "run.trajectory");
@@ -86,7 +86,7 @@ TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
 TEST(Replay, WithPipelineRunsTheTrackerButUsesTheRecordedPoses) {
     ArhostRun run(recording());
     ASSERT_EQ(run.run(), 0) << run.output();
-    // Without the occlusion, the tracker finds more than it did.
+    // Without the occlusion, the tracker finds the marker in more frames than in the recorded run.
     run.write("chain.yaml", recording("100") + "stats: recorded.stats.json\n");
     ASSERT_EQ(
         run.run({"replay", "--trajectory", "run.trajectory", "--config", "chain.yaml", "--with-pipeline", "--set",
@@ -200,7 +200,8 @@ TEST(Replay, ReadsTheDissertationsFormat) {
         EXPECT_EQ(lines[30]["eye"], nlohmann::json::parse("[0, 0, 529]"));
         EXPECT_TRUE(lines[11]["eye"].is_null());
         EXPECT_EQ(run.stats()["frames"]["augmented"], 20);
-        EXPECT_EQ(run.output().find("t.txt:31: ignores the truncated last line") != std::string::npos, cut);
+        EXPECT_EQ(run.output().find("t.txt:31: the last line is truncated and was ignored") != std::string::npos,
+                  cut);
     }
 }
 
@@ -330,7 +331,8 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "rt_embre"}), "did you mean 'rt_embree'"},
         {replay("t.txt", {"--scene", "scene.yaml", "--raytracer", "sink_null"}), "is a sink, not a raytracer"},
         {replay("t.txt", {"--scene", "scene.yaml", "--width", "64"}), "--width and --height must be given together"},
-        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}), "contains an image size"},
+        {replay("t.txt", {"--scene", "scene.yaml", "--width", "64", "--height", "48"}),
+         "contains the image size; remove --width and --height"},
         {replay("plain.txt", {"--scene", "scene.yaml", "--width", "0", "--height", "48"}), "--width"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "x"}), "--output x: add an extension"},
         {replay("t.txt", {"--scene", "scene.yaml", "--output", "x.xyz"}), "x.xyz"},
@@ -339,8 +341,8 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
         {replay("t.txt", {"--scene", "scene.yaml", "--stats", "t.txt"}),
          "--stats: stats: 't.txt' is a file that this run reads"},
         {replay("t.txt", {"--config", "pure.yaml", "--with-pipeline"}),
-         "--with-pipeline needs a 'source' and a 'tracker'; pure.yaml lacks them"},
-        {{"--config", "live.yaml"}, "live.yaml:2:7: mode: live needs a 'source' that sets the pace"},
+         "--with-pipeline needs a 'source' and a 'tracker'; pure.yaml lacks at least one of them"},
+        {{"--config", "live.yaml"}, "live.yaml:2:7: mode: mode live needs a 'source', which sets the frame rate"},
         {{"--config", "tracker.yaml"}, "tracker.yaml:3:10: tracker: a tracker needs a 'source'"},
         {{"--config", "same.yaml"}, "is a file that this run reads; choose another path"},
         {{"--config", "stats.yaml"}, "stats.yaml:3:8: stats: "},
@@ -371,6 +373,6 @@ TEST(Replay, CanBeChecked) {
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
     run.write("t.txt", run.read("t.txt") + "{\"frame\"");
     EXPECT_EQ(run.run({"check", "replay.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: ignores the truncated last line"));
+    EXPECT_THAT(run.output(), HasSubstr("t.txt:7: the last line is truncated and was ignored"));
     EXPECT_EQ(run.run({"--config", "replay.yaml"}), 0) << run.output();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Complete runs in mode lockstep.
+// Tests of complete runs in mode lockstep.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -134,7 +134,7 @@ TEST(Run, HoldsTheLastPoseForHoldFrames) {
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.hold_frames=4"}), 0) << run.output();
     const auto lines = counted(run);
     ASSERT_EQ(lines.size(), 30u);
-    EXPECT_EQ(lines[13].overlay, "9"); // held
+    EXPECT_EQ(lines[13].overlay, "9"); // the pose of frame 9 is held
     EXPECT_EQ(lines[13].kind, 2);
     EXPECT_EQ(lines[14].overlay, "none");
 }
@@ -185,13 +185,13 @@ TEST(Run, FinishesItsFilesOnCtrlCAndExitsWith130) {
     }
 }
 
-TEST(Run, TreatsSimultaneousSignalsAsOne) { // timeout(1) sends to the process and to its group
+TEST(Run, TreatsSimultaneousSignalsAsOne) { // timeout(1) signals the process and also its group
     ArhostRun run(counting("lockstep", "frames: 100000", "", "delay_ms: 1"));
     run.write("scene.yaml", small_scene);
     run.start();
     while (run.running() && counted(run).size() < 20)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    ::kill(run.pid(), SIGSTOP); // so that it receives them at once
+    ::kill(run.pid(), SIGSTOP); // so that it receives both signals at the same time
     for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGCONT})
         ::kill(run.pid(), signal);
     ASSERT_EQ(run.wait(), 130) << run.output();
@@ -235,7 +235,7 @@ TEST(Run, WorksWithoutStandardStreams) {
     for (const auto &c : cases) {
         ArhostRun run(counting("lockstep", "frames: 60, crash_at: 30", "crash_at: 20", "error_at: 10"));
         run.write("scene.yaml", small_scene);
-        // The source crashes at frame 30 in each attempt, which is also logged.
+        // The source crashes at frame 30 after every restart; the log also contains these crashes.
         run.start({"--config", "run.yaml", "-v", "--set", "restart.first_delay_ms=1"}, c.prepare);
         EXPECT_EQ(run.wait(), 1) << c.name;
         const auto lines = counted(run);
@@ -297,7 +297,7 @@ TEST(Run, LeavesNoProcessIfKilled) {
 TEST(Run, ContinuesWhileTheTerminalIsStopped) {
     ArhostRun run(counting("lockstep", "frames: 200", "", ""));
     run.write("scene.yaml", small_scene);
-    run.start({"--config", "run.yaml", "-v"}, [] { // stderr is a full, unread pipe
+    run.start({"--config", "run.yaml", "-v"}, [] { // stderr is a full pipe that nobody reads
         int ends[2];
         if (::pipe2(ends, O_NONBLOCK) != 0)
             ::_exit(126);
@@ -312,7 +312,8 @@ TEST(Run, ContinuesWhileTheTerminalIsStopped) {
     EXPECT_TRUE(run.exists("stats.json"));
     EXPECT_TRUE(run.exists("counted.txt.done"));
     expect_every_frame_augmented(run, 200);
-    for (int i = 0; i < 1000 && run.running(); ++i) { // it is blocked on its last lines; a signal ends it
+    for (int i = 0; i < 1000 && run.running();
+         ++i) { // arhost is blocked while writing its last lines; a signal must end it
         ::kill(run.pid(), SIGTERM);
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
@@ -335,12 +336,13 @@ TEST(Run, RedrawsProgressOnATerminal) {
     ASSERT_EQ(::grantpt(terminal), 0);
     ASSERT_EQ(::unlockpt(terminal), 0);
     const std::string name = ::ptsname(terminal);
-    const int kept_open = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // otherwise an early read may fail
+    const int kept_open = ::open(
+        name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC); // otherwise a read before arhost opens the terminal may fail
     run.start({"--config", "run.yaml", "--set", "outputs[0].path=out/counted.txt"}, // avoids a warning
               [&] { ::dup2(::open(name.c_str(), O_RDWR | O_NOCTTY), STDERR_FILENO); });
     ::fcntl(terminal, F_SETFL, O_NONBLOCK);
     std::string shown;
-    for (bool ended = false; !ended;) { // reads once more after the end
+    for (bool ended = false; !ended;) { // reads once more after arhost has exited
         ended = !run.running();
         char bytes[4096];
         for (ssize_t count; (count = ::read(terminal, bytes, sizeof bytes)) > 0;)
@@ -350,7 +352,7 @@ TEST(Run, RedrawsProgressOnATerminal) {
     ::close(kept_open);
     ::close(terminal);
     EXPECT_EQ(run.wait(), 0);
-    EXPECT_THAT(shown, HasSubstr("\r\033[Kframe ")); // overwrites the previous line
+    EXPECT_THAT(shown, HasSubstr("\r\033[Kframe ")); // the line must overwrite the previous one
     EXPECT_THAT(shown, testing::ContainsRegex("frame 60/60  [0-9.]+ fps  finishing the outputs  source [0-9.]+ ms  "
                                               "tracker [0-9.]+ ms  raytracer [0-9.]+ ms  composite [0-9.]+ ms"));
     EXPECT_TRUE(shown.ends_with("\r\033[K")) << "the line must be cleared";
@@ -378,7 +380,7 @@ TEST(CommandLine, PrintsVersionHelpAndPlugins) {
 
 TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     ArhostRun run;
-    // Shader caches go to the scratch folder.
+    // Shader caches are written to the scratch folder.
     run.start({"plugins", "--devices"}, [&] { ::setenv("XDG_CACHE_HOME", run.path("cache").c_str(), 1); });
     EXPECT_EQ(run.wait(), 1) << "some test plugins are broken";
     const std::string blank(19, ' '), output = run.output();
@@ -390,23 +392,22 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
         const std::size_t end = output.find("\n\n", at);
         std::istringstream lines(output.substr(at + 1, end - at));
         std::string line, found;
-        std::getline(lines, line); // the plugin's own line
+        std::getline(lines, line); // the line with the plugin's name
         while (std::getline(lines, line) && line.starts_with(blank))
             found += line.substr(blank.size()) + "\n";
         return found;
     };
     EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
     const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(lines_below("lister_none"), what + "no device that it can run on\n");
-    EXPECT_EQ(lines_below("lister_fail"), what + "its devices cannot be listed: the driver is too old\n");
-    EXPECT_EQ(
-        lines_below("lister_broken"),
-        what + "its devices cannot be listed: it reported a device that has no name or whose struct is too short\n");
+    EXPECT_EQ(lines_below("lister_none"), what + "found no device that the plugin can run on\n");
+    EXPECT_EQ(lines_below("lister_fail"), what + "cannot list the devices: the driver is too old\n");
+    EXPECT_EQ(lines_below("lister_broken"),
+              what + "cannot list the devices: it reported a device that has no name or whose struct is too short\n");
     EXPECT_THAT(lines_below("lister_crash"),
-                testing::StartsWith(what + "its devices cannot be listed: killed by signal 11 "));
+                testing::StartsWith(what + "cannot list the devices: killed by signal 11 "));
     EXPECT_THAT(lines_below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
     EXPECT_THAT(lines_below("lister_hang"),
-                testing::StartsWith(what + "its devices cannot be listed: no answer within 20 s; "));
+                testing::StartsWith(what + "cannot list the devices: did not respond within 20 s; "));
     const std::string many = lines_below("lister_many"), text(256, '"');
     EXPECT_THAT(many, testing::StartsWith(what + "device 0: " + text + "… (integrated GPU)\n    " + text + "…\n"));
     EXPECT_THAT(many, HasSubstr("\ndevice 63: "));
@@ -415,7 +416,7 @@ TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     EXPECT_EQ(run.run({"plugins"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("lister_hang"));
     EXPECT_THAT(run.output(), testing::AllOf(Not(HasSubstr("device 0")), Not(HasSubstr("its devices"))))
-        << "only with --devices";
+        << "devices must be listed only with --devices";
 }
 
 TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
@@ -427,13 +428,14 @@ TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
 }
 
 TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {
-    // rt_counter gets a camera without distortion and fills its image.
+    // rt_counter receives a camera without lens distortion and fills the entire image.
     ArhostRun run(
         counting("lockstep", "frames: 5", "", "",
                  "camera: {width: 64, height: 48, fx: 60, distortion: {model: brown, coefficients: [-0.2, 0.05, "
                  "0, 0]}}\n"));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("rt_counter does not support lens distortion: the host distorts its images"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("rt_counter does not support lens distortion: the host warps the rendered images"));
     expect_every_frame_augmented(run, 5);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A hostile tracker attempts the attacks listed in docs/security.md; they must fail and the video must be complete.
+// A hostile tracker attempts the attacks listed in docs/security.md. The attacks must fail, and the video must be
+// complete.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -47,7 +48,7 @@ public:
     HostileRun &operator=(const HostileRun &) = delete;
     fs::path target() const { return elsewhere_.path() / "target"; }
     std::string target_text() const { return read_file(target()); }
-    // `victim`: target of the attacks instead of the host, which could not report its own death.
+    // `victim` is the pid of a process that is attacked instead of the host, because a killed host cannot report.
     void start_it(pid_t victim = 0) {
         start({"--config", "run.yaml"}, [this, victim] {
             ::setenv("HOSTILE_HOST", std::to_string(victim ? victim : ::getpid()).c_str(), 1);
@@ -75,13 +76,14 @@ private:
     std::vector<int> listening_;
 };
 
-// A process that does nothing; a target for attacks.
+// A process that does nothing and serves as a target of attacks.
 class Victim {
 public:
     Victim() : pid_(::fork()) {
         if (pid_ != 0)
             return;
-        ::prctl(PR_SET_PTRACER, PR_SET_PTRACER_ANY, 0, 0, 0); // allowed even under Yama
+        ::prctl(PR_SET_PTRACER, PR_SET_PTRACER_ANY, 0, 0,
+                0); // allows ptrace even if the Yama security module restricts it
         for (;;)
             ::pause();
     }
@@ -111,7 +113,8 @@ void expect_frames_in_order(const ArhostRun &run) {
     }
 }
 
-// Also, each overlay belongs to its frame; only the attacked frame and `before` frames before it may have none.
+// Also checks that each overlay belongs to its frame. Only the frame of the attack and the `before` frames preceding
+// it may have no overlay.
 void expect_complete_video(const ArhostRun &run, std::uint64_t before = 0) {
     expect_frames_in_order(run);
     const auto lines = counted(run, "out/counted.txt");
@@ -135,7 +138,7 @@ bool has(const std::string &layer) {
     return level().substr(0, level().find("MISSING")).find(layer) != std::string::npos;
 }
 
-// The attacks were attempted and all stopped, and the plugin continued.
+// Checks that the attacks were attempted, that all were stopped, and that the plugin continued.
 void expect_stopped(HostileRun &run) {
     ASSERT_EQ(run.attack(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(": stopped"));
@@ -145,7 +148,7 @@ void expect_stopped(HostileRun &run) {
     expect_complete_video(run);
 }
 
-// The plugin violated the contract, was ended for `reason` and restarted.
+// Checks that the plugin was terminated because of `reason`, a contract violation, and then restarted.
 void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t before = 0) {
     ASSERT_EQ(run.attack(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(reason));
@@ -154,7 +157,8 @@ void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t befo
     expect_complete_video(run, before);
 }
 
-// Sanitizers need processes for leak checks and stack traces, and unlimited shadow memory.
+// Sanitizers need child processes (for leak checks and stack traces) and unlimited memory, so the sandbox allows
+// both.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define REQUIRE_NO_SANITIZER() GTEST_SKIP() << "under a sanitizer the sandbox allows processes and all memory"
 #else
@@ -166,7 +170,7 @@ void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t befo
 
 } // namespace
 
-// Verifies the attacks: without the sandbox they succeed, so that the tests below are meaningful.
+// Verifies that the attacks succeed without the sandbox; otherwise the tests below would prove nothing.
 class WithoutSandbox : public testing::TestWithParam<std::string> {};
 
 TEST_P(WithoutSandbox, AttacksSucceed) {
@@ -175,7 +179,7 @@ TEST_P(WithoutSandbox, AttacksSucceed) {
     run.start_it(victim.pid());
     run.wait();
     EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
-    // Attacks that need more than an ordinary user's rights, or a kernel feature.
+    // Attacks that succeed only with more rights than an ordinary user has, or with a certain kernel feature.
     const auto is_rare = [](const std::string &line) {
         const std::initializer_list<const char *> rare = {
             "the passwords", "packets", "virtual machines", "launcher", "/dev/", "/run: ", "/: "};
@@ -216,7 +220,7 @@ TEST(Sandbox, BlocksDevices) {
 }
 
 TEST(Sandbox, HidesSecretsInTheEnvironment) {
-    REQUIRE_LAYER("landlock"); // protects /proc of the launcher
+    REQUIRE_LAYER("landlock"); // protects the launcher's files in /proc
     HostileRun run("environment");
     expect_stopped(run);
 }
@@ -257,7 +261,7 @@ TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOldKernels) {
     for (const char *attack : {"signal", "signal_by_child"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack, ", allow: [processes]");
-        const Victim victim; // signalled instead of the host
+        const Victim victim; // receives the signals instead of the host
         run.start_it(victim.pid());
         ASSERT_EQ(run.wait(), 0) << run.output();
         EXPECT_EQ(victim.lives(), scoped) << run.output();
@@ -271,7 +275,7 @@ TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOldKernels) {
         expect_complete_video(run);
     }
     HostileRun strict("none", ", allow: [processes]", "sandbox: strict\n");
-    const int status = strict.attack(); // other layers may also be missing
+    const int status = strict.attack(); // the message may name other missing layers, too
     const bool refused = strict.output().find("blocking signals to other processes") != std::string::npos;
     EXPECT_EQ(refused, !scoped) << strict.output();
     EXPECT_TRUE(!refused || status == 2) << status;
@@ -286,7 +290,7 @@ TEST(Sandbox, LimitsMemory) {
     expect_complete_video(run);
 }
 
-// The host can still pass descriptors to a new worker.
+// The host must still be able to pass descriptors to a new worker.
 TEST(Sandbox, LimitsDescriptors) {
     HostileRun run("descriptors");
     run.start_it();
@@ -299,7 +303,7 @@ TEST(Sandbox, LimitsDescriptors) {
     expect_complete_video(run);
 }
 
-// Keeps up to 1,500 descriptors in unread messages, like another program of the same user.
+// Keeps up to 1,500 descriptors in unread messages, as another program of the same user could do.
 class DescriptorsInFlight {
 public:
     DescriptorsInFlight() {
@@ -334,7 +338,7 @@ private:
     int ends_[2] = {-1, -1};
 };
 
-// The scene loader waits until it can send its descriptors.
+// The scene loader must wait until it can send its descriptors.
 TEST(Sandbox, LoadsASceneAlthoughOthersHaveManyDescriptorsInFlight) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);
@@ -348,7 +352,7 @@ TEST(Sandbox, LoadsASceneAlthoughOthersHaveManyDescriptorsInFlight) {
 
 TEST(Sandbox, CorruptRingsAndSlotsEndTheWorker) {
     HostileRun run("scribble");
-    expect_ended(run, "violation: ", 1); // it may erase the last result before the host has received it
+    expect_ended(run, "violation: ", 1); // the plugin may erase its last result before the host has read it
     EXPECT_THAT(run.output(), HasSubstr("make input writable: stopped"));
 }
 
@@ -367,10 +371,11 @@ TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced with 'allow: [gpu]'"));
+    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced together with 'allow: [gpu]'"));
 }
 
-// Data may change between check and use. A wrong pose may result, which cannot be detected.
+// The plugin changes data between the host's check and use. This may result in a wrong pose, which cannot be
+// detected.
 TEST(Sandbox, SurvivesConcurrentChangesOfRingsAndSlots) {
     for (int i = 0; i < 3; ++i) {
         HostileRun run("race");
@@ -394,7 +399,8 @@ TEST(Sandbox, MalformedMessagesEndTheWorker) {
         EXPECT_GT(run.stats()["restarts"]["tracker"], 0) << run.output();
         expect_complete_video(run);
     }
-    for (const char *attack : {"empty", "oversized"}) { // like a closed channel; rejected by the socket
+    // "empty" has the effect of a closed channel; the socket rejects "oversized".
+    for (const char *attack : {"empty", "oversized"}) {
         HostileRun run(attack);
         ASSERT_EQ(run.attack(), 0) << run.output();
         expect_complete_video(run);
@@ -416,7 +422,7 @@ TEST(Sandbox, KillsAWorkerThatIgnoresSignals) {
     expect_ended(run, "hung");
 }
 
-// The host's own output files cannot be redirected or blocked, even if the plugin can write to their folder.
+// A plugin must not be able to redirect or block the host's own output files, even if it may write to their folder.
 TEST(Sandbox, HostDoesNotOpenPlantedLinksOrPipes) {
     for (const char *attack : {"link", "pipe"}) {
         SCOPED_TRACE(attack);
@@ -468,9 +474,10 @@ TEST(Sandbox, WarnsIfAnOutputMayWriteToTheWorkingDirectory) {
     ArhostRun run(counting("lockstep", "frames: 3", "", ""));
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:40: outputs[0].path: 'sink_counter' can write all of '"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("run.yaml:6:40: outputs[0].path: 'sink_counter' may write to everything in and below '"));
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "outputs[0].path=out/counted.txt"}), 0) << run.output();
-    EXPECT_THAT(run.output(), Not(HasSubstr("can write all of")));
+    EXPECT_THAT(run.output(), Not(HasSubstr("may write to everything")));
 }
 
 TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// End-to-end registration with lens distortion: the silhouette of a virtual plate in the augmented frames is compared
-// with its projection by the source's exact pose.
+// Tests the registration of the complete system with lens distortion: compares the silhouette of a virtual plate in
+// the augmented frames with the plate's projection, computed with the exact pose that the source reports.
 #include "arhost_run.hpp"
 #include "camera/lens.hpp"
 
@@ -15,7 +15,7 @@ using namespace arhost::test;
 namespace {
 
 constexpr int frames = 50;
-constexpr double half_side_mm = 45; // of the plate, which is centred on the marker
+constexpr double half_side_mm = 45; // half the side of the plate, which is centred on the marker
 
 arhost_intrinsics lens() {
     arhost_intrinsics i{};
@@ -46,12 +46,12 @@ std::string configuration(const std::string &tracker) {
            "poses.jsonl}\n";
 }
 
-// Pure green under any light, so that a colour mask gives the silhouette.
+// The plate is pure green under any light, so the silhouette can be found by colour.
 const char *const plate = "version: 1\naxes: z-up\nambient: 1\n"
                           "materials: {green: {model: diffuse, diffuse: 0, ambient: [0, 1, 0]}}\n"
                           "objects: [{plane: {size: 90}, material: green}]\n";
 
-// The plate's distorted outline in px for the exact pose `mt` in OpenGL eye space.
+// Returns the outline of the plate in the distorted image, in px. `mt` is the exact pose in OpenGL eye space.
 std::vector<cv::Point2d> true_outline(const std::vector<double> &mt) {
     std::vector<cv::Point2d> outline;
     const double corners[5][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}, {-1, 1}};
@@ -99,7 +99,7 @@ TEST_P(Silhouette, MatchesTheExactPose) {
         std::vector<std::vector<cv::Point>> contours;
         cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
         ASSERT_EQ(contours.size(), 1u) << name;
-        // The outermost pixel centres are 0 to 1 px inside the edge, 0.5 px on average.
+        // The outermost pixel centres are 0 to 1 px inside the plate's edge, on average 0.5 px.
         double frame_px = 0;
         for (const cv::Point &point : contours[0])
             frame_px += distance_to_outline(point, outline);

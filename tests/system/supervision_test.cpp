@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Plugins that crash, hang or fail; the video continues.
+// Tests that the video continues if plugins crash, hang or return errors.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,8 @@ void wait_for_frames(const ArhostRun &run, std::size_t frames) {
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
 }
 
-// True for a zombie too: an orphan's new parent may not reap it.
+// Returns whether a process has ended. Returns true also for a zombie, because the new parent of an orphan may not
+// reap it.
 bool is_dead(pid_t pid) {
     const auto lives = [&] {
         std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
@@ -114,7 +115,7 @@ TEST(Supervision, ASourceKilledDuringRestartContinues) {
             send_signal(source, SIGKILL);
         for (int tries = 0; tries < 10'000 && !run.worker("source_counter"); ++tries)
             if (const pid_t starting = run.worker("arhost-worker")) {
-                send_signal(starting, SIGKILL); // before it has reported whether it can seek
+                send_signal(starting, SIGKILL); // kills the source before it has reported whether it can seek
                 ++hits;
                 break;
             }
@@ -205,7 +206,8 @@ TEST(Supervision, StderrOfACrashedPluginNeedNotBeUtf8) {
     EXPECT_THAT(run.stats()["crashes"][0]["log_tail"].get<std::string>(), HasSubstr("last words: \uFFFD"));
 }
 
-// Like Ctrl-Z for longer than a deadline: the workers continue, and their answers wait.
+// Stops the host for longer than a timeout, as Ctrl-Z does. The workers continue, and the host reads their responses
+// later.
 TEST(Supervision, NothingHangsIfTheHostIsStopped) {
     ArhostRun run(counting("lockstep", "frames: 120", "", "delay_ms: 5"));
     run.write("scene.yaml", small_scene);
@@ -222,7 +224,7 @@ TEST(Supervision, NothingHangsIfTheHostIsStopped) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 120);
 }
 
-// Like a frozen container: the host may be resumed before the workers.
+// Stops the host and the workers, as when a container is frozen. The host may be resumed before the workers.
 TEST(Supervision, NothingHangsIfAllProcessesAreStopped) {
     ArhostRun run(counting("lockstep", "frames: 100", "", "delay_ms: 5"));
     run.write("scene.yaml", small_scene);
@@ -253,7 +255,8 @@ TEST(Supervision, AFrameWithAnErrorIsSkippedWithoutARestart) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
-// A new process can reopen the device and has free memory; only a frame that fails again stays without overlay.
+// After a lost device or lack of memory, a new process can reopen the device and has free memory, so the frame is
+// retried. Only a frame that fails again has no overlay.
 class FatalError : public testing::TestWithParam<std::pair<arhost_status, const char *>> {};
 INSTANTIATE_TEST_SUITE_P(Statuses, FatalError,
                          testing::Values(std::pair(ARHOST_STATUS_ERROR_DEVICE_LOST, "device lost"),
@@ -307,12 +310,12 @@ TEST(Supervision, TheFallbackReplacesAPluginThatIsGivenUp) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
                            "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
     run.write("scene.yaml", small_scene);
-    // The same plugin works with its default options.
+    // As a fallback, the same plugin has its default options, with which it works.
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("falling back to rt_counter"));
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_embree"}), 0) << run.output();
-    EXPECT_EQ(run.stats()["crashes"][0]["plugin"], "rt_counter") << "the one that crashed";
+    EXPECT_EQ(run.stats()["crashes"][0]["plugin"], "rt_counter") << "must name the plugin that crashed";
 }
 
 TEST(Supervision, KillingWorkersDoesNotChangeTheResult) {
@@ -379,7 +382,7 @@ TEST(Supervision, AFailedSourceFrameIsRetriedAndNeverSkipped) {
     expect_all_frames_in_order(run, 30);
 }
 
-// Otherwise all correct times that follow would run backwards.
+// Capture times in the future must be rejected: compared with them, later correct times would run backwards.
 TEST(Supervision, ACaptureTimeInTheFutureCausesARestartWithoutLosingFrames) {
     ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000, ahead_at: 15", "", ""));
     run.write("scene.yaml", small_scene);
@@ -479,7 +482,8 @@ TEST(Supervision, AStoppedLauncherDoesNotDelayTheEnd) {
     EXPECT_EQ(run.wait(std::chrono::seconds(20)), 130) << run.output();
 }
 
-// Its workers die with it, the output while writing; all restart under a new launcher.
+// Kills the launcher. Its workers die with it, the output's worker while writing. All are restarted by a new
+// launcher.
 TEST(Supervision, AKilledLauncherIsReplaced) {
     ArhostRun run(counting("lockstep", "frames: 700, delay_ms: 5", "", ""));
     run.write("scene.yaml", small_scene);
@@ -495,7 +499,7 @@ TEST(Supervision, AKilledLauncherIsReplaced) {
     EXPECT_THAT(run.output(), HasSubstr("warning: arhost: the launcher has died, and all workers with it; starting"));
 }
 
-// Only the kernel is left to resume the launcher.
+// After the host's death, no other process resumes the stopped launcher; only the kernel can.
 TEST(Supervision, AKilledHostLeavesNoStoppedProcesses) {
     ArhostRun run(counting("lockstep", "frames: 100000, delay_ms: 1", "fork_at: 10", ""));
     run.write("scene.yaml", small_scene);

@@ -22,7 +22,7 @@ protected:
         std::ofstream(folder_.path() / "camera.yaml") << text;
         return folder_.path() / "camera.yaml";
     }
-    // The error of reading `text`, without the folder name.
+    // Returns the error message for a calibration file with the contents `text`, without the name of the folder.
     std::string error_in(const std::string &text, std::optional<Size> expected = {}) const {
         const auto file = write(text);
         const std::string message = error_of([&] { read_calibration(file, expected); });
@@ -40,7 +40,7 @@ arhost_intrinsics parsed(const std::string &text) {
     return parse_camera(yaml::Node::parse(text, "lab.yaml"));
 }
 
-// A calibration with the given distortion lines.
+// Returns a calibration file that ends with `lines`, which describe the distortion.
 std::string with_distortion(const std::string &lines) {
     return "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
            "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
@@ -124,7 +124,7 @@ TEST_F(Calibration, DetectsFisheyeByItsModelKey) {
               ARHOST_DISTORTION_FISHEYE);
     EXPECT_EQ(read_calibration(write(with_distortion("fisheye_model: 1\n" + four))).distortion,
               ARHOST_DISTORTION_FISHEYE);
-    // A fisheye lens with coefficients of 0 still has distortion.
+    // With the fisheye model, a lens distorts even if all coefficients are 0.
     EXPECT_EQ(read_calibration(write(with_distortion("distortion_model: fisheye\n" + no_distortion))).distortion,
               ARHOST_DISTORTION_FISHEYE);
 }
@@ -160,16 +160,17 @@ TEST_F(Calibration, AcceptsFourteenCoefficientsOnlyWithoutTilt) {
 TEST_F(Calibration, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(
         error_in(with_distortion("distortion_coefficients: [1, 2, 3]\n")),
-        "camera.yaml:10:26: distortion_coefficients: the Brown model has 4, 5, 8 or 12 coefficients (k1 k2 p1 p2 "
+        "camera.yaml:10:26: distortion_coefficients: the Brown model needs 4, 5, 8 or 12 coefficients (k1 k2 p1 p2 "
         "[k3 [k4 k5 k6 [s1 s2 s3 s4]]]), not 3");
     EXPECT_EQ(
         error_in(with_distortion("distortion_model: fisheye\ndistortion_coefficients: [1, 2, 3, 4, 5]\n")),
-        "camera.yaml:11:26: distortion_coefficients: the fisheye model has 4 coefficients (k1 k2 k3 k4), not 5");
+        "camera.yaml:11:26: distortion_coefficients: the fisheye model needs 4 coefficients (k1 k2 k3 k4), not 5");
     EXPECT_EQ(error_in(with_distortion("distortion_model: radtn\n" + no_distortion)),
               "camera.yaml:10:19: distortion_model: 'radtn' is not one of brown, plumb_bob, radtan, "
               "rational_polynomial, fisheye, equidistant, none; did you mean 'radtan'?");
     EXPECT_EQ(error_in(with_distortion("distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4]\n")),
-              "camera.yaml:11:26: distortion_coefficients: the model is none, but a coefficient is not 0; set the "
+              "camera.yaml:11:26: distortion_coefficients: the distortion model is 'none', but a coefficient is not "
+              "0; set the "
               "model to brown or fisheye");
     EXPECT_EQ(error_in(with_distortion("")), "camera.yaml:3:1: the key 'distortion_coefficients' is missing; for a "
                                              "lens without distortion, write [0, 0, 0, 0]");
@@ -178,9 +179,9 @@ TEST_F(Calibration, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_in("image_width: 640\n"), "camera.yaml:1:1: the key 'image_height' is missing; give the size of "
                                               "the calibration's images in px, here or as width and height next to "
                                               "'file' in the configuration");
-    EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"),
-              "camera.yaml:1:1: is not a YAML calibration; let OpenCV's FileStorage write it to a file named "
-              "*.yaml");
+    EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"), "camera.yaml:1:1: is not a calibration in YAML format; for "
+                                                     "YAML, give OpenCV's FileStorage a file name that ends in "
+                                                     ".yaml");
 }
 
 TEST_F(Calibration, RejectsInvalidCameraMatrices) {
@@ -188,15 +189,15 @@ TEST_F(Calibration, RejectsInvalidCameraMatrices) {
         return "image_width: 640\nimage_height: 480\ncamera_matrix: " + value + "\n" + no_distortion;
     };
     EXPECT_EQ(error_in(with_matrix("[600, 0, 320, 0, 601, 240]")),
-              "camera.yaml:3:16: camera_matrix: must be a 3×3 matrix, has 6 numbers");
+              "camera.yaml:3:16: camera_matrix: must be a 3×3 matrix with 9 numbers, but has 6 numbers");
     EXPECT_EQ(error_in(with_matrix("[600, 0.5, 320, 0, 601, 240, 0, 0, 1]")),
               "camera.yaml:3:16: camera_matrix: skew (row 1, column 2) is not supported and must be 0");
     EXPECT_EQ(error_in(with_matrix("[600, 0, 0, 0, 601, 0, 320, 240, 1]")),
               "camera.yaml:3:16: camera_matrix: must be [fx, 0, cx, 0, fy, cy, 0, 0, 1], row by row");
     EXPECT_EQ(error_in(with_matrix("[600, 0, 320, 0, -601, 240, 0, 0, 1]")),
-              "camera.yaml:3:16: camera_matrix: the focal length must be greater than 0 px, is -601");
+              "camera.yaml:3:16: camera_matrix: the focal length must be greater than 0 px, but is -601");
     EXPECT_EQ(error_in(with_matrix("[.Nan, 0, 320, 0, 601, 240, 0, 0, 1]")),
-              "camera.yaml:3:17: camera_matrix[0]: must be a finite number, is .Nan");
+              "camera.yaml:3:17: camera_matrix[0]: must be a finite number, but is .Nan");
     EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: d, data: [1, 2]}")),
               "camera.yaml:3:48: camera_matrix.data: has 2 numbers, but rows × cols is 9");
     EXPECT_EQ(error_in(with_matrix("{rows: 3, cols: 3, dt: u, data: [1, 2]}")),
@@ -232,7 +233,8 @@ TEST(CameraBlock, DefaultsToACentredPrincipalPoint) {
 
 TEST(CameraBlock, AcceptsAFieldOfViewInsteadOfFocalLengths) {
     const arhost_intrinsics intrinsics = parsed("{width: 800, height: 600, vertical_fov_degrees: 45, cx: 400}");
-    // The image's edges are half a pixel beyond the outermost centres, 300 px from its middle.
+    // The upper and lower edges of the image are half a pixel outside the outermost pixel centres, 300 px from the
+    // centre.
     EXPECT_NEAR(intrinsics.fx, 724.2640687, 1e-6);
     EXPECT_EQ(intrinsics.fy, intrinsics.fx);
     EXPECT_EQ(intrinsics.cx, 400);
@@ -242,9 +244,10 @@ TEST(CameraBlock, AcceptsAFieldOfViewInsteadOfFocalLengths) {
     EXPECT_EQ(dissertation.cx, 399.5);
     EXPECT_EQ(dissertation.distortion, ARHOST_DISTORTION_NONE);
     EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, fx: 9, vertical_fov_degrees: 45}"); }),
-              "lab.yaml:1:52: vertical_fov_degrees: replaces fx and fy; keep either it or them");
+              "lab.yaml:1:52: vertical_fov_degrees: must not be combined with fx and fy; remove either this key or "
+              "those two");
     EXPECT_EQ(error_of([] { parsed("{width: 8, height: 6, vertical_fov_degrees: 180}"); }),
-              "lab.yaml:1:45: vertical_fov_degrees: must be 0.01 to 179, is 180");
+              "lab.yaml:1:45: vertical_fov_degrees: must be 0.01 to 179, but is 180");
 }
 
 TEST(CameraBlock, UsesEveryGivenNumber) {
@@ -275,9 +278,9 @@ TEST(CameraBlock, ReadsAFileRelativeToTheConfiguration) {
 TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\n"); }), "lab.yaml:1:1: the key 'fx' is missing");
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 0\n"); }),
-              "lab.yaml:3:5: fx: the focal length must be greater than 0 px, is 0");
+              "lab.yaml:3:5: fx: the focal length must be greater than 0 px, but is 0");
     EXPECT_EQ(error_of([] { parsed("width: 0\nheight: 480\nfx: 600\n"); }),
-              "lab.yaml:1:8: width: must be 1 to 16384, is 0");
+              "lab.yaml:1:8: width: must be 1 to 16384, but is 0");
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 600\nf: 1\n"); }),
               "lab.yaml:4:4: f: unknown key; did you mean 'fx'?");
     EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: brown}}"); }),
@@ -288,7 +291,7 @@ TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
               "lab.yaml:1:8: file: the calibration file " +
                   (std::filesystem::current_path() / "camera.yaml").string() + " does not exist");
     EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, fx: 640}"); }),
-              "lab.yaml:1:25: fx: unknown key; known here: file, width, height");
+              "lab.yaml:1:25: fx: unknown key; known keys: file, width, height");
 }
 
 TEST(CameraBlock, RequiresWidthAndHeightTogether) {
@@ -296,10 +299,10 @@ TEST(CameraBlock, RequiresWidthAndHeightTogether) {
     const std::string file = (folder.path() / "camera.yaml").string();
     std::ofstream(file) << "{}\n";
     EXPECT_EQ(error_of([&] { parsed("{file: " + file + ", width: 640}"); }),
-              "lab.yaml:1:1: width and height go together; set both or neither");
+              "lab.yaml:1:1: width and height must be set together; set both or neither");
 }
 
-// The examples of docs/camera.md.
+// Tests the examples in docs/camera.md.
 TEST(CameraDocumentation, HasValidExamples) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";

@@ -28,7 +28,7 @@ Coordinates parsed(const std::string &text) {
 
 } // namespace
 
-// -ar 1 -rt 2 -g 90 -x 1 -y 0 -z 0, the dissertation's own example.
+// The example of the dissertation: -ar 1 -rt 2 -g 90 -x 1 -y 0 -z 0.
 TEST(Coordinates, OfTheDissertationsExampleMapXyzToXzMinusY) {
     const Coordinates coordinates{1, 2, {{90, {1, 0, 0}}}};
     EXPECT_EQ(to_scene(coordinates, {1, 2, 3}), glm::dvec3(1, 3, -2));
@@ -40,7 +40,7 @@ TEST(Coordinates, OfEqualProfilesDoNotRotate) {
 }
 
 TEST(Coordinates, MultiplyTheFirstRotationByTheSecond) {
-    // R1 sends y to z, R2 sends x to y: R1·R2 sends x to y and then to z.
+    // R1 maps y to z, and R2 maps x to y. Therefore R1·R2 maps x to z.
     const glm::dmat4 product = rotation_of({1, 3, {{90, {1, 0, 0}}, {90, {0, 0, 1}}}});
     EXPECT_EQ(glm::dvec3(product[0]), glm::dvec3(0, 0, 1));
     EXPECT_EQ(glm::dvec3(product[1]), glm::dvec3(-1, 0, 0));
@@ -119,10 +119,10 @@ TEST(Coordinates, ErrorsInYamlNameTheLine) {
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [0, 0, 0]}\n"); }),
               "lab.yaml:4:25: rotations[0].axis: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: .nan, axis: [1, 0, 0]}\n"); }),
-              "lab.yaml:4:15: rotations[0].degrees: must be a finite number, is .nan");
+              "lab.yaml:4:15: rotations[0].degrees: must be a finite number, but is .nan");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [1, 0]}\n"); }),
-              "lab.yaml:4:25: rotations[0].axis: must be a list of 3 numbers, has 2");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 4\n"); }), "lab.yaml:2:5: rt: must be 1 to 3, is 4");
+              "lab.yaml:4:25: rotations[0].axis: must be a list of 3 numbers, but has 2");
+    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 4\n"); }), "lab.yaml:2:5: rt: must be 1 to 3, but is 4");
     EXPECT_EQ(error_of([] { parsed("ar: 1\n"); }), "lab.yaml:1:1: the key 'rt' is missing");
     EXPECT_EQ(
         error_of([] { parsed("ar: 1\nrt: 2\n"); }),

@@ -7,7 +7,7 @@
 
 namespace arhost::test {
 
-// The message of the yaml::Error that `call` throws.
+// Returns the message of the yaml::Error that `call` throws.
 template <class Call> std::string error_of(const Call &call) {
     try {
         call();

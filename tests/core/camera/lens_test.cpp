@@ -76,13 +76,13 @@ TEST(FisheyeLens, ProjectsLikeOpenCv) {
     expect_projection(expected, intrinsics);
 }
 
-// Pixel centres are at integers, so the centre of 640 pixels is between 319 and 320.
+// Pixel centres are at integer coordinates, so the centre of an image of 640 px is between pixels 319 and 320.
 TEST(Lens, ProjectsTheOpticalAxisToTheImageCentre) {
     const auto camera = parse_camera(yaml::Node::parse("{width: 640, height: 480, fx: 600}", "lab.yaml"));
     const auto pixel = project(camera, {0, 0, 1000});
     ASSERT_TRUE(pixel);
     EXPECT_EQ(*pixel, glm::dvec2(319.5, 239.5));
-    EXPECT_EQ(*project(camera, {10, 20, 1000}), glm::dvec2(325.5, 251.5)); // right and down
+    EXPECT_EQ(*project(camera, {10, 20, 1000}), glm::dvec2(325.5, 251.5)); // to the right of the centre and below it
 }
 
 TEST(Lens, DoesNotProjectPointsBehindTheCamera) {

@@ -36,7 +36,7 @@ Pose pose(const cv::Matx33d &rotation, const cv::Vec3d &translation_mm) {
     return pose;
 }
 
-// The marker on the optical axis, facing the camera.
+// The marker is on the optical axis and faces the camera.
 Pose facing(double distance_mm) {
     return pose(cv::Matx33d::eye(), {0, 0, -distance_mm});
 }
@@ -72,7 +72,7 @@ TEST(CameraFromMarker, IsAboveTheMarkerInAYUpWorld) {
     expect_near(camera->up, {0, 0, -1}, 0);
 }
 
-// The camera 400 mm high and 300 mm in front of the marker, looking at it: w = (0, -0.6, 0.8),
+// The camera is 400 mm above and 300 mm in front of the marker and looks at it: w = (0, -0.6, 0.8),
 // v = (0, 0.8, 0.6); the rows of the rotation are u, v, w, and t = −R·eye = (0, 0, −500).
 TEST(CameraFromMarker, MatchesAHandComputedPose) {
     const cv::Matx33d rotation(1, 0, 0, 0, 0.8, 0.6, 0, -0.6, 0.8);
@@ -89,14 +89,14 @@ TEST(CameraFromMarker, MatchesAHandComputedPose) {
     expect_near(upright->up, {0, 0.6, -0.8}, 1e-15);
 }
 
-// Equations 3.2 to 3.5 computed with OpenCV, with one and two rotations.
+// Compares with equations 3.2 to 3.5 of the dissertation computed with OpenCV, for one and for two rotations.
 TEST(CameraFromMarker, MatchesAnIndependentInverseForRandomPoses) {
     std::mt19937 random(2);
     std::uniform_real_distribution<double> angle(-360, 360), component(-1, 1);
     for (int i = 0; i < 2000; ++i) {
         const Pose marker = random_pose(random);
         Coordinates coordinates{1, 3, {}};
-        cv::Matx44d product = cv::Matx44d(marker.mt).t(); // Matx is row-major
+        cv::Matx44d product = cv::Matx44d(marker.mt).t(); // transposed because Matx is row-major
         for (int k = 0; k <= i % 2; ++k) {
             const cv::Vec3d axis(component(random), component(random), component(random));
             const double degrees = angle(random);
@@ -130,7 +130,8 @@ TEST(CameraFromMarker, SeesMarkerPointsWhereMtMapsThem) {
         ASSERT_TRUE(camera);
         const glm::dvec3 on_marker(random() % 100, random() % 100, random() % 100);
         const cv::Vec4d eye_space = cv::Matx44d(marker.mt).t() * cv::Vec4d(on_marker.x, on_marker.y, on_marker.z, 1);
-        const glm::dvec3 seen = in_camera(*camera, {on_marker.x, on_marker.z, -on_marker.y}); // y-up world
+        const glm::dvec3 seen =
+            in_camera(*camera, {on_marker.x, on_marker.z, -on_marker.y}); // converted to y-up world axes
         EXPECT_NEAR(seen.x, eye_space[0], 1e-9);
         EXPECT_NEAR(seen.y, -eye_space[1], 1e-9);
         EXPECT_NEAR(seen.z, -eye_space[2], 1e-9);
@@ -149,7 +150,7 @@ TEST(CameraFromMarker, KeepsTheIntrinsics) {
     EXPECT_EQ(camera->intrinsics.struct_size, sizeof intrinsics);
 }
 
-// The recorded cameras have six digits, so look_at − eye is accurate to about 1e-3.
+// The recorded cameras are rounded to six digits, so look_at − eye is accurate only to about 1e-3.
 TEST(CameraFromMarker, ReproducesTheCamerasOfRecordedTrajectories) {
     ARHOST_REQUIRE_SHARED_DATA("seed-samples/camPose.txt");
     for (const char *name : {"seed-samples/camPose.txt", "seed-samples/camPoseDragon.txt"}) {
@@ -159,7 +160,7 @@ TEST(CameraFromMarker, ReproducesTheCamerasOfRecordedTrajectories) {
             std::istringstream numbers(line);
             glm::dvec3 eye, look_at, up;
             if (!(numbers >> eye.x >> eye.y >> eye.z >> look_at.x >> look_at.y >> look_at.z >> up.x >> up.y >> up.z))
-                continue; // the last line is truncated
+                continue; // skips the truncated last line
             const glm::dvec3 w = glm::normalize(eye - look_at), u = glm::normalize(glm::cross(up, w));
             const glm::dvec3 v = glm::cross(w, u);
             const cv::Matx33d rotation(u.x, u.y, u.z, v.x, v.y, v.z, w.x, w.y, w.z);
@@ -195,7 +196,7 @@ TEST(CameraFromMarker, RejectsInvalidPoses) {
     expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = 1e200; });
     expect_rejected("the pose's rotation is not orthonormal", [](double *mt) { mt[0] = mt[5] = mt[10] = 0; });
     expect_rejected("the pose's rotation is left-handed", [](double *mt) { mt[10] = -1; });
-    expect_rejected("the pose is more than 1000 km away", [](double *mt) { mt[14] = -1.1e9; });
+    expect_rejected("the pose is more than 1000 km from the camera", [](double *mt) { mt[14] = -1.1e9; });
 }
 
 TEST(CameraFromMarker, AcceptsARotationThatIsOrthonormalTo1e6) {

@@ -37,7 +37,7 @@ protected:
         std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
         return read_trajectory(file());
     }
-    // The message without the file name that it starts with.
+    // Returns the error message without the file name at its start.
     std::string error(const std::string &text) const {
         const std::string message = error_of([&] { read(text); });
         EXPECT_THAT(message, testing::StartsWith(file().string() + ":"));
@@ -92,7 +92,7 @@ TEST_F(Trajectories, IgnoreATruncatedLastLine) {
     for (std::size_t cut = 1; cut + 1 < second.size(); ++cut) {
         const Trajectory trajectory = read(header + line(0) + second.substr(0, cut));
         EXPECT_EQ(trajectory.frames.size(), 1u) << cut;
-        EXPECT_EQ(trajectory.warning, file().string() + ":3: ignores the truncated last line");
+        EXPECT_EQ(trajectory.warning, file().string() + ":3: the last line is truncated and was ignored");
     }
     const Trajectory without_final_line_end = read(whole.substr(0, whole.size() - 1));
     EXPECT_EQ(without_final_line_end.frames.size(), 2u);
@@ -127,14 +127,14 @@ TEST_F(Trajectories, ErrorsNamePositionAndFix) {
         {header + line(0, "\"up\": [0, 1, 0]"), {"2:1: the key 'eye' is missing"}},
         {header + line(0, R"("eye": [1, 2, 3], "up": [0, 1, 0])"), {"2:1: the key 'look_at' is missing"}},
         {header + line(-1), {"2:2: frame: must be at least 0"}},
-        {header + "{\"frame\": 1.5, \"eye\": null}\n", {"2:2: frame: must be a whole number, is 1.5"}},
+        {header + "{\"frame\": 1.5, \"eye\": null}\n", {"2:2: frame: must be a whole number, but is 1.5"}},
         {header + "{\"eye\": null, \"frame\": " + std::string(100'000, '[') + std::string(100'000, ']') + "}\n",
          {"frame: must be a whole number"}},
         {header + line(0, R"("eye": [1, 2, 2e9], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
-         {"eye: eye and look_at must be within 1e9 mm"}},
-        {header + line(3) + line(3), {"3:2: frame: must be greater than in the previous line, 3"}},
+         {"eye: the coordinates of eye and look_at must be between -1e9 and 1e9 mm"}},
+        {header + line(3) + line(3), {"3:2: frame: must be greater than the frame number of the previous line, 3"}},
         {header + line(3) + "{\"frame\": 4, \"capture_ns\": 5, \"eye\": null}\n",
-         {"3:14: capture_ns: must not be less than in the previous line"}},
+         {"3:14: capture_ns: must not be less than the capture time in the previous line"}},
         {header + line(0, R"("eye": [1, 2], "look_at": [0, 0, 0], "up": [0, 1, 0])"),
          {"2:31: eye: must be three numbers, or null in a frame without a camera"}},
         {header + line(0, R"("eye": [1, 2, 3], "look_at": [0, 0, "a"], "up": [0, 1, 0])"),
@@ -185,9 +185,9 @@ TEST_F(Trajectories, OfTheDissertationIgnoreATruncatedLastLine) {
     for (std::size_t cut = 1; cut + 2 < record.size(); ++cut) {
         const Trajectory trajectory = read(record + record.substr(0, cut));
         EXPECT_EQ(trajectory.frames.size(), 1u) << record.substr(0, cut);
-        EXPECT_EQ(trajectory.warning, file().string() + ":2: ignores the truncated last line");
+        EXPECT_EQ(trajectory.warning, file().string() + ":2: the last line is truncated and was ignored");
     }
-    // The blank after the ninth number shows that it is complete.
+    // A blank after the ninth number proves that the number is complete.
     const Trajectory whole = read(record + record.substr(0, record.size() - 1));
     EXPECT_EQ(whole.frames.size(), 2u);
     EXPECT_EQ(whole.warning, "");
@@ -199,8 +199,8 @@ TEST_F(Trajectories, OfTheDissertationErrorsNamePositionAndFix) {
     EXPECT_THAT(error(record + "1 2 nan 4 5 6 7 8 9\n"), HasSubstr("2:5: 'nan' is not a number"));
     EXPECT_THAT(error(record + "1 2 inf 4 5 6 7 8 9\n"), HasSubstr("2:5: 'inf' is not a number"));
     EXPECT_THAT(error(record + "1 2 1e999 4 5 6 7 8 9\n"), HasSubstr("2:5: '1e999' is not a number"));
-    EXPECT_THAT(error("1 2 3\n" + record), HasSubstr("1:6: has 3 numbers; eye, look_at and up need nine"));
-    EXPECT_THAT(error("1 2 3 4 5 6 7 8 9 10\n"), HasSubstr("1:19: has more than nine numbers"));
+    EXPECT_THAT(error("1 2 3\n" + record), HasSubstr("1:6: the line has 3 numbers; eye, look_at and up need nine"));
+    EXPECT_THAT(error("1 2 3 4 5 6 7 8 9 10\n"), HasSubstr("1:19: the line has more than nine numbers"));
     EXPECT_THAT(error("1 2 3 1 2 3 7 8 9\n"), HasSubstr("1:1: look_at must differ"));
     EXPECT_THAT(error("0 0 3 0 0 2 0 0 9\n"), HasSubstr("1:1: up must not be 0"));
     EXPECT_THAT(error(std::string("\0\0", 2) + "\n"), HasSubstr("1:1: "));
@@ -226,8 +226,8 @@ TEST_F(Trajectories, ReadTheDissertationsSampleFiles) {
     for (const auto &sample : samples) {
         const Trajectory trajectory = read_trajectory(test::shared_data(sample.file));
         EXPECT_EQ(trajectory.frames.size(), sample.frames) << sample.file;
-        EXPECT_THAT(trajectory.warning,
-                    HasSubstr(":" + std::to_string(sample.frames + 1) + ": ignores the truncated last line"));
+        EXPECT_THAT(trajectory.warning, HasSubstr(":" + std::to_string(sample.frames + 1) +
+                                                  ": the last line is truncated and was ignored"));
         EXPECT_TRUE(std::ranges::all_of(trajectory.frames, [](const auto &frame) { return frame.view.has_value(); }));
     }
 }

@@ -40,7 +40,8 @@ bool has_chroma_pairs(arhost_pixel_format format) {
            format == ARHOST_PIXEL_FORMAT_I420;
 }
 
-// A random frame and overlay. `shift` moves every pointer off its alignment and makes the strides odd.
+// A frame and an overlay with random contents. A `shift` other than 0 makes all pointers unaligned and all strides
+// odd.
 struct Scene {
     Scene(arhost_frame_format laid_out, std::size_t shift, std::mt19937 &random) : format(laid_out) {
         for (std::uint32_t p = 0; p < format.plane_count; ++p)
@@ -52,7 +53,7 @@ struct Scene {
         }
         overlay_stride = 4 * std::size_t(format.width) + 5 * shift;
         overlay_bytes.resize(overlay_stride * format.height + shift);
-        // Runs of empty, opaque and other alphas.
+        // The overlay consists of runs of transparent, opaque and other pixels.
         for (std::size_t i = 0, alpha = 0, run = 0; i < overlay_bytes.size(); ++i) {
             if (run-- == 0) {
                 alpha = random() % 3;
@@ -68,7 +69,7 @@ struct Scene {
     }
     ImageView overlay() const { return {overlay_bytes.data() + out_shift, overlay_stride}; }
 
-    // Output of `function`, including the bytes between and around the rows.
+    // Returns what `function` writes, including the bytes between and around the rows.
     template <class Function>
     Bytes output(const Function &function, const ImageView &image, const Region &region) const {
         Bytes bytes(out_stride * format.height + out_shift + 100, 0xa5);
@@ -112,9 +113,9 @@ TEST(Composite, ImplementsEquation36) {
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {frame.data()};
     Bytes out(12);
     composite(format, planes, {rgba, 16}, {0, 0, 4, 1}, {out.data(), 12});
-    EXPECT_EQ(out, (Bytes{10, 20, 30, // alpha 0: the video
-                          3, 2, 1,    // alpha 255: the overlay, RGB to BGR
-                          4, 8, 12,   // a shadow of 0.6 leaves 0.4
+    EXPECT_EQ(out, (Bytes{10, 20, 30, // alpha 0: the video frame's pixel
+                          3, 2, 1,    // alpha 255: the overlay's pixel, converted to BGR
+                          4, 8, 12,   // black with alpha 0.6 (a shadow): 40 % of the video frame's pixel
                           160, 95, 55}));
 }
 
@@ -142,7 +143,7 @@ TEST(Composite, ClipsTheRegionToTheImage) {
               scene.output(composite, ImageView{}, Region{}));
 }
 
-// Each overlay row is a page; pages outside the region are inaccessible.
+// Each row of the overlay is one memory page. Pages outside the region are inaccessible, so any access crashes.
 TEST(Composite, DoesNotReadTheOverlayOutsideTheRegion) {
     const std::uint32_t page = static_cast<std::uint32_t>(getpagesize()), width = page / 4, height = 8;
     const Region region{0, 3, width, 2};
@@ -170,16 +171,18 @@ TEST(Composite, ConvertsBt601LikeOpenCv) {
     const arhost_pixel_format formats[] = {ARHOST_PIXEL_FORMAT_YUYV, ARHOST_PIXEL_FORMAT_NV12,
                                            ARHOST_PIXEL_FORMAT_I420};
     for (int i = 0; i < 3; ++i) {
-        constexpr int width = 128, height = 64; // no row padding, as in OpenCV's planar images
+        constexpr int width = 128,
+                      height = 64; // a size without row padding, because OpenCV's planar images have none
         const arhost_frame_format format = layout(formats[i], width, height);
         Bytes frame(format.byte_size);
-        // OpenCV clamps values below 16.
+        // Luma starts at 16 because OpenCV clamps smaller values.
         std::generate(frame.begin(), frame.end(), [&] { return static_cast<std::uint8_t>(16 + random() % 224); });
         const std::uint8_t *planes[ARHOST_MAX_PLANES] = {
             frame.data() + format.offset[0], frame.data() + format.offset[1], frame.data() + format.offset[2]};
         cv::Mat ours(height, width, CV_8UC3), opencv, difference;
         composite(format, planes, {}, {}, {ours.data, ours.step});
-        if (formats[i] == ARHOST_PIXEL_FORMAT_I420) { // chroma rows are aligned to 64 bytes, which width / 2 is
+        if (formats[i] ==
+            ARHOST_PIXEL_FORMAT_I420) { // chroma rows are aligned to 64 bytes; width / 2 is a multiple of 64
             ASSERT_EQ(format.stride[1], width / 2);
         }
         const cv::Mat yuv = formats[i] == ARHOST_PIXEL_FORMAT_YUYV

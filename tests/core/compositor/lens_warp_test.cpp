@@ -19,7 +19,7 @@ arhost_intrinsics lens(arhost_distortion distortion, std::vector<double> k) {
     return in;
 }
 
-// An antialiased disc in the pinhole image.
+// Draws an antialiased disc in the pinhole image.
 std::vector<std::uint8_t> disc(double x0, double y0, double radius) {
     std::vector<std::uint8_t> image(std::size_t{320} * 240 * 4);
     for (int y = 0; y < 240; ++y)
@@ -51,13 +51,14 @@ TEST(LensWarp, MapsPinholePixelsToTheirLensPosition) {
                     x_sum += pixel[3] * x;
                     y_sum += pixel[3] * y;
                     if (pixel[3] > 0) {
-                        ASSERT_EQ(pixel[0], 200) << "edges keep their colour";
+                        ASSERT_EQ(pixel[0], 200) << "the colour of edge pixels must not change";
                         ASSERT_EQ(pixel[2], 50);
                     }
                 }
             const auto expected = distortion.project({px, py, 1});
             ASSERT_TRUE(expected);
-            // The warped disc's centroid differs slightly from its warped centre: 0.2 px at this size.
+            // The centroid of the warped disc differs slightly from the warped centre of the disc, by up to 0.2 px
+            // here.
             EXPECT_NEAR(x_sum / area, expected->x, 0.2);
             EXPECT_NEAR(y_sum / area, expected->y, 0.2);
         }
@@ -82,5 +83,5 @@ TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
     const ImageView none = warp.warp({opaque.data(), 320 * 4}, {10, 10, 0, 0});
     EXPECT_TRUE(std::all_of(none.rgba, none.rgba + 320 * 240 * 4, [](std::uint8_t byte) { return byte == 0; }));
     warp.warp({opaque.data(), 320 * 4},
-              {300, 200, 4'000'000'000u, 4'000'000'000u}); // ASan detects reads beyond the image
+              {300, 200, 4'000'000'000u, 4'000'000'000u}); // AddressSanitizer detects reads outside the image
 }

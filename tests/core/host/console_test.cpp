@@ -12,7 +12,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// This process's stderr as a pipe.
+// Redirects stderr of this process to a pipe.
 class Stderr {
 public:
     Stderr() : before_(::dup(STDERR_FILENO)) {
@@ -35,7 +35,7 @@ public:
         ::close(ends_[1]);
         before_ = -1;
     }
-    // Everything written before restore().
+    // Returns everything that was written before restore().
     std::string read_all() {
         std::string text;
         char bytes[4096];
@@ -69,7 +69,7 @@ TEST(Console, DropsLinesInsteadOfBlockingAndReportsTheirNumber) {
     {
         Console console(true);
         const std::string long_line(200, 'x');
-        for (int i = 0; i < 5000; ++i) // far more than the 64 KiB that a pipe holds
+        for (int i = 0; i < 5000; ++i) // much more than the 64 KiB that fit in a pipe
             console.log(ARHOST_SEVERITY_INFO, "tracker", long_line);
         reader = std::thread([&] { text = stream.read_all(); });
     }

@@ -20,7 +20,7 @@ constexpr arhost_intrinsics lens{
 constexpr arhost_marker_config listed[] = {{sizeof(arhost_marker_config), 4, 80},
                                            {sizeof(arhost_marker_config), 7, 40}};
 
-// Seen from the front, half a metre away.
+// Returns a marker that faces the camera at a distance of half a metre.
 arhost_marker marker(int id, double side_mm) {
     arhost_marker m{};
     m.id = id;
@@ -64,7 +64,8 @@ struct Time {
     std::int64_t capture_ns;
     std::uint32_t skipped = 0;
 };
-// Frames from 0 on that come at `now_ns`, of a source that was started at 0.
+// Frames of a source that was started at time 0. Frame numbers start at 0, and the host receives each frame at
+// `now_ns`.
 std::string violations_of_times(const SourceChecks::Rate &rate, arhost_clock clock, const std::vector<Time> &times,
                                 std::int64_t now_ns) {
     SourceChecks source(rate, 0);
@@ -85,7 +86,7 @@ arhost_marker altered(void (*alter)(arhost_marker &)) {
     return m;
 }
 
-// A ball of 10 mm radius at the origin, seen from 200 mm in front of it.
+// A scene with a ball of 10 mm radius at the origin; the camera is 200 mm in front of the ball.
 struct View {
     explicit View(std::optional<arhost_role> role = ARHOST_ROLE_VIRTUAL)
         : scene(scene_with(role)), pixels(640 * 480 * 4) {}
@@ -106,7 +107,7 @@ struct View {
     std::string violations(const Region &region = {0, 0, 640, 480}) const {
         const OverlayChecks overlay(scene.scene());
         ContractChecks checks;
-        for (std::uint64_t frame = 0; frame < 16; ++frame) // each row once
+        for (std::uint64_t frame = 0; frame < 16; ++frame) // 16 frames, so that each row is checked once
             overlay.check(checks, frame, camera, region, {pixels.data(), 640 * 4});
         return ::violations(checks);
     }
@@ -131,13 +132,13 @@ TEST(MarkerChecks, PassForACorrectTracker) {
     EXPECT_EQ(violations_of({}), "");
     EXPECT_EQ(violations_of({marker(4, 80), marker(7, 40)}), "");
     EXPECT_EQ(violations_of({marker(7, 40)}), "");
-    // An error of a tenth of a pixel, reported as such.
+    // A marker with an error of 0.1 px that reports this error correctly.
     EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
                   m.corners_px[0][0] += 0.2;
                   m.reprojection_px = 0.1;
               })}),
               "");
-    // A predicted marker has no detected corners.
+    // A predicted marker has no detected corners, so its reprojection error is not checked.
     EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
                   m.state = ARHOST_MARKER_PREDICTED;
                   m.age_frames = 2;
@@ -148,7 +149,8 @@ TEST(MarkerChecks, PassForACorrectTracker) {
 
 TEST(MarkerChecks, FailForAWrongTracker) {
     EXPECT_EQ(violations_of({marker(7, 40), marker(4, 80)}),
-              "tracker.order: frame 12: marker 4 is not in the order of the configuration's list");
+              "tracker.order: frame 12: marker 4 is reported out of order; markers must be in the order of the "
+              "configuration's list");
     const auto expect = [](void (*alter)(arhost_marker &), const char *expected) {
         EXPECT_THAT(violations_of({altered(alter)}), HasSubstr(expected));
     };
@@ -157,14 +159,16 @@ TEST(MarkerChecks, FailForAWrongTracker) {
     expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is detected, but its age is 3 frames");
     expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
     expect([](arhost_marker &m) { m.mt[14] = -0.5; },
-           "tracker.pose: frame 12: marker 4: its reprojection error is reported as 0.000 px"); // metres
+           "tracker.pose: frame 12: marker 4: the reported reprojection error is 0.000 px"); // the pose is in metres
+                                                                                             // instead of mm
     expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
     expect([](arhost_marker &m) { m.reprojection_px = 1; },
-           "its reprojection error is reported as 1.000 px and is 0.000 px");
+           "the reported reprojection error is 1.000 px, but the actual one is 0.000 px");
     expect([](arhost_marker &m) { m.corners_px[1][0] = 1e200; },
-           "its reprojection error is reported as 0.000 px and is inf px");
-    EXPECT_THAT(violations_of({marker(4, 40)}), HasSubstr("its reprojection error is reported as 0.000 px and is "))
-        << "half the side";
+           "the reported reprojection error is 0.000 px, but the actual one is inf px");
+    EXPECT_THAT(violations_of({marker(4, 40)}),
+                HasSubstr("the reported reprojection error is 0.000 px, but the actual one is "))
+        << "the marker's side is half as long as configured";
 }
 
 TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
@@ -173,7 +177,7 @@ TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
     };
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 99'990'000'000), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 100'250'000'000),
-              "source.capture-time: frame 0: was captured 0.250 s after its arrival");
+              "source.capture-time: frame 0: has a capture time 0.250 s after its arrival at the host");
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, 0), "") << "any delay is allowed";
     EXPECT_EQ(captured(ARHOST_CLOCK_MONOTONIC, INT64_MIN), "");
     EXPECT_EQ(captured(ARHOST_CLOCK_MEDIA, 0), "") << "media time is unrelated to the current time";
@@ -198,12 +202,12 @@ TEST(SourceChecks, RequireTheConfiguredRate) {
         return violations_of_times({10, true, false}, ARHOST_CLOCK_MEDIA, times, 0);
     };
     EXPECT_EQ(configured({{0}, {100 * ms}, {200 * ms}}), "");
-    EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "it may start at any time";
-    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count";
-    EXPECT_EQ(
-        configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
-        "source.rate: frame 2: is 0.400 s after the previous frame; 10 fps and 0 skipped frames require 0.100 s");
-    EXPECT_THAT(configured({{0}, {0}}), HasSubstr("is 0.000 s after the previous frame"));
+    EXPECT_EQ(configured({{5000 * ms}, {5100 * ms}}), "") << "media time may start at any value";
+    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms, 3}, {600 * ms}}), "") << "skipped frames count as frames";
+    EXPECT_EQ(configured({{0}, {100 * ms}, {500 * ms}, {600 * ms}}),
+              "source.rate: frame 2: has a media time 0.400 s after the previous frame, but 10 fps and 0 skipped "
+              "frames require 0.100 s");
+    EXPECT_THAT(configured({{0}, {0}}), HasSubstr("has a media time 0.000 s after the previous frame"));
     EXPECT_THAT(configured({{0}, {100 * ms, 1}}), HasSubstr("1 skipped frames require 0.200 s"));
 }
 
@@ -216,8 +220,8 @@ TEST(SourceChecks, RequireRealTimeInModeLive) {
         return violations_of_times({10, false, true}, ARHOST_CLOCK_MEDIA, times, 2000 * ms);
     };
     EXPECT_EQ(live({{0}, {100 * ms}, {1000 * ms}}), "");
-    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}),
-              "source.rate: frame 2: is 10.000 s after the first frame, but arrived 2.000 s after the start");
+    EXPECT_EQ(live({{0}, {100 * ms}, {10'000 * ms}}), "source.rate: frame 2: has a media time 10.000 s after the "
+                                                      "first frame, but arrived only 2.000 s after the start");
 }
 
 TEST(SourceChecks, DoNotCheckTheRateOfALiveSource) {
@@ -244,17 +248,18 @@ TEST(SampleHash, DetectsAnyChangeWithinSixteenFrames) {
 TEST(OverlayChecks, PassForACorrectRayTracer) {
     View view;
     view.set(330, 235, 255); // the ball's centre
-    view.set(330, 206, 90);  // its edge: 10 mm are 30 px
-    view.set(10, 10, 153);   // a shadow somewhere else
+    view.set(330, 206, 90);  // the ball's edge: 10 mm correspond to 30 px
+    view.set(10, 10, 153);   // a shadow, which may be anywhere
     EXPECT_EQ(view.violations(), "");
 }
 
 TEST(OverlayChecks, FailOutsideTheRegionAndTheObjects) {
     View view;
     view.set(100, 50, 255);
-    EXPECT_EQ(view.violations({300, 200, 60, 70}),
-              "raytracer.region: frame 2: pixel (100, 50): alpha is 255 outside the region, which is 60 x 70 px from "
-              "(300, 200)");
+    EXPECT_EQ(
+        view.violations({300, 200, 60, 70}),
+        "raytracer.region: frame 2: pixel (100, 50) is outside the reported region, but has alpha 255; the region is "
+        "60 x 70 px at (300, 200)");
     EXPECT_EQ(view.violations(),
               "raytracer.place: frame 2: pixel (100, 50): alpha is 255, but all virtual objects are "
               "between (297, 201) and (363, 269)");
@@ -271,7 +276,7 @@ TEST(OverlayChecks, DoNotTreatACatcherAsAVirtualObject) {
 
 TEST(OverlayChecks, SkipPlacesBehindTheCamera) {
     View view;
-    view.camera.eye[1] = -5; // inside the ball
+    view.camera.eye[1] = -5; // the camera is inside the ball
     view.set(1, 1, 255);
     EXPECT_EQ(view.violations(), "");
 }

@@ -35,8 +35,8 @@ TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {
     EXPECT_EQ(accepted(5'000'000, 5ms), 5ms);
     EXPECT_EQ(accepted(5'000'001, 5ms), 0ns);
     EXPECT_EQ(accepted(0, 5ms), 0ns);
-    EXPECT_EQ(accepted(UINT64_MAX, 5ms), 0ns) << "-1 as a signed number";
-    EXPECT_EQ(accepted(1, -5ms), 0ns) << "the worker reports the duration, too";
+    EXPECT_EQ(accepted(UINT64_MAX, 5ms), 0ns) << "UINT64_MAX is -1 as a signed number";
+    EXPECT_EQ(accepted(1, -5ms), 0ns) << "the worker also reports the duration, which may be negative";
     EXPECT_EQ(accepted(UINT64_MAX, -1ns), 0ns);
 }
 
@@ -48,7 +48,7 @@ TEST(FrameInfo, IsRejectedWithoutAClock) {
 TEST(FrameInfo, IsRejectedIfItsTimeRunsBackwards) {
     EXPECT_EQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 5, now_ns - 5), nullptr);
     EXPECT_STREQ(problem_with(ARHOST_CLOCK_MONOTONIC, now_ns - 6, now_ns - 5),
-                 "a frame's capture time runs backwards");
+                 "a frame's capture time is before that of the previous frame");
 }
 
 TEST(FrameInfo, IsRejectedIfALiveTimeIsFarInTheFuture) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What `arhost new-plugin` writes and rejects; tests/sdk tests the skeletons.
+// Tests what `arhost new-plugin` writes and rejects. tests/sdk builds and tests the skeletons.
 #include "host/new_plugin.hpp"
 
 #include "plugin_under_test.hpp"
@@ -89,7 +89,7 @@ TEST(NewPlugin, RejectsNamesThatClashWithTheSkeleton) {
     expect({"raytracer", "vec_3", "rust", folder.path()}, "results in the class name 'Vec3'");
     expect({"raytracer", "tracer", "c", folder.path()}, "is the name of another file of the skeleton");
     for (const char *name : {"numpy", "sys", "json", "random", "unittest", "tracker"})
-        expect({"tracker", name, "python", folder.path()}, "has no underscore, which is required in Python");
+        expect({"tracker", name, "python", folder.path()}, "has no underscore; a Python plugin needs one");
     for (const char *name : {"py_compile", "pydoc_data", "sre_parse"})
         expect({"tracker", name, "python", folder.path()}, "is a standard Python module");
     for (const char *name : {"core", "std", "test", "self", "arhost_sys", "m", "all", "edit_cache"})

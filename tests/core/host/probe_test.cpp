@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Queries real plugins in real workers.
+// Tests that query real plugins in real workers.
 #include "host/probe.hpp"
 #include "plugin_under_test.hpp"
 
@@ -14,7 +14,7 @@ using testing::StartsWith;
 namespace {
 
 struct Probe : testing::Test {
-    // The folder of a GPU driver's shader cache.
+    // Sets the folder in which GPU drivers keep their shader caches.
     void SetUp() override { ::setenv("XDG_CACHE_HOME", scratch.path().c_str(), 1); }
 
     host::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
@@ -46,7 +46,8 @@ struct Probe : testing::Test {
 
 private:
     Reactor reactor_;
-    std::optional<supervise::Launcher> launcher_; // inherits the environment of SetUp
+    std::optional<supervise::Launcher>
+        launcher_; // created in SetUp, because it inherits the environment that is set there
     std::optional<supervise::Context> context_;
 };
 
@@ -71,7 +72,7 @@ TEST_F(Probe, ListsDevices) {
     EXPECT_EQ(first.index, 0u);
     EXPECT_EQ(first.kind, ARHOST_DEVICE_DISCRETE_GPU);
     EXPECT_FALSE(first.is_default);
-    EXPECT_EQ(first.name, "Abacus  [2J3000") << "printable";
+    EXPECT_EQ(first.name, "Abacus  [2J3000") << "control characters must be replaced";
     EXPECT_EQ(first.uuid, "0d15c0de-0000");
     EXPECT_EQ(first.abilities, "counts: up, down");
     EXPECT_EQ(second.index, 1u);
@@ -96,7 +97,7 @@ TEST_F(Probe, ReportsWhyDevicesCantBeListed) {
     EXPECT_EQ(reason("lister_broken"), "it reported a device that has no name or whose struct is too short");
     EXPECT_THAT(reason("lister_crash"), testing::ContainsRegex("killed by signal 11 .* while it listed its devices"));
     EXPECT_THAT(reason("lister_hang", std::chrono::seconds(1)),
-                StartsWith("no answer within 1 s; killed by signal 6 "));
+                StartsWith("did not respond within 1 s; killed by signal 6 "));
     EXPECT_THAT(reason("no_plugin"), HasSubstr("is not an arhost plugin"));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The test plays a compromised scene loader.
+// The tests send the messages that a compromised scene loader could send.
 #include "host/scene_loading.hpp"
 #include "plugin_under_test.hpp"
 
@@ -25,9 +25,9 @@ struct FakeLoader final : supervise::Starter {
         supervise::Spawned spawned;
         std::tie(spawned.channel, channel) = Channel::make_pair();
         spawned.doorbell = make_doorbell().host;
-        spawned.output = base::UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // silent
-        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC));                 // signals cannot be sent to it
-        spawned.pid = 1 << 22; // above the highest that Linux gives to a process
+        spawned.output = base::UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // never becomes readable
+        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC)); // not a pidfd, so sending signals to it fails
+        spawned.pid = 1 << 22;                                     // greater than any pid that Linux assigns
         death = base::UniqueFd(::dup(spawned.pidfd.get()));
         return spawned;
     }
@@ -35,7 +35,7 @@ struct FakeLoader final : supervise::Starter {
 };
 
 struct SceneLoadingTest : testing::Test {
-    // The failure after the loader has sent these messages and exited.
+    // Returns the failure that is reported after the loader has sent these messages and exited.
     std::string reason_after(const std::vector<Json> &messages) {
         run_config::FilesInUse files;
         for (const char *name : {"a.mp4", "b.mp4"})

@@ -34,7 +34,7 @@ TEST(Timing, HandlesNoSamplesAndNonPositiveDurations) {
     Timing timing;
     EXPECT_EQ(timing.percentile_ms(0.5), 0);
     timing.add(std::chrono::nanoseconds(0));
-    timing.add(std::chrono::nanoseconds(-5)); // a clock that ran backwards
+    timing.add(std::chrono::nanoseconds(-5)); // a negative duration, as from a clock that ran backwards
     EXPECT_EQ(timing.count(), 2u);
     EXPECT_LE(timing.percentile_ms(0.99), 1e-5);
 }
@@ -61,7 +61,7 @@ TEST(Timeline, HasOneLinePerFrame) {
 
 TEST(Timeline, FormatsTheLongestDurationsAWorkerCanReport) {
     Statistics statistics;
-    const auto longest = std::chrono::nanoseconds::min(); // with its sign
+    const auto longest = std::chrono::nanoseconds::min(); // the longest text, as it has a sign
     statistics.timeline = {{UINT64_MAX, std::chrono::steady_clock::time_point(longest), longest, longest, longest,
                             longest, longest, longest}};
     const std::string text = timeline_csv(statistics);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A buffer between two inaccessible guard pages: any out-of-bounds access crashes the test.
+// A buffer between two inaccessible guard pages. Accesses outside the buffer crash the test.
 #pragma once
 
 #include <sys/mman.h>
@@ -14,7 +14,7 @@ namespace arhost::test {
 
 class FencedBytes {
 public:
-    enum Side { at_front, at_back }; // the end that is adjacent to a guard page
+    enum Side { at_front, at_back }; // the end of the buffer that is adjacent to a guard page
 
     FencedBytes(std::size_t size, Side side) : size_(size) {
         const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));

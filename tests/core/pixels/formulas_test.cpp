@@ -10,7 +10,7 @@
 namespace arhost {
 namespace {
 
-// The matrices of ITU-R BT.601-7 and BT.709-6 in floating point, derived from their primaries.
+// Converts with the matrices of ITU-R BT.601-7 and BT.709-6 in floating point, derived from the luma weights.
 struct Exact {
     double kr, kb;
     bool limited;
@@ -19,7 +19,7 @@ struct Exact {
         const double scale = limited ? 255.0 / 224 : 1;
         const double cb = (u - 128) * scale, cr = (v - 128) * scale;
         const double r = luma + 2 * (1 - kr) * cr, b = luma + 2 * (1 - kb) * cb;
-        // Y = kr·R + kg·G + kb·B, solved for G.
+        // Solves Y = kr·R + kg·G + kb·B for G.
         const double g = (luma - kr * r - kb * b) / (1 - kr - kb);
         return {b, g, r};
     }
@@ -42,7 +42,7 @@ TEST(Blended, GivesTheHandComputedValues) {
     EXPECT_EQ(blended(200, 100, 0), 200);
     EXPECT_EQ(blended(200, 100, 255), 100);
     EXPECT_EQ(blended(200, 100, 128), 150); // 38200 / 255 = 149.8
-    EXPECT_EQ(blended(255, 0, 153), 102);   // a shadow of 0.6 on white
+    EXPECT_EQ(blended(255, 0, 153), 102);   // black with alpha 0.6 (a shadow) over white
     EXPECT_EQ(blended(255, 0, 77), 178);
 }
 
@@ -64,7 +64,7 @@ TEST_P(EveryYuv, IsWithinOneOfTheExactValue) {
                 }
             }
     EXPECT_EQ(too_far, 0u);
-    EXPECT_LT(double(not_nearest), 0.01 * 3 * (1 << 24)); // of all values, few are not the nearest one
+    EXPECT_LT(double(not_nearest), 0.01 * 3 * (1 << 24)); // less than 1 % of all values are not the nearest integer
 }
 INSTANTIATE_TEST_SUITE_P(Matrices, EveryYuv,
                          testing::Values(std::tuple(0.299, 0.114, true), std::tuple(0.299, 0.114, false),

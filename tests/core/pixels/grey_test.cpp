@@ -27,7 +27,8 @@ arhost_frame_format layout(arhost_pixel_format pixel_format, std::uint32_t width
     return format;
 }
 
-// A frame of random bytes including its grey plane; `fill` is fill_grey or its reference.
+// Returns a frame whose planes, including the grey plane, are filled with random bytes and then passed to `fill`,
+// which is fill_grey or fill_grey_reference.
 template <class Fill> std::vector<std::uint8_t> filled(const arhost_frame_format &format, const Fill &fill) {
     std::mt19937 random(3);
     std::vector<std::uint8_t> bytes(format.byte_size);
@@ -59,7 +60,7 @@ TEST(Grey, WritesNothingForFormatsWithALumaPlane) {
     }
 }
 
-// All 2^24 colours.
+// Tests all 2^24 colours.
 TEST(Grey, IsWithinOneOfOpenCvForEveryColour) {
     const auto format = layout(ARHOST_PIXEL_FORMAT_BGR8, 4096, 4096);
     std::vector<std::uint8_t> bytes(format.byte_size);

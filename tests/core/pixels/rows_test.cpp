@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using test::FencedBytes;
 
-// A kernel with the bytes per two pixels of each input and the bytes per pixel of the output.
+// A kernel, the number of bytes that each input has per two pixels, and the number of output bytes per pixel.
 struct Kernel {
     std::string name;
     std::vector<std::size_t> bytes_per_2px;
@@ -39,7 +39,7 @@ void put(const Bgr &pixel, std::uint8_t *to) {
 
 std::vector<Kernel> kernels() {
     const YuvMatrix m = yuv_matrix(0.2126, 0.0722, true);
-    // The expected value of pixel i, written by `pixel(in, i, to)`.
+    // `pixel(in, i, to)` writes the expected value of pixel i to `to`.
     const auto each = [](std::size_t out_bytes, auto pixel) {
         return [=](const std::vector<const std::uint8_t *> &in, std::uint8_t *out, std::size_t count) {
             for (std::size_t i = 0; i < count; ++i)
@@ -129,7 +129,7 @@ std::vector<Kernel> kernels() {
 
 } // namespace
 
-// Inputs and output are enclosed by guard pages.
+// All input and output buffers are next to guard pages, so out-of-bounds accesses crash.
 TEST(Rows, MatchTheFormulasForEveryLengthAndAccessNoOtherBytes) {
     test::on_each_instruction_set([] {
         std::mt19937 random(1);
@@ -157,7 +157,8 @@ TEST(Rows, BlendEveryCombinationOfColoursAndAlpha) {
     test::on_each_instruction_set([] {
         Bytes a(3 * 256), b(4 * 256), out(3 * 256), expected(3 * 256);
         for (std::size_t i = 0; i < 256; ++i)
-            b[4 * i + 3] = static_cast<std::uint8_t>(i); // all alphas in a row, so that no chunk is uniform
+            b[4 * i + 3] = static_cast<std::uint8_t>(
+                i); // consecutive alphas, so that no chunk is uniformly transparent or opaque
         for (int ca = 0; ca < 256; ++ca)
             for (int cb = 0; cb < 256; ++cb) {
                 std::fill(a.begin(), a.end(), static_cast<std::uint8_t>(ca));

@@ -139,8 +139,8 @@ TEST_F(Access, WarnsIfAnOutputMayWriteToHomeOrTheWorkingDirectory) {
     };
     const std::string home = fs::canonical(std::getenv("HOME")).string();
     EXPECT_THAT(warning(home + "/film.mp4"),
-                HasSubstr("run.yaml:1:7: path: 'my_sink' can write all of '" + home + "'"));
-    EXPECT_THAT(warning("film.mp4"), HasSubstr("give it its own folder, as in 'path: output/film.mp4'"));
+                HasSubstr("run.yaml:1:7: path: 'my_sink' may write to everything in and below '" + home + "'"));
+    EXPECT_THAT(warning("film.mp4"), HasSubstr("give this output its own folder, as in 'path: output/film.mp4'"));
     EXPECT_THAT(warning("/film.mp4"), HasSubstr("all of '/'"));
     EXPECT_EQ(warning("out/film.mp4"), "");
     EXPECT_EQ(warning((folder / "film.mp4").string()), "");

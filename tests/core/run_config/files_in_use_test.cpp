@@ -20,7 +20,7 @@ struct FilesInUseTest : testing::Test {
         std::ofstream(folder / name) << "x";
         return folder / name;
     }
-    // The error for an output of that path in a run that reads `input`, or "".
+    // Returns the error for an output with this path in a run that reads `input`; "" if there is none.
     std::string refusal(const std::string &input, const std::string &output) const {
         FilesInUse files;
         files.read_numbered(folder / input);
@@ -76,7 +76,7 @@ TEST_F(FilesInUseTest, RecognisesTheFilesOfAPattern) {
     EXPECT_NE(refusal("f-0001.png", "f-%04d.png"), "");
     fs::create_hard_link(folder / "f-0001.png", folder / "g-7.png");
     EXPECT_NE(refusal("f-%04d.png", "g-%d.png"), "");
-    // Files that the pattern does not match, or that do not exist yet.
+    // Names that the pattern does not match, and names of files that do not exist yet.
     for (const char *other : {"f-%d.png", "f-%03d.png", "f-%05d.png", "f-000%%1.png", "f-%04d.jpg", "f-%x.png",
                               "f-0002.png", "f_%04d.png", "g-8.png", "f.%04d.png"})
         EXPECT_EQ(refusal("f-%04d.png", other), "") << other;
@@ -84,9 +84,9 @@ TEST_F(FilesInUseTest, RecognisesTheFilesOfAPattern) {
     EXPECT_NE(refusal("f-%.png", "f-%.png"), "");
     file("f-0.png");
     EXPECT_NE(refusal("f-0.png", "f-%01d.png"), "");
-    EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "no digit left to match";
+    EXPECT_EQ(refusal("f-0.png", "f-0%d.png"), "") << "the pattern needs at least one more digit";
     file("100%f-12345.png");
-    EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "more than the minimum digits";
+    EXPECT_NE(refusal("100%f-12345.png", "100%%f-%04d.png"), "") << "numbers may have more digits than the minimum";
 }
 
 TEST_F(FilesInUseTest, ExpandsPatternsOnlyWhereTheyAreExpected) {
@@ -104,7 +104,7 @@ TEST_F(FilesInUseTest, AcceptsOnlyOneNumberInAPattern) {
     for (int i = 0; i < 100; ++i)
         numbers += "%d";
     file(std::string(200, '1') + ".png");
-    EXPECT_EQ(refusal("other.png", numbers + ".jpg"), "") << "and quickly";
+    EXPECT_EQ(refusal("other.png", numbers + ".jpg"), "") << "and the comparison must be fast";
 }
 
 TEST_F(FilesInUseTest, AcceptsPatternsInMissingFolders) {
@@ -115,7 +115,7 @@ TEST_F(FilesInUseTest, AcceptsPatternsInMissingFolders) {
 TEST_F(FilesInUseTest, RecognisesFilesOfOtherOutputs) {
     FilesInUse files;
     files.write(node("a.mp4"));
-    EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output writes '"));
+    EXPECT_THAT(error_of([&] { files.write(node("./a.mp4")); }), HasSubstr("another output already writes '"));
     file("f-0001.png");
     fs::create_hard_link(folder / "f-0001.png", folder / "f-0002.png");
     EXPECT_EQ(error_of([&] { files.write(node("f-%04d.png")); }), "")

@@ -364,7 +364,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
               "s.yaml:2:7: axes: 'zup' is not one of z-up, y-up; did you mean 'z-up'?");
     EXPECT_EQ(error_of("version: 1\naxes: z-up\nmaterial: {}\n"),
               "s.yaml:3:11: material: unknown key; did you mean 'materials'?");
-    EXPECT_EQ(error_of(start + "max_depth: 101\n"), "s.yaml:5:12: max_depth: must be 0 to 100, is 101");
+    EXPECT_EQ(error_of(start + "max_depth: 101\n"), "s.yaml:5:12: max_depth: must be 0 to 100, but is 101");
     EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
               "s.yaml:6:10: objects: duplicate key; keep one of them");
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
@@ -374,7 +374,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
               "metallic-roughness; did you mean "
               "'diffuse'?");
     EXPECT_EQ(error_of(start + "  red: {model: mirror, diffuse: 1}\n"),
-              "s.yaml:5:33: materials.red.diffuse: unknown key; known here: model, reflectivity");
+              "s.yaml:5:33: materials.red.diffuse: unknown key; known keys: model, reflectivity");
     EXPECT_EQ(
         error_of(start + "  red: {model: diffuse, diffuse: '#ff00'}\n"),
         "s.yaml:5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, "
@@ -386,7 +386,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
         "s.yaml:5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, "
         "0 to 1)");
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0], intensity: 1}\n"),
-              "s.yaml:6:16: lights[0].position: must be a list of 3 numbers, has 2");
+              "s.yaml:6:16: lights[0].position: must be a list of 3 numbers, but has 2");
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2e9], intensity: 1}\n"),
               "s.yaml:6:16: lights[0].position: must be within 1e9 mm");
     EXPECT_EQ(error_of(start + "lights:\n  - {position: [0, 0, 2], intensity: -1}\n"),

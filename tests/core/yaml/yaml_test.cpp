@@ -30,9 +30,9 @@ Node sample() {
 
 TEST(Yaml, ErrorsNameFileLineColumnAndKey) {
     EXPECT_EQ(error_of([] { sample().require("tracker").require("side_mm").real(0); }),
-              "lab.yaml:3:12: tracker.side_mm: must be at least 0, is -3");
+              "lab.yaml:3:12: tracker.side_mm: must be at least 0, but is -3");
     EXPECT_EQ(error_of([] { sample().require("tracker").require("ids").reals(); }),
-              "lab.yaml:4:12: tracker.ids[1]: must be a number, is 'x'");
+              "lab.yaml:4:12: tracker.ids[1]: must be a number, but is 'x'");
 }
 
 TEST(Yaml, SuggestsTheNearestKeyForAnUnknownOne) {
@@ -41,7 +41,7 @@ TEST(Yaml, SuggestsTheNearestKeyForAnUnknownOne) {
                   node.allow_keys({"tracker", "source"});
               }),
               "a.yaml:1:9: traker: unknown key; did you mean 'tracker'?");
-    EXPECT_THAT(error_of([&] { node.allow_keys({"source", "mode"}); }), HasSubstr("known here: source, mode"));
+    EXPECT_THAT(error_of([&] { node.allow_keys({"source", "mode"}); }), HasSubstr("known keys: source, mode"));
 }
 
 TEST(Yaml, RejectsDuplicateKeys) {
@@ -56,14 +56,14 @@ TEST(Yaml, SyntaxErrorsNameTheirPosition) {
 
 TEST(Yaml, RejectsASecondDocument) {
     EXPECT_THAT(error_of([] { Node::parse("a: 1\n---\nb: 2\n", "a.yaml"); }),
-                HasSubstr("a.yaml:2:1: YAML syntax: a second document starts here; keep one"));
+                HasSubstr("a.yaml:2:1: YAML syntax: a second document starts here; the file must contain only one"));
     // Content after the end of a document.
     EXPECT_THAT(error_of([] { Node::parse("[1, 2], 3\n", "a.yaml"); }),
                 HasSubstr("a.yaml:1:7: YAML syntax: a second"));
     EXPECT_THAT(error_of([] { Node::parse(",", "a.yaml"); }), HasSubstr("a.yaml:1:1: YAML syntax: a second"));
 }
 
-// yaml-cpp accepts the end of the text as the closing quote, which would swallow the keys in between.
+// yaml-cpp accepts the end of the text as the closing quote; all keys after the opening quote would be lost silently.
 TEST(Yaml, RejectsUnterminatedQuotes) {
     const auto error = [](const std::string &text) { return error_of([&] { Node::parse(text, "a.yaml"); }); };
     const std::string why = "YAML syntax: this quoted value is not terminated";
@@ -118,7 +118,7 @@ TEST(Yaml, TruncatesLongValuesInMessages) {
     const std::string error =
         error_of([] { Node::parse("a: " + std::string(3'000'000, 'x'), "a.yaml").require("a").real(); });
     EXPECT_LT(error.size(), 300u);
-    EXPECT_THAT(error, HasSubstr("must be a number, is 'xxx"));
+    EXPECT_THAT(error, HasSubstr("must be a number, but is 'xxx"));
 }
 
 TEST(Yaml, ReportsWhyAFileCantBeRead) {
@@ -138,10 +138,10 @@ TEST(Yaml, OverridesValuesFromTheCommandLine) {
     EXPECT_EQ(node.require("outputs").items()[0].require("path").text(), "b.mp4");
     EXPECT_EQ(node.require("raytracer").require("options").require("samples").integer(), 4);
     EXPECT_EQ(error_of([&] { node.require("raytracer").require("options").require("samples").integer(8, 16); }),
-              "--set: raytracer.options.samples: must be 8 to 16, is 4");
-    EXPECT_THAT(error_of([&] { node.override_value("mode.x", "1"); }), HasSubstr("the value above 'x' is a scalar"));
+              "--set: raytracer.options.samples: must be 8 to 16, but is 4");
+    EXPECT_THAT(error_of([&] { node.override_value("mode.x", "1"); }), HasSubstr("the parent of 'x' is a scalar"));
     EXPECT_THAT(error_of([&] { node.override_value("outputs[7].path", "1"); }),
-                HasSubstr("not an index of a list of 1"));
+                HasSubstr("not a valid index; the number of elements in the list is 1"));
 }
 
 TEST(Yaml, ErrorsNameTheOverridingOption) {
@@ -151,9 +151,9 @@ TEST(Yaml, ErrorsNameTheOverridingOption) {
     const Node output = node.require("outputs").items()[0];
     EXPECT_EQ(output.require("path").text(), "c: [d]");
     EXPECT_EQ(error_of([&] { output.require("path").integer(); }),
-              "--path: outputs[0].path: must be a whole number, is 'c: [d]'");
+              "--path: outputs[0].path: must be a whole number, but is 'c: [d]'");
     EXPECT_EQ(error_of([&] { output.require("fps").integer(4, 5); }),
-              "--output: outputs[0].fps: must be 4 to 5, is 3");
+              "--output: outputs[0].fps: must be 4 to 5, but is 3");
 }
 
 TEST(Yaml, ResolvesPathsRelativeToTheirFile) {
@@ -185,23 +185,24 @@ TEST(Yaml, KeepsPathsAbsoluteAfterABrokenLink) {
 
 TEST(Yaml, RejectsNumbersThatUnderflow) {
     const Node node = Node::parse("a: 1e-999\nb: -0." + std::string(400, '0') + "1\nc: 1e-300\n", "a.yaml");
-    EXPECT_EQ(error_of([&] { node.require("a").real(); }), "a.yaml:1:4: a: must not be that close to 0, is 1e-999");
+    EXPECT_EQ(error_of([&] { node.require("a").real(); }), "a.yaml:1:4: a: must not be so close to 0, but is 1e-999");
     EXPECT_EQ(error_of([&] { node.require("a").real(0.01, 1e6); }),
-              "a.yaml:1:4: a: must not be that close to 0, 0.01 to 1e+06, is 1e-999");
-    EXPECT_THAT(error_of([&] { node.require("b").real(); }), HasSubstr("must not be that close to 0, is -0.0"));
+              "a.yaml:1:4: a: must not be so close to 0, 0.01 to 1e+06, but is 1e-999");
+    EXPECT_THAT(error_of([&] { node.require("b").real(); }), HasSubstr("must not be so close to 0, but is -0.0"));
     EXPECT_EQ(node.require("c").real(), 1e-300);
 }
 
 TEST(Yaml, RejectsNumbersThatAreNotFinite) {
     const Node node = Node::parse("a: .nan\nb: 1e999\nc: inf\nd: +2.5\ne: -.Inf\nf: .5\ng: .info\n", "a.yaml");
-    EXPECT_EQ(error_of([&] { node.require("a").real(); }), "a.yaml:1:4: a: must be a finite number, is .nan");
+    EXPECT_EQ(error_of([&] { node.require("a").real(); }), "a.yaml:1:4: a: must be a finite number, but is .nan");
     EXPECT_EQ(error_of([&] { node.require("a").real(0, 10'000); }),
-              "a.yaml:1:4: a: must be a finite number, 0 to 10000, is .nan");
+              "a.yaml:1:4: a: must be a finite number, 0 to 10000, but is .nan");
     EXPECT_EQ(error_of([&] { node.require("c").real(0); }),
-              "a.yaml:3:4: c: must be a finite number, at least 0, is inf");
+              "a.yaml:3:4: c: must be a finite number, at least 0, but is inf");
     for (const char *key : {"b", "e"})
-        EXPECT_THAT(error_of([&] { node.require(key).real(); }), HasSubstr("must be a finite number, is ")) << key;
-    EXPECT_EQ(error_of([&] { node.require("g").real(); }), "a.yaml:7:4: g: must be a number, is '.info'");
+        EXPECT_THAT(error_of([&] { node.require(key).real(); }), HasSubstr("must be a finite number, but is "))
+            << key;
+    EXPECT_EQ(error_of([&] { node.require("g").real(); }), "a.yaml:7:4: g: must be a number, but is '.info'");
     EXPECT_EQ(node.require("d").real(), 2.5);
     EXPECT_EQ(node.require("f").real(), 0.5);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Negotiates successfully but returns no plugin. */
+/* A plugin that negotiates successfully but does not return a descriptor. */
 #include <arhost/arhost.h>
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Crashes while it is loaded. */
+/* A library that crashes in a constructor, while it is being loaded. */
 #include <arhost/arhost.h>
 #include <signal.h>
 

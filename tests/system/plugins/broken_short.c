@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Its arhost_entry has a struct_size that is too small. */
+/* A plugin whose arhost_entry has a struct_size that is too small. */
 #include <arhost/arhost.h>
 
 ARHOST_EXPORT const arhost_entry_point arhost_entry = {4, 0};

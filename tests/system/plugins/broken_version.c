@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Selects an ABI version that was not offered. */
+/* A plugin that selects an ABI version that the host did not offer. */
 #include <arhost/arhost.h>
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

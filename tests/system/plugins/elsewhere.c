@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A library, and (with USER) a library in another folder that is linked with it. */
+/* Without USER: a library. With USER: a library in another folder that links to the first one. */
 int elsewhere(void);
 #ifdef USER
 int uses_elsewhere(void);

@@ -22,7 +22,7 @@ namespace arhost::test {
         option(ARHOST_OPTION_INTEGER, "hang_at", "-1", "Never returns from this frame; -1: never"),                  \
         option(ARHOST_OPTION_BOOL, "ignore_abort", "false", "Ignores SIGABRT"),                                      \
         option(ARHOST_OPTION_INTEGER, "error_at", "-1", "Returns an error for this frame; -1: never"),               \
-        option(ARHOST_OPTION_INTEGER, "error", "-8", "Status of that error"),                                        \
+        option(ARHOST_OPTION_INTEGER, "error", "-8", "Status to return with error_at"),                              \
         option(ARHOST_OPTION_INTEGER, "close_control_at", "-1", "Closes descriptor 3 at this frame; -1: never"),     \
         option(ARHOST_OPTION_INTEGER, "fork_at", "-1", "Forks two children, listed in children.txt; -1: never"),     \
         option(ARHOST_OPTION_REAL, "delay_ms", "0", "Delay per frame, in ms", 0, 60000)
@@ -42,8 +42,8 @@ public:
     void at(std::uint64_t sequence) const {
         const auto frame = static_cast<std::int64_t>(sequence);
         if (frame == crash_at_) {
-            (void)!::write(STDERR_FILENO, "last words: \xff\xc3(\n", 16); // not UTF-8
-            std::signal(SIGSEGV, SIG_DFL);                                // sanitizers install a handler
+            (void)!::write(STDERR_FILENO, "last words: \xff\xc3(\n", 16); // text that is not valid UTF-8
+            std::signal(SIGSEGV, SIG_DFL); // removes the handler that sanitizers install
             std::raise(SIGSEGV);
         }
         if (frame == exit_at_)
@@ -61,7 +61,7 @@ public:
     }
 
 private:
-    // One in this process group, and one in a new session, like a daemon.
+    // Creates two child processes: one in this process group, and one in a new session, like a daemon.
     static void leave_children() {
         std::string pids;
         for (const bool daemon : {false, true}) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A working tracker that attempts an attack at one frame. Logs each attempt as "NAME: what: stopped" or
- * "NAME: what: SUCCEEDED"; attacks that succeed do bounded harm.
+ * A working tracker that attempts one kind of attack at one frame. It logs each attempt as "NAME: what: stopped" or
+ * "NAME: what: SUCCEEDED"; the harm of attacks that succeed is limited.
  */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -45,7 +45,7 @@ static void report(const tracker *self, const char *what, int succeeded) {
     self->host->log(self->host, ARHOST_SEVERITY_INFO, text);
 }
 
-/* The host's pid, given by the test; the worker's parent is the launcher. */
+/* Returns the host's pid, which the test provides: getppid() would return the launcher's pid. */
 static pid_t host_pid(void) {
     const char *text = getenv("HOSTILE_HOST");
     return text ? (pid_t)atoi(text) : getppid();
@@ -68,7 +68,7 @@ static void read_files(const tracker *self) {
     report(self, "the host's addresses", opens(file, O_RDONLY));
 }
 
-/* Each with its own names, so that one success does not affect the next attempt. */
+/* Each attempt uses a different file name, so that a successful attempt does not affect the next one. */
 static void write_files(const tracker *self) {
     char other[1100];
     report(self, "an old file", opens(self->target, O_WRONLY));
@@ -84,7 +84,7 @@ static void write_files(const tracker *self) {
     report(self, "unlink", unlink(strcat(strcpy(other, self->target), ".other")) == 0);
 }
 
-/* Those that exist on this machine. */
+/* Tries to open the devices that exist on this machine. */
 static void open_devices(const tracker *self) {
     const char *const devices[] = {"/dev/ptmx", "/dev/kmsg", "/dev/fuse", "/dev/mem", "/dev/loop0", "/dev/video0"};
     size_t i;
@@ -106,12 +106,12 @@ static void read_environment(const tracker *self) {
     char file[64];
     errno = ENOENT;
     report(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
-    report(self, "where it was in memory", file_has("/proc/self/environ", "HOSTILE_SECRET="));
+    report(self, "the initial environment", file_has("/proc/self/environ", "HOSTILE_SECRET="));
     snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
-    report(self, "the launcher's", file_has(file, "HOSTILE_SECRET="));
+    report(self, "the launcher's environment", file_has(file, "HOSTILE_SECRET="));
 }
 
-/* The test listens on a path and on an abstract name. */
+/* Connects to a Unix socket. The test listens on a path and on an abstract name. */
 static int connects(const tracker *self, int is_abstract) {
     struct sockaddr_un address = {AF_UNIX, {0}};
     const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
@@ -131,7 +131,7 @@ static void open_sockets(const tracker *self) {
     report(self, "netlink", socket(AF_NETLINK, SOCK_RAW, 0) >= 0);
     report(self, "packets", socket(AF_PACKET, SOCK_RAW, 0) >= 0);
     report(self, "virtual machines", socket(AF_VSOCK, SOCK_STREAM, 0) >= 0);
-    report(self, "a family with upper bits", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
+    report(self, "a family with upper bits set", syscall(SYS_socket, 0x100000000l | AF_INET, SOCK_STREAM, 0) >= 0);
     report(self, "a path", connects(self, 0));
     report(self, "an abstract name", connects(self, 1));
     report(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
@@ -151,7 +151,7 @@ static void make_processes(const tracker *self) {
     }
     report(self, "fork", made > 0);
     report(self, "a namespace", unshare(CLONE_NEWUSER) == 0);
-    execv("/bin/true", arguments); /* on success the worker ends */
+    execv("/bin/true", arguments); /* does not return on success */
     report(self, "exec", 0);
 }
 
@@ -193,7 +193,7 @@ static void signal_host(const tracker *self) {
     report(self, "a processor", sched_setaffinity(host_pid(), sizeof processor, &processor) == 0);
 }
 
-/* With `allow: [processes]`: a child has the same restrictions, and may be signalled. */
+/* Used with `allow: [processes]`: a child has the same restrictions as the plugin, and the plugin may signal it. */
 static void signal_from_a_child(const tracker *self) {
     int status = 0;
     const pid_t child = fork();
@@ -260,7 +260,7 @@ static void fill_disk(const tracker *self) {
     }
 }
 
-/* As many as possible, open and in unread messages. */
+/* Keeps as many descriptors as possible: open ones, and ones in unread messages. */
 static void hold_descriptors(const tracker *self) {
     enum { pairs = 20 };
     struct rlimit limit;
@@ -326,7 +326,8 @@ static void note_memory(const tracker *self, void *bytes, size_t size, int writa
         memories[memory_count++] = (memory){bytes, size / sizeof(uint32_t)};
 }
 
-/* Each word is sometimes valid, so that it may change between check and use by the host. */
+/* Changes each word between valid and invalid values, so that a word may change between the host's check and its use.
+ */
 static void *race(void *unused) {
     uint32_t flip = 1;
     size_t i, j, twice;
@@ -351,10 +352,11 @@ static void truncate_one(const tracker *self, void *bytes, size_t size, int writ
     fd = open(file, O_RDWR | O_CLOEXEC);
     report(self, "open and truncate", fd >= 0 && ftruncate(fd, 0) == 0);
     if (writable)
-        madvise(bytes, size, MADV_REMOVE); /* a hole reads as zeros: harmless, but a contract violation */
+        madvise(bytes, size,
+                MADV_REMOVE); /* reading a hole returns zeros, which is harmless, but a contract violation */
 }
 
-/* Makes the host check the rings now; an answer would repair the positions. */
+/* Makes the host check the rings now, before a response corrects the ring positions. */
 static void trigger_check(void) {
     (void)!send(doorbell, "", 1, MSG_NOSIGNAL);
     for (;;)
@@ -461,7 +463,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
         return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
     self->host = host;
     snprintf(self->attack, sizeof self->attack, "%s", arhost_find_option(options, option_count, "attack")->text);
-    /* Only the base name: a path option would grant access. */
+    /* The option has only the base name, because an option with the full path would grant access. */
     snprintf(self->target, sizeof self->target, "%s/%s", getenv("HOSTILE_FOLDER"),
              arhost_find_option(options, option_count, "target_file")->text);
     self->at = arhost_find_option(options, option_count, "at")->integer;
@@ -480,7 +482,7 @@ static arhost_status start(arhost_instance *self, const arhost_tracker_setup *se
     return ARHOST_STATUS_OK;
 }
 
-/* Like tracker_counter: reports a marker at 500 mm plus the frame number. */
+/* Like tracker_counter, reports a marker at a distance of 500 mm plus 1 mm times the frame number. */
 static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
     const int number = frame->plane[0][0] + 256 * frame->plane[0][1];
     arhost_marker *marker = &result->markers[0];
@@ -502,9 +504,9 @@ static void stop(arhost_instance *self) {
 }
 
 static const arhost_option_descriptor options[] = {
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "The attack"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "target_file", "target", 0, 0, NULL, "Its target"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "at", "20", 0, 0, NULL, "At this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "Name of the attack"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "target_file", "target", 0, 0, NULL, "File to attack"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "at", "20", 0, 0, NULL, "Attacks at this frame"},
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_TRACKER,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A plugin that only lists devices (arhost/devices.h). LIST: the function that does so; ID: the plugin's id. */
+/* A plugin that can only list devices (arhost/devices.h). Macros: LIST is the function that lists them, ID the
+ * plugin's id. */
 #define _GNU_SOURCE
 #include <arhost/arhost.h>
 
@@ -44,7 +45,7 @@ static inline arhost_status list_broken(const arhost_host *host, arhost_take_dev
     report(take, context, 0, NULL, NULL);
     return ARHOST_STATUS_OK;
 }
-/* 10,000 devices with texts of 1 MiB: quotation marks, whose JSON form is longest. */
+/* Lists 10,000 devices with texts of 1 MiB. The texts consist of quotation marks, which JSON must escape. */
 static inline arhost_status list_many(const arhost_host *host, arhost_take_device take, void *context) {
     const size_t size = 1 << 20;
     char *text = malloc(size + 1);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Faults that tools/faults injects: SIGRTMIN carries a number whose low byte selects the fault (enum misbehaviour) of
- * the next frame; the other bytes are a seed. If several signals arrive before a frame, the last one counts.
+ * Faults that tools/faults injects. It sends SIGRTMIN with a number: the low byte selects the fault at the next frame
+ * (enum misbehaviour), the other bytes are a seed. If several signals arrive before a frame, the last one is used.
  */
 #ifndef ARHOST_TEST_MISBEHAVE_H
 #define ARHOST_TEST_MISBEHAVE_H
@@ -20,19 +20,19 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Same order as in tools/faults. */
+/* The order must be the same as in tools/faults. */
 enum misbehaviour {
     MISBEHAVE_CRASH = 1,
     MISBEHAVE_EXIT,
-    MISBEHAVE_HANG,        /* forever; ignores SIGABRT if the seed is odd */
-    MISBEHAVE_SLOW,        /* a late reply, but within the deadline */
-    MISBEHAVE_ERROR,       /* an error status for the frame */
-    MISBEHAVE_MESSAGE,     /* malformed messages to the host */
-    MISBEHAVE_PASS,        /* messages of all kinds with descriptors */
-    MISBEHAVE_RING,        /* garbage in the memory shared with the host */
+    MISBEHAVE_HANG,        /* never returns; ignores SIGABRT if the seed is odd */
+    MISBEHAVE_SLOW,        /* responds late, but within the timeout */
+    MISBEHAVE_ERROR,       /* returns an error status for the frame */
+    MISBEHAVE_MESSAGE,     /* sends malformed messages to the host */
+    MISBEHAVE_PASS,        /* sends messages of all types, with file descriptors */
+    MISBEHAVE_RING,        /* writes random data to the memory shared with the host */
     MISBEHAVE_DOORBELL,    /* floods the doorbell */
     MISBEHAVE_CLOSE,       /* closes the control channel */
-    MISBEHAVE_DESCRIPTORS, /* opens as many as possible until its end */
+    MISBEHAVE_DESCRIPTORS, /* opens as many file descriptors as possible and keeps them open */
     MISBEHAVE_MEMORY       /* allocates as much as possible, then frees it */
 };
 
@@ -107,7 +107,7 @@ static inline void misbehave_message(uint32_t seed, int with_descriptors) {
     misbehave_send(garbage, sizeof garbage, with_descriptors);
 }
 
-/* Corrupts the page with the rings only; image contents are up to the plugin. */
+/* Corrupts only the page that contains the rings, because a plugin may write anything to images. */
 static inline void misbehave_scribble(uint32_t seed) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[512], mode[8];
@@ -129,7 +129,7 @@ static inline void misbehave_scribble(uint32_t seed) {
                 words[misbehave_random(&seed) % count] = misbehave_random(&seed);
                 break;
             case 2:
-                words[8] += 1 + misbehave_random(&seed) % 20; /* number of results: see WorkerPage */
+                words[8] += 1 + misbehave_random(&seed) % 20; /* number of results; see struct WorkerPage */
                 break;
             default:
                 madvise(words, end - begin, MADV_REMOVE);
@@ -166,7 +166,7 @@ static inline void misbehave_fill_memory(void) {
     }
 }
 
-/* To be called for each frame; returns non-zero if the frame must fail. */
+/* Must be called once per frame. Returns non-zero if the plugin must return an error for the frame. */
 static inline int misbehave_if_requested(void) {
     const uint32_t request = (uint32_t)misbehave_request;
     const uint32_t seed = request >> 8;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* As if built against newer headers with larger option descriptors. */
+/* A plugin as if built with newer headers, in which option descriptors are larger. */
 #include <arhost/arhost.h>
 
 struct grown {
@@ -18,7 +18,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              "0.1.0",
                                              "arhost",
                                              "Apache-2.0",
-                                             "Has long options, for tests.",
+                                             "Has larger option descriptors, for tests.",
                                              0,
                                              sizeof options / sizeof *options,
                                              &options[0].option,

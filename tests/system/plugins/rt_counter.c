@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A ray tracer in plain C. Draws a square of 16 px in the top left corner whose colour is the frame number, derived
- * from the camera's distance: R and G are the low and high byte. Option writes_later: also writes into the previous
- * image.
+ * A ray tracer in plain C. Draws a square of 16 px in the top left corner. The colour of the square is the frame
+ * number, which is derived from the camera's distance: R and G are its low and high byte. With the option
+ * writes_later, the plugin also writes to the previous image, which the ABI forbids.
  */
 #include "misbehave.h"
 
@@ -63,7 +63,7 @@ static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *
     return setup->scene->magic == ARHOST_SCENE_MAGIC ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
 }
 
-/* Returns whether the host has cancelled. */
+/* Waits as the option delay_ms requests. Returns whether the host has cancelled the call. */
 static int wait_or_cancel(const arhost_instance *self) {
     double left_ms = self->delay_ms;
     while (left_ms > 0 && !self->host->cancelled(self->host)) {
@@ -115,17 +115,19 @@ static void stop(arhost_instance *self) {
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Crashes at this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_until", "-1", 0, 0, NULL,
-     "Nor from later frames before this one"},
+     "Also hangs at later frames before this one; -1: none"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL,
-     "Never returns from this frame"},
+     "Never returns from this frame; -1: never"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
      "Returns an error for this frame"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL, "Status of that error"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL, "Status of each frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL,
+     "Status to return with error_at"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL,
+     "Status to return for each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 600000, NULL,
      "Delay per frame, in ms"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
-     "Also writes into the previous image"},
+     "Also writes to the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
      "Reported device time; negative values wrap to huge ones"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},

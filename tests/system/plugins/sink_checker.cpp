@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Checks every pixel and the order of the counting plugins' frames. The file PATH has one line that is always
-// complete and survives restarts: number of the next frame, frames so far, frames with an overlay, wrong frames, and
-// the time of the last frame (ns, CLOCK_MONOTONIC). PATH.wrong describes the errors.
+// A sink that checks every pixel and the order of the frames of the *_counter plugins. The file PATH contains one
+// line, which is always complete and survives restarts: number of the next frame, number of frames so far, of frames
+// with an overlay and of wrong frames, and the time of the last frame (ns, CLOCK_MONOTONIC). PATH.wrong describes the
+// errors.
 #include "faults.hpp"
 
-#ifndef ID // sink_suspect is the same plugin, as a target for tools/faults
+#ifndef ID // sink_suspect is the same plugin with another id; tools/faults injects faults into it
 #define ID "sink_checker"
 #endif
 
@@ -37,7 +38,7 @@ public:
         if (::pread(file_, line.data(), line.size() - 1, 0) > 0)
             std::sscanf(line.data(), "%" SCNu64 " %" SCNu64 " %" SCNu64 " %" SCNu64, &next_, &frames_, &overlaid_,
                         &wrong_);
-        // A frame that was written but not confirmed is repeated; a skipped frame is an error.
+        // The host sends a frame again if it was written but not confirmed. A skipped frame is an error.
         if (setup.first_sequence > next_ && !gaps_)
             report(setup.first_sequence, "follows a frame that was not written");
         frames_ -= next_ > setup.first_sequence ? next_ - setup.first_sequence : 0;
@@ -66,7 +67,7 @@ public:
     }
 
 private:
-    // The overlay is a 16 px square in the corner.
+    // Returns whether all pixels are correct. The overlay is a square of 16 px in the top left corner.
     static bool is_correct(const arhost_output &output, bool has_overlay) {
         const auto low = static_cast<std::uint8_t>(output.record->sequence),
                    high = static_cast<std::uint8_t>(output.record->sequence >> 8);
@@ -94,7 +95,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The file with the line"),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "File for the results"),
     option(ARHOST_OPTION_BOOL, "gaps", "false", "Frames may be skipped, as in mode live"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,

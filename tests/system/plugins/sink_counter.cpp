@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writes a line per frame: its number, the number in the video's pixels, and the one in the overlay's pixels or
-// "none". Writes PATH.done at the end. After a restart it keeps the complete lines before first_sequence.
+// A sink that writes one line per frame: the frame number, the number encoded in the video's pixels, and the number
+// encoded in the overlay's pixels (or "none"). Writes PATH.done at the end. After a restart, keeps the complete lines
+// of the frames before first_sequence.
 #include "faults.hpp"
 
-#ifndef ID // sink_realtime is the same plugin with a window's capability
+#ifndef ID // sink_realtime is the same plugin with the capability that window sinks have
 #define ID "sink_counter"
 #define CAPABILITIES 0
 #endif
@@ -35,7 +36,7 @@ public:
             std::ofstream(path_, std::ios::trunc) << std::flush;
             return;
         }
-        // A kill in between must not lose data.
+        // Writes a new file first, because no data must be lost if the plugin is killed here.
         std::ofstream(path_ + ".new", std::ios::trunc) << kept << std::flush;
         std::rename((path_ + ".new").c_str(), path_.c_str());
     }
@@ -45,7 +46,7 @@ public:
         const std::uint8_t *last = output.bgr + (output.height - 1) * output.stride + 3 * (output.width - 1);
         std::ostringstream line;
         line << output.record->sequence << ' ' << last[0] + 256 * last[1] << ' ';
-        if (output.bgr[0] == 170) // the overlay's blue
+        if (output.bgr[0] == 170) // the blue value of all overlay pixels
             line << output.bgr[2] + 256 * output.bgr[1];
         else
             line << "none";
@@ -69,7 +70,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The file"),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "Output file"),
     option(ARHOST_OPTION_INTEGER, "end_at", "-1", "Ends the run at this frame, like a closed window; -1: never"),
     option(ARHOST_OPTION_BOOL, "hang_in_stop", "false", "Never returns from stop"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),

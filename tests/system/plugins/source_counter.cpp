@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Frames whose pixels contain the frame number: B and G are the low and high byte, R is 85. Options make it write
-// into the previous frame or report capture times in the future.
+// A source whose frames encode the frame number in their pixels: B and G are the low and high byte, R is 85. With
+// some options, it writes to the previous frame or reports capture times in the future.
 #include "faults.hpp"
 
 #include <cstring>
@@ -85,7 +85,7 @@ private:
     std::uint64_t frames_, first_ = 0;
     std::uint32_t width_, height_;
     bool writes_later_;
-    std::uint8_t *last_ = nullptr; // the previous frame
+    std::uint8_t *last_ = nullptr; // buffer of the previous frame
     double ahead_ms_;
     std::int64_t ahead_at_, hold_at_;
     double fps_ = 30;
@@ -95,13 +95,14 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "frames", "100", "Number of frames"),
-    option(ARHOST_OPTION_INTEGER, "width", "64", "px", 1, 4096),
-    option(ARHOST_OPTION_INTEGER, "height", "48", "px", 1, 4096),
-    option(ARHOST_OPTION_BOOL, "writes_later", "false", "Also writes into the previous frame"),
+    option(ARHOST_OPTION_INTEGER, "width", "64", "Width, in px", 1, 4096),
+    option(ARHOST_OPTION_INTEGER, "height", "48", "Height, in px", 1, 4096),
+    option(ARHOST_OPTION_BOOL, "writes_later", "false", "Also writes to the previous frame"),
     option(ARHOST_OPTION_REAL, "ahead_ms", "0",
            "Reports capture times this far in the future, in ms; 0: media times"),
-    option(ARHOST_OPTION_INTEGER, "ahead_at", "-1", "Only at this frame, before any restart; -1: always"),
-    option(ARHOST_OPTION_INTEGER, "hold_at", "-1", "Hangs at this frame, before any restart; -1: never"),
+    option(ARHOST_OPTION_INTEGER, "ahead_at", "-1",
+           "Applies ahead_ms only to this frame, and not after a restart; -1: always"),
+    option(ARHOST_OPTION_INTEGER, "hold_at", "-1", "Hangs at this frame, but not after a restart; -1: never"),
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reads the frame number from the pixels, rejects a wrong one, and reports the first marker (or all) at a distance of
-// 500 mm plus that number.
+// A tracker that reads the frame number from the pixels and fails if it is wrong. Reports the first marker (or all
+// markers) at a distance of 500 mm plus 1 mm times the frame number.
 #include "faults.hpp"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ public:
     Counter(const Counter &) = delete;
     Counter &operator=(const Counter &) = delete;
 
-    // More messages than the host reads at a time.
+    // Sends more messages than the host reads at a time.
     void stop() {
         for (int i = 0; i < 100; ++i)
             host_.log(ARHOST_SEVERITY_DEBUG, "last words");
@@ -53,14 +53,14 @@ public:
             std::reverse(listed_.begin(), listed_.end());
         else
             listed_.resize(1);
-        if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // only before any restart
+        if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // the folder exists after a restart
             seal_output();
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
-        if (number != (frame.sequence & 0xffff)) // the pixels have two bytes
-            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the frame has a wrong number");
+        if (number != (frame.sequence & 0xffff)) // the pixels encode only two bytes
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the pixels contain the number of another frame");
         faults_.at(number);
         const auto signed_number = static_cast<std::int64_t>(number);
         if (signed_number >= lost_from_ && signed_number < lost_to_)
@@ -87,7 +87,8 @@ private:
         }
     }
 
-    // Speaks the worker's protocol until it receives the memory for its results, and seals that before the host does.
+    // Implements the worker's protocol until the plugin receives the memory for its results, and then seals this
+    // memory before the host does.
     void seal_output() const {
         constexpr int control = 3;
         const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
@@ -120,10 +121,10 @@ private:
 
 constexpr const char *seals[] = {"no", "seal", "write", nullptr};
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_TEXT, "seal", "no", "Seal to add to its shared memory", 0, 0, seals),
-    option(ARHOST_OPTION_BOOL, "reversed", "false", "Reports all markers, the last of the list first"),
-    option(ARHOST_OPTION_INTEGER, "lost_from", "0", "Reports no marker from this frame on"),
-    option(ARHOST_OPTION_INTEGER, "lost_to", "0", "until before this one"),
+    option(ARHOST_OPTION_TEXT, "seal", "no", "Seal to add to the plugin's shared memory", 0, 0, seals),
+    option(ARHOST_OPTION_BOOL, "reversed", "false", "Reports all markers, in the reverse order of the list"),
+    option(ARHOST_OPTION_INTEGER, "lost_from", "0", "First frame for which no marker is reported"),
+    option(ARHOST_OPTION_INTEGER, "lost_to", "0", "End of that range of frames, exclusive"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Crashes in destroy"),
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
     option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Number of steps in start, each reported as progress"),
