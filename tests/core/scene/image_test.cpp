@@ -147,9 +147,8 @@ TEST(Textures, ErrorsNameFileAndKey) {
         return Scene(name, content)
             .error_of("materials:\n  a: {model: diffuse, texture: " + name + "}\nobjects: []\n");
     };
-    EXPECT_EQ(error("a.png", "GIF89a"),
-              "s.yaml:4:32: materials.a.texture: a.png: its content is not PNG, JPEG, PPM, HDR or "
-              "EXR; convert it to one of them");
+    EXPECT_EQ(error("a.png", "GIF89a"), "s.yaml:4:32: materials.a.texture: a.png: is not a PNG, JPEG, PPM, HDR or "
+                                        "EXR; convert it to one of them");
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
     EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: cannot be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: cannot be loaded: "));

@@ -368,7 +368,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
               "s.yaml:6:10: objects: duplicate key; keep one of them");
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
-              "s.yaml:5:9: materials.grey: duplicate material; keep one of them");
+              "s.yaml:5:9: materials.grey: another material has the same name; rename or remove one of them");
     EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
               "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror, metal, glass, "
               "metallic-roughness; did you mean "
@@ -394,7 +394,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     EXPECT_EQ(error_of(start + "objects:\n  - {material: grey}\n"),
               "s.yaml:6:5: objects[0]: needs one of mesh, gltf, sphere, cuboid and plane");
     EXPECT_EQ(error_of(ball + ", cuboid: {size: 1}}\n"),
-              "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; split it into two objects");
+              "s.yaml:6:51: objects[0].cuboid: the object has a sphere ; split it into two objects");
     EXPECT_EQ(error_of(ball + "y}\n"),
               "s.yaml:6:37: objects[0].material: 'greyy' is not one of grey; did you mean 'grey'?");
     EXPECT_EQ(error_of(ball + ", smooth: true}\n"), "s.yaml:6:51: objects[0].smooth: is only allowed with 'mesh'");
@@ -419,9 +419,9 @@ TEST(SceneErrors, NameTheStepOfATransform) {
               "1e9; negative factors mirror");
     EXPECT_EQ(with("      - rotate: {axis: [0, 0, 0], degrees: 1}\n"),
               "s.yaml:9:24: objects[0].transform[0].rotate.axis: must have a length between 1e-9 and 1e9");
-    EXPECT_EQ(
-        with("      - {scale: 1, translate: [0, 0, 0]}\n"),
-        "s.yaml:9:9: objects[0].transform[0]: each step of a transform must be one of translate, scale and rotate");
+    EXPECT_EQ(with("      - {scale: 1, translate: [0, 0, 0]}\n"),
+              "s.yaml:9:9: objects[0].transform[0]: each step of a transform must have exactly one of the keys "
+              "translate, scale and rotate");
     EXPECT_EQ(with("      - scale: 1\n      - skale: 1\n"),
               "s.yaml:10:16: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
     EXPECT_EQ(with("      - scale: [1, 1, 2]\n"),

@@ -159,12 +159,12 @@ TEST(Obj, KeepsTexcoordsAndUsesZeroForCornersWithoutThem) {
 TEST(Obj, IgnoresNormalsIfOnlySomeFacesHaveThem) {
     const Loaded loaded = load_text("a.obj", three_vertices + "vn 0 0 1\nf 1 2 3\nf 1//1 2//1 3//1\n");
     EXPECT_TRUE(loaded.mesh.normals.empty());
-    EXPECT_EQ(loaded.info, "a.obj: only some faces have normals; ignores all of them; ");
+    EXPECT_EQ(loaded.info, "a.obj: only some faces have normals; all normals are ignored; ");
 }
 
 TEST(Obj, ReportsIgnoredMaterials) {
     EXPECT_EQ(load_text("a.obj", "mtllib a.mtl\n" + three_vertices + "f 1 2 3").info,
-              "a.obj: ignores its MTL materials; the scene file defines the materials; ");
+              "a.obj: the MTL materials are ignored; the scene file defines the materials; ");
 }
 
 TEST(Obj, ReadsSyntaxVariants) {
@@ -180,32 +180,33 @@ TEST(Obj, ReadsSyntaxVariants) {
 }
 
 TEST(Obj, ErrorsNameFileAndLine) {
-    EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, has 2");
+    EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, but has 2");
     EXPECT_EQ(error_of("a.obj", "\n\nv 0 x 0\n"), "a.obj:3: 'x' is not a number");
     EXPECT_EQ(error_of("a.obj", "v 0 1,5 0\n"), "a.obj:1: '1,5' is not a number");
-    EXPECT_EQ(error_of("a.obj", "v 0 nan 0\n"), "a.obj:1: a vertex has the number 'nan'");
-    EXPECT_EQ(error_of("a.obj", "v 0 0 1e99\n"), "a.obj:1: a vertex has the number '1e99'");
-    EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the number '-inf'");
-    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"), "a.obj:4: a face needs three corners, has 2");
+    EXPECT_EQ(error_of("a.obj", "v 0 nan 0\n"), "a.obj:1: a vertex has the invalid number 'nan'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 1e99\n"), "a.obj:1: a vertex has the invalid number '1e99'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the invalid number '-inf'");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"),
+              "a.obj:4: a face needs at least three corners, but this one has 2");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 4\n"),
-              "a.obj:4: a face refers to vertex 4, but 3 are defined above");
+              "a.obj:4: a face refers to vertex 4, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 -4\n"),
-              "a.obj:4: a face refers to vertex -4, but 3 are defined above");
+              "a.obj:4: a face refers to vertex -4, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 0 1 2\n"),
-              "a.obj:4: a face refers to vertex 0, but 3 are defined above");
+              "a.obj:4: a face refers to vertex 0, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1/1 2/1 3/1\n"),
-              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
+              "a.obj:4: a face refers to texcoord 1, but only 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "vn 0 0 1\nf 1//1 2//2 3//1\n"),
-              "a.obj:5: a face refers to normal 2, but 1 are defined above");
+              "a.obj:5: a face refers to normal 2, but only 1 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 x\n"), "a.obj:4: 'x' is not a corner of a face");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 3/1/1/1\n"),
-              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
+              "a.obj:4: a face refers to texcoord 1, but only 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 99999999999999999999\n"),
               "a.obj:4: '99999999999999999999' is not a corner of a face");
     EXPECT_EQ(error_of("a.obj", three_vertices), "a.obj: contains no triangles");
     EXPECT_EQ(error_of("a.obj", three_vertices + "l 1 2\n"),
               "a.obj: contains no triangles, only points, lines or curves");
-    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: contains no triangles, nor vertices");
+    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: contains no triangles, and no vertices");
 }
 
 TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
@@ -275,15 +276,16 @@ TEST(Ply, ReadsCarriageReturnLineEndings) {
 }
 
 TEST(Ply, HeaderErrorsNameFileAndLine) {
-    EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: a PLY file begins with a line 'ply', this one does not");
-    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header lacks end_header");
-    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header lacks a format");
+    EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: the first line must be 'ply'");
+    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header has no line 'end_header'");
+    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header has no line 'format'");
     EXPECT_EQ(error_of("a.ply", "ply\nformat utf8 1.0\nend_header\n"),
               "a.ply:2: the format 'utf8' is not ascii, binary_little_endian or binary_big_endian");
     EXPECT_EQ(error_of("a.ply", "ply\nformat ascii 2.0\n"), "a.ply:2: the format version is '2.0', not 1.0");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex -1\n"),
-              "a.ply:3: the element 'vertex' has the count '-1'");
-    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"), "a.ply:3: a property precedes the first element");
+              "a.ply:3: the element 'vertex' has the invalid count '-1'");
+    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"),
+              "a.ply:3: the header has a property before the first element");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty half x\n"),
               "a.ply:4: the property type 'half' is unknown");
     EXPECT_EQ(error_of("a.ply", ply_start + "element face 1\nproperty list float int vertex_indices\n"),
@@ -292,21 +294,21 @@ TEST(Ply, HeaderErrorsNameFileAndLine) {
               "a.ply: contains no triangles: the header has no element 'face' with a list 'vertex_indices'");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty float x\nelement face 1\n"
                                             "property list uchar int vertex_index\nend_header\n1\n3 0 0 0\n"),
-              "a.ply: the vertices lack x, y or z");
+              "a.ply: each vertex must have the properties x, y and z");
 }
 
 TEST(Ply, DataErrorsNameFileAndLine) {
     const std::string header = ply_start + ply_triangle_header; // lines 1 to 9
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n"),
-              "a.ply:11: vertex 1 has more values than properties");
+              "a.ply:11: vertex 1 has more values than the header declares properties");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: 'zero' is not a number");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"),
               "a.ply:11: vertex 1: 'y' is not finite");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-              "a.ply:13: face 0 refers to vertex 3, but 3 are defined above");
+              "a.ply:13: face 0 refers to vertex 3, but only 3 are defined");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"),
-              "a.ply:13: face 0 refers to vertex -1, but 3 are defined above");
+              "a.ply:13: face 0 refers to vertex -1, but only 3 are defined");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"), "a.ply:13: '1.5' is not an integer");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:13: face 0 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n\n\n"),
@@ -314,7 +316,7 @@ TEST(Ply, DataErrorsNameFileAndLine) {
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n4000000 0 1 2\n"),
               "a.ply:13: face 0: the list 'vertex_indices' has the length 4000000");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
-              "a.ply: contains no triangles: its faces have fewer than three corners");
+              "a.ply: contains no triangles: all faces have fewer than three corners");
 }
 
 TEST(Ply, BinaryDataErrorsNameTheByteOffset) {
@@ -323,11 +325,11 @@ TEST(Ply, BinaryDataErrorsNameTheByteOffset) {
     EXPECT_EQ(error_of("a.ply", whole.substr(0, whole.size() - 1)),
               "a.ply: byte " + std::to_string(whole.size() - 2) + ": face 0: the list 'unused' has the length 2");
     EXPECT_EQ(error_of("a.ply", whole.substr(0, header + 10)),
-              "a.ply: the header declares 3 elements 'vertex', but only 10 bytes are left for them");
+              "a.ply: the header declares 3 elements 'vertex', but the file has only 10 bytes for them");
     std::string wrong = whole;
     wrong[header + 3 * 15 + 1] = 77;
     EXPECT_EQ(error_of("a.ply", wrong), "a.ply: byte " + std::to_string(header + 3 * 15 + 3) +
-                                            ": face 0 refers to vertex 77, but 3 are defined above");
+                                            ": face 0 refers to vertex 77, but only 3 are defined");
 }
 
 TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
@@ -336,8 +338,8 @@ TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
             const std::string text = "ply\nformat " + format + " 1.0\nelement vertex " + count +
                                      "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
                                      "property list uchar int vertex_indices\nend_header\n0 0 0\n";
-            EXPECT_THAT(error_of("a.ply", text),
-                        HasSubstr("a.ply: the header declares " + count + " elements 'vertex', but only"));
+            EXPECT_THAT(error_of("a.ply", text), HasSubstr("a.ply: the header declares " + count +
+                                                           " elements 'vertex', but the file has only"));
         }
 }
 
@@ -367,7 +369,7 @@ TEST(MeshFile, GzipErrorsNameTheByteOffset) {
     damaged = packed;
     damaged[packed.size() - 6] ^= 1; // the checksum
     EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("incorrect data check"));
-    EXPECT_THAT(error_of("a.obj.gz", packed + "unused"), HasSubstr("not a gzip member"));
+    EXPECT_THAT(error_of("a.obj.gz", packed + "unused"), HasSubstr("a gzip header is expected here"));
     EXPECT_EQ(error_of("a.obj.gz", gzipped("")), "a.obj.gz: is empty");
 }
 
@@ -375,16 +377,17 @@ TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
     const std::string bomb = gzipped(std::string(20 << 20, '#'));
     MeshOptions options;
     options.byte_limit = 4 << 20;
-    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: uncompresses to more than the limit of 4 MiB");
+    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: its decompressed content exceeds the limit of 4 MiB");
     EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options), "a.obj: is 5 MiB large; the limit is 4 MiB");
 }
 
 TEST(MeshFile, OfAnUnsupportedFormatIsRejected) {
-    EXPECT_EQ(error_of("a.stl", "solid x\n"),
-              "a.stl: mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)");
-    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension cannot be loaded"));
-    EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is text in UTF-16; save it as UTF-8 or ASCII");
-    EXPECT_EQ(error_of("a.obj", ply_start), "a.obj: is a PLY file by its content; name it .ply");
+    EXPECT_EQ(error_of("a.stl", "solid x\n"), "a.stl: the format '.stl' is unsupported; convert the mesh to .obj or "
+                                              ".ply (optionally compressed: .obj.gz, .ply.gz)");
+    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: the file name has no extension"));
+    EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is UTF-16 text; save it as UTF-8 or ASCII");
+    EXPECT_EQ(error_of("a.obj", ply_start),
+              "a.obj: has the extension .obj but contains a PLY mesh; rename it to .ply");
     EXPECT_EQ(error_of("a.obj", ""), "a.obj: is empty");
 }
 
@@ -508,9 +511,9 @@ TEST_P(LoaderCases, YieldAMeshOrAClearError) {
 
 namespace {
 constexpr char no_stl[] =
-    ": mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": the format '.stl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
 constexpr char no_mtl[] =
-    ": mesh files '*.mtl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": the format '.mtl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
 constexpr char no_faces[] = ": contains no triangles: the header has no element 'face' with a list 'vertex_indices'";
 constexpr char only_lines[] = ": contains no triangles, only points, lines or curves";
 } // namespace
@@ -520,7 +523,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         LoaderCase{"Spider_ascii.stl", 0, 0, no_stl}, LoaderCase{"Spider_binary.stl", 0, 0, no_stl},
         LoaderCase{"Wuson.ply", 3732, 11184}, LoaderCase{"WusonOBJ.obj", 3732, 2117}, LoaderCase{"box.obj", 12, 8},
-        LoaderCase{"box_UTF16BE.obj", 0, 0, ": is text in UTF-16; save it as UTF-8 or ASCII"},
+        LoaderCase{"box_UTF16BE.obj", 0, 0, ": is UTF-16 text; save it as UTF-8 or ASCII"},
         LoaderCase{"box_longline.obj", 944, 8}, LoaderCase{"box_mat_with_spaces.obj", 12, 8},
         LoaderCase{"box_spaces.mtl", 0, 0, no_mtl}, LoaderCase{"box_without_lineending.obj", 12, 8},
         LoaderCase{"concave_polygon.mtl", 0, 0, no_mtl}, LoaderCase{"concave_polygon.obj", 64, 64},
