@@ -50,7 +50,7 @@ float *ball(Arena &a) {
     return elements<float>(a, geometries(a)[1].positions);
 }
 
-// All non-empty buffers of the small scene.
+// Returns all non-empty buffers of the small scene.
 std::vector<arhost_buffer *> buffers(Arena &a) {
     arhost_scene &scene = header(a);
     arhost_geometry *g = geometries(a);
@@ -344,7 +344,7 @@ TEST(Validate, RequiresSixteenReadableBytesAfterTheLastBuffer) {
     EXPECT_THAT(validate(arena.bytes()), HasSubstr("the table of geometries extends past the end"));
 }
 
-TEST(Validate, AcceptsLargerMemoryThanTheScene) { // a memfd is mapped in whole pages
+TEST(Validate, AcceptsLargerMemoryThanTheScene) { // because a memfd is mapped in whole pages
     Arena small = small_scene().build();
     Arena large(small.bytes().size() + 4096);
     std::memcpy(large.bytes().data(), small.bytes().data(), small.bytes().size());
@@ -538,7 +538,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "node_from_mesh is nan"}),
     [](const auto &info) { return std::string(info.param.field); });
 
-// Otherwise, a small arena could keep the host busy for hours.
+// If buffers could be shared, checking a small arena could keep the host busy for hours.
 TEST(Validate, RejectsGeometriesThatShareABuffer) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
@@ -587,7 +587,7 @@ TEST(Validate, ReadsBuffersOnlyWithinTheArena) {
                 }
 }
 
-// Any content yields a result without out-of-bounds reads (checked by the sanitizer builds).
+// For any content, validate() must return without reading out of bounds, which the sanitizer builds detect.
 TEST(Validate, SurvivesRandomBytes) {
     const Arena whole = full_scene().build();
     std::mt19937 random(1);
@@ -599,8 +599,8 @@ TEST(Validate, SurvivesRandomBytes) {
             arena.bytes()[random() % arena.bytes().size()] ^= std::byte(1 + random() % 255);
         const bool is_valid = validate(arena.bytes()).empty();
         rejected += !is_valid;
-        if (is_valid && arena.scene().duration_s > 0) // a valid arena must be safe to evaluate
+        if (is_valid && arena.scene().duration_s > 0) // evaluating a valid arena must be safe
             MotionEvaluator(arena.scene()).at(0.7);
     }
-    EXPECT_GT(rejected, 25000); // other flips hit spare bytes or keep the value valid
+    EXPECT_GT(rejected, 25000); // the remaining flips change spare bytes, or give another valid value
 }

@@ -32,10 +32,11 @@ std::string base64(const std::string &bytes) {
     return text;
 }
 
-// A glTF file with one buffer.
+// Builds a glTF file with one buffer.
 struct Gltf {
-    std::string bytes, views, accessors;                                   // JSON, without brackets
-    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0", more; // more: starts with a comma
+    std::string bytes, views, accessors; // content of the JSON lists, without brackets
+    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0",
+                        more; // more: further JSON members; starts with a comma
     int view_count = 0, accessor_count = 0;
 
     int view(const std::string &data, int stride = 0) {
@@ -79,7 +80,7 @@ struct Gltf {
     }
 };
 
-// A triangle (0,0,0), (1,0,0), (0,1,0) in accessor 0, texcoords in 1.
+// Returns a file with one triangle: (0,0,0), (1,0,0), (0,1,0) in accessor 0, texture coordinates in accessor 1.
 Gltf triangle() {
     Gltf gltf;
     gltf.floats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
@@ -88,13 +89,13 @@ Gltf triangle() {
     return gltf;
 }
 
-// The same with two joints: node 1 and its child node 2, 1 above it; vertex 2 is bound to the second. Animation
-// "wave": node 2 rotates by 90° about z within 1 s.
+// Returns the same triangle with a skin of two joints: node 1, and its child node 2 at y = 1. Vertex 2 is bound to
+// the second joint. In the animation "wave", node 2 rotates by 90° about z within 1 s.
 Gltf skinned() {
     Gltf gltf = triangle();
-    gltf.accessor(gltf.view(std::string("\0\0\0\0\0\0\0\0\1\0\0\0", 12)), 5121, 3, "VEC4"); // 2
+    gltf.accessor(gltf.view(std::string("\0\0\0\0\0\0\0\0\1\0\0\0", 12)), 5121, 3, "VEC4"); // accessor 2
     gltf.accessor(gltf.view(std::string("\xff\0\0\0\xff\0\0\0\xff\0\0\0", 12)), 5121, 3, "VEC4",
-                  R"(, "normalized": true)"); // 3
+                  R"(, "normalized": true)"); // accessor 3
     gltf.floats(
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, /**/ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
         "MAT4", 16);                                                      // 4
@@ -176,7 +177,7 @@ TEST(Gltf, TransformsStaticMeshesToWorldSpace) {
     EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("a.gltf: 1 triangles, 3 vertices, 2 x 2 x 0 mm")));
 }
 
-TEST(Gltf, IsUprightInZUpScenes) {
+TEST(Gltf, ConvertsItsUpAxisInZUpScenes) {
     const Loaded loaded = load(triangle().text(), "", "z-up");
     EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(near(0), near(0), near(1))) << "its y is up";
 }
@@ -230,7 +231,7 @@ TEST(Gltf, ReadsMaterialsAndTextures) {
     EXPECT_THAT(m.emission, ElementsAre(1, 0.5f, 0));
     EXPECT_EQ(m.metallic, 0.1f);
     EXPECT_EQ(m.roughness, 0.2f);
-    EXPECT_EQ(m.alpha_cutoff, 0.5f) << "applies to the texture alpha, which the factor halves";
+    EXPECT_EQ(m.alpha_cutoff, 0.5f) << "the cutoff applies to the texture alpha, which the factor halves";
     ASSERT_EQ(arena.scene().textures.count, 3u);
     const auto *textures = at<arhost_texture>(arena, arena.scene().textures);
     EXPECT_EQ(textures[m.colour_texture].format, ARHOST_TEXEL_SRGB8);
@@ -294,7 +295,7 @@ TEST(Gltf, IsStaticWithoutAnAnimation) {
                 testing::Contains(HasSubstr("no animation selected; available for 'animation': 0 'wave'")));
 }
 
-TEST(Gltf, DeformsSkinsByTheirAnimation) {
+TEST(Gltf, DeformsSkinsAccordingToTheAnimation) {
     for (const std::string animation : {"wave", "0"}) {
         const Loaded loaded = load(skinned().text(), ", animation: " + animation +
                                                          ", transform: [{scale: 10}, {translate: [1, 2, 3]}]");
@@ -329,7 +330,7 @@ TEST(Gltf, MovesRigidNodesAndTheirDescendants) {
     EXPECT_THAT(motion.moved[0].world_from_object, ElementsAre(10, 0, 0, 0, 10, 0, 0, 0, 10, 70, 20, 0));
 }
 
-TEST(Gltf, MorphsByItsAnimation) {
+TEST(Gltf, MorphsAccordingToTheAnimation) {
     Gltf gltf = triangle();
     const int target = gltf.floats({0, 0, 0, 0, 0, 2, 0, 0, 0}, "VEC3", 3);
     const int times = gltf.floats({0, 1}, "SCALAR", 1), weights = gltf.floats({0, 1}, "SCALAR", 1);
@@ -406,7 +407,7 @@ TEST(Gltf, ErrorsNameTheProblem) {
     EXPECT_THAT(error_of(old), HasSubstr("is not glTF 2: its asset.version must be"));
     EXPECT_THAT(error_after([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
                 HasSubstr("requires the unsupported extension 'KHR_draco_mesh_compression'"));
-    // Detected before tinygltf reads out of bounds or recurses without limit.
+    // The loader must detect these errors before tinygltf reads out of bounds or recurses without limit.
     EXPECT_THAT(
         error_after([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 18446744073709551615"); }),
         HasSubstr("buffer view 0 extends past the end of its buffer"));

@@ -42,7 +42,7 @@ std::string gzipped(const std::string &content) {
     return packed;
 }
 
-// `info`: the messages of the loader, each followed by "; ".
+// `info` has the messages of the loader, each followed by "; ".
 struct Loaded {
     TriangleMesh mesh;
     std::string info;
@@ -60,7 +60,7 @@ Loaded load_text(const std::string &name, const std::string &content, const Mesh
     return loaded;
 }
 
-// The error message without the folder.
+// Returns the error message without the folder.
 std::string error_of(const std::string &name, const std::string &content, const MeshOptions &options = {}) {
     const ScratchFolder folder;
     write_file(folder.path() / name, content);
@@ -72,7 +72,7 @@ std::string error_of(const std::string &name, const std::string &content, const 
     return "no error";
 }
 
-// The validator's result for a scene with this mesh.
+// Returns the result of `validate` for a scene with this mesh.
 std::string validated(TriangleMesh mesh) {
     ArenaBuilder builder;
     builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey()));
@@ -150,7 +150,7 @@ TEST(Obj, KeepsTexcoordsAndUsesZeroForCornersWithoutThem) {
     const TriangleMesh mesh =
         load_text("a.obj", three_vertices + "vt 0.25 0.5\nvt 1\nf 1 2 3\nf 1/1 2/2 3/-1\n").mesh;
     ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
-    // v starts at the texture's top in the arena, at its bottom in OBJ files.
+    // v = 0 is the top of the texture in the arena, but the bottom in OBJ files.
     EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0, 1));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].x], glm::vec2(0.25f, 0.5f));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 1));
@@ -169,8 +169,9 @@ TEST(Obj, ReportsIgnoredMaterials) {
 
 TEST(Obj, ReadsSyntaxVariants) {
     for (const std::string &text :
-         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows, no final line end
-          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // classic Mac OS
+         {std::string(
+              "\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows line ends; the last line has none
+          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),         // classic Mac OS line ends
           std::string("v 0 \\\n0 0\nv 1 0 0 # last\nv 0 1 0 1.0\nf 1 \\\n 2 3 # f 9 9 9\n"),
           std::string("\t v\t+0 0. .0 0.5 0.5 0.5\nvp 1\nv 1e0 0E5 -0\nv 1e-60 +1.0e+0 0\ng a\ns off\nf 1 2 3\\")}) {
         const TriangleMesh mesh = load_text("a.obj", text).mesh;
@@ -210,7 +211,8 @@ TEST(Obj, ErrorsNameFileAndLine) {
 }
 
 TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
-    // A square; a concave arrow head; a U, whose gap a fan would cover; and the U with opposite winding.
+    // The polygons are a square, a concave arrow head, a U (a triangle fan would cover its gap), and a U with the
+    // opposite winding.
     EXPECT_FLOAT_EQ(area_of(load_text("a.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n").mesh), 4);
     const TriangleMesh arrow = load_text("a.obj", "v 0 0 0\nv 4 0 2\nv 0 0 4\nv 1 0 2\nf 1 2 3 4\n").mesh;
     EXPECT_FLOAT_EQ(area_of(arrow), 6);
@@ -227,7 +229,7 @@ TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
     }
 }
 
-TEST(Polygons, ThatSelfIntersectAreStillTriangulated) {
+TEST(Polygons, AreTriangulatedEvenIfTheyIntersectThemselves) {
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 2 0\nf 1 2 3 4\n").mesh.triangles.size(), 2u);
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 1 1 1\nf 1 2 1 2 1 2\n").mesh.triangles.size(), 4u);
 }
@@ -298,7 +300,7 @@ TEST(Ply, HeaderErrorsNameFileAndLine) {
 }
 
 TEST(Ply, DataErrorsNameFileAndLine) {
-    const std::string header = ply_start + ply_triangle_header; // lines 1 to 9
+    const std::string header = ply_start + ply_triangle_header; // these are lines 1 to 9
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n"),
               "a.ply:11: vertex 1 has more values than the header declares properties");
@@ -343,13 +345,14 @@ TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
         }
 }
 
-TEST(MeshFile, IsUncompressedFromGzip) {
+TEST(MeshFile, IsDecompressedIfItIsGzip) {
     const std::string text = three_vertices + "f 1 2 3\n";
     EXPECT_EQ(load_text("a.obj.gz", gzipped(text)).mesh.triangles.size(), 1u);
     EXPECT_EQ(load_text("A.OBJ.GZ", gzipped(text)).mesh.triangles.size(), 1u);
-    EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(), 1u); // by its content
+    EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(),
+              1u); // gzip is recognised by content, not by extension
     EXPECT_EQ(load_text("a.ply.gz", gzipped(binary_triangle(true))).mesh.triangles.size(), 1u);
-    // Two members followed by zero padding, as on tapes (RFC 1952, 2.2).
+    // Two gzip members followed by zero padding, as on tapes (RFC 1952, 2.2).
     const std::string parts = gzipped(text.substr(0, 9)) + gzipped(text.substr(9)) + std::string(5, '\0');
     EXPECT_EQ(load_text("a.obj.gz", parts).mesh.triangles.size(), 1u);
 }
@@ -381,7 +384,7 @@ TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
     EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options), "a.obj: is 5 MiB large; the limit is 4 MiB");
 }
 
-TEST(MeshFile, OfAnUnsupportedFormatIsRejected) {
+TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
     EXPECT_EQ(error_of("a.stl", "solid x\n"), "a.stl: the format '.stl' is unsupported; convert the mesh to .obj or "
                                               ".ply (optionally compressed: .obj.gz, .ply.gz)");
     EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: the file name has no extension"));
@@ -417,7 +420,7 @@ TEST(MeshFile, LoadingCanBeCancelled) {
 }
 
 TEST(Normals, AreComputedIfSmoothIsTrue) {
-    // Two triangles of a ridge; the edge's normals are weighted by area, 1 to 3.
+    // Two triangles meet at a ridge. At their common edge, the normals are weighted by area, in the ratio 1 : 3.
     const std::string ridge = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -3\nf 1 3 2\nf 1 2 4\n";
     EXPECT_TRUE(load_text("a.obj", ridge).mesh.normals.empty());
     const TriangleMesh mesh = load_text("a.obj", ridge, {true}).mesh;
@@ -436,24 +439,24 @@ TEST(Normals, AreSharedAcrossTextureSeams) {
     EXPECT_EQ(mesh.normals[mesh.triangles[0].x], mesh.normals[mesh.triangles[1].x]);
 }
 
-TEST(Normals, OfTheFileAreDroppedIfSmoothIsFalse) {
+TEST(Normals, InTheFileAreDroppedIfSmoothIsFalse) {
     const std::string text = three_vertices + "vn 0 0 1\nf 1//1 2//1 3//1\n";
     EXPECT_EQ(load_text("a.obj", text).mesh.normals.size(), 3u);
     EXPECT_EQ(load_text("a.obj", text, {true}).mesh.normals.size(), 3u);
     EXPECT_TRUE(load_text("a.obj", text, {false}).mesh.normals.empty());
 }
 
-TEST(Normals, OfLengthZeroAreComputed) {
+TEST(Normals, WithLengthZeroAreComputed) {
     const TriangleMesh mesh =
         load_text("a.obj",
                   three_vertices + "v 9 9 9\nv 9 9 9\nvn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//1\nf 4//1 5//1 4//1\n")
             .mesh;
     EXPECT_EQ(mesh.normals[0], glm::vec3(0, 0, 1));
     EXPECT_EQ(mesh.normals[1], glm::vec3(1, 0, 0));
-    EXPECT_EQ(validated(mesh), ""); // including the degenerate triangle
+    EXPECT_EQ(validated(mesh), ""); // the mesh includes a degenerate triangle
 }
 
-TEST(Normals, OfATinyMeshAreCorrect) { // squared lengths underflow in floats
+TEST(Normals, AreCorrectInATinyMesh) { // where squared lengths underflow in floats
     TriangleMesh mesh = square();
     for (glm::vec3 &p : mesh.positions)
         p *= 1e-24f;
@@ -489,7 +492,7 @@ INSTANTIATE_TEST_SUITE_P(Real, SharedMeshes,
 struct LoaderCase {
     const char *file;
     std::size_t triangles, vertices;
-    const char *message = nullptr; // error instead of a mesh
+    const char *message = nullptr; // expected error; null if a mesh is expected
 };
 
 class LoaderCases : public testing::TestWithParam<LoaderCase> {};
@@ -551,7 +554,8 @@ TEST(LoaderCaseTable, CoversEveryFileInTheFolder) {
     EXPECT_EQ(std::distance(begin(files), end(files)), 43);
 }
 
-// Corrupt files yield a mesh that the validator accepts, or a MeshError; no other exception, no sanitizer finding.
+// For a corrupt file, the loader must return a mesh that the validator accepts or throw a MeshError. Any other
+// exception or a sanitizer finding is a bug.
 TEST(MeshMutations, YieldAMeshOrAnError) {
     std::vector<std::pair<std::string, std::string>> seeds = {
         {"a.obj",
@@ -561,7 +565,7 @@ TEST(MeshMutations, YieldAMeshOrAnError) {
         {"c.ply", binary_triangle(true)},
         {"a.obj.gz", gzipped(three_vertices + "f 1 2 3\n")}};
     std::mt19937 random(7);
-    // In memory, so that writing thousands of files is fast.
+    // The folder is in memory, which makes writing thousands of files fast.
     const int memory = memfd_create("mesh", 0);
     ASSERT_GE(memory, 0);
     const ScratchFolder folder;
@@ -591,7 +595,7 @@ TEST(MeshMutations, YieldAMeshOrAnError) {
         ASSERT_EQ(pwrite(memory, content.data(), content.size(), 0), static_cast<ssize_t>(content.size()));
         try {
             TriangleMesh mesh = load_mesh(folder.path() / name, {random() % 2 == 0});
-            const bool in_limits = // checked by the scene loader
+            const bool in_limits = // the scene loader checks these limits
                 std::ranges::all_of(mesh.positions, [](const glm::vec3 &p) { return glm::length(p) < 1e9f; }) &&
                 std::ranges::all_of(mesh.texcoords, [](const glm::vec2 &p) { return glm::length(p) < 1e9f; });
             if (in_limits) {
