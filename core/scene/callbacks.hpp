@@ -13,9 +13,9 @@ namespace arhost::scene {
 // run on the thread that loads.
 struct LoadCallbacks {
     std::function<void(double fraction, const std::string &what)> progress; // 0 to 1; called several times a second
-    std::function<bool()> cancelled;                          // returns true to make the loader throw Cancelled
-    std::function<void(const std::string &)> info, warning;   // logs one sentence
-    std::function<void(const std::filesystem::path &)> reads; // called before a file is opened
+    std::function<bool()> cancelled;                                        // true: stop by throwing Cancelled
+    std::function<void(const std::string &)> info, warning;                 // logs one sentence
+    std::function<void(const std::filesystem::path &)> reads;               // called before a file is opened
 };
 
 class Cancelled : public std::runtime_error {

@@ -20,8 +20,8 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // for a .gltf, a .glb, and each external buffer
-constexpr std::size_t empty_accessor_limit =
-    10'000'000;                    // limits accessors without a buffer view, whose elements are 0
+// Limits the size of accessors without a buffer view, whose elements are all 0.
+constexpr std::size_t empty_accessor_limit = 10'000'000;
 constexpr double min_scale = 1e-6; // a scale of 0 hides objects, but has no inverse
 // Extensions that are accepted even if the file requires them: they can be ignored, or need no special support.
 constexpr std::string_view harmless_extensions[] = {"KHR_mesh_quantization", "KHR_texture_transform",
@@ -334,11 +334,11 @@ public:
 
 private:
     struct SceneNode {
-        int file_node;                      // index in the file
+        int file_node;                      // index of the node in the file
         std::uint32_t parent = ARHOST_NONE; // index in nodes_
         glm::dmat4 placement_from_node{1};  // in the rest pose; to the coordinates of placement_.node
-        bool has_channel = false;           // its translation, rotation or scale is animated
-        bool moves = false;                 // it or an ancestor is animated
+        bool has_channel = false;           // the animation changes its translation, rotation or scale
+        bool moves = false;                 // the animation moves this node or an ancestor
         bool has_weights_channel = false;
         std::vector<float> morph_weights;
     };
@@ -574,7 +574,8 @@ private:
         return result;
     }
 
-    // Adds a root node for the file's space, all scene nodes below it, and the channels of the animation.
+    // Adds a root node that represents the coordinates of the file, all scene nodes as its descendants, and the
+    // channels of the animation.
     void add_motion() {
         MotionNode root;
         root.parent = placement_.node;
@@ -750,7 +751,7 @@ private:
         }
         for (const std::uint32_t corner : corners)
             if (corner >= vertex_count)
-                accessors_.fail("a triangle refers to vertex " + std::to_string(corner) + ", but there are " +
+                accessors_.fail("a triangle refers to vertex " + std::to_string(corner) + ", but the mesh has only " +
                                 std::to_string(vertex_count));
         std::vector<glm::uvec3> triangles;
         const std::size_t step = mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1;
@@ -953,8 +954,8 @@ private:
                              : "translucent; drawn opaque unless 'material' replaces it, for example with glass");
         else if (alpha < cutoff)
             info("invisible, because its alpha factor is below its alphaCutoff; drawn where its texture is opaque");
-        if (is_textured &&
-            cutoff > 0) // in the file, the cutoff applies to the product of texture alpha and alpha factor
+        // In the file, the cutoff applies to the product of texture alpha and alpha factor.
+        if (is_textured && cutoff > 0)
             material.alpha_cutoff = alpha > cutoff ? static_cast<float>(cutoff / alpha) : 1;
     }
 

@@ -17,9 +17,8 @@ struct ImageRequest {
     const char *format; // OpenImageIO's name of the format
     std::string file;
     std::span<const unsigned char> content; // if not empty, these bytes are decoded instead of the file
-    std::function<std::byte *(std::uint32_t width, std::uint32_t height, bool is_float)>
-        allocate;                               // returns memory for the RGBA texels
-    std::function<bool(float fraction)> report; // returns false to stop decoding
+    std::function<std::byte *(std::uint32_t width, std::uint32_t height, bool is_float)> allocate; // RGBA texels
+    std::function<bool(float fraction)> report; // returns false: stop decoding
 };
 
 // Sets `error` to a message, or leaves it empty on success. Does not change the texel values of the file: alpha is

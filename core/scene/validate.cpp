@@ -34,7 +34,7 @@ std::string number(double value) {
     return text;
 }
 
-// NaN compares as false, so it is outside every range.
+// Returns false for NaN, because all comparisons with NaN are false.
 bool within(float value, float low, float high) {
     return value >= low && value <= high;
 }
@@ -149,7 +149,7 @@ private:
 
     // Checks that the buffer and its spare bytes are inside the arena, and returns its elements. The total size of
     // all buffers must not exceed the size of the arena; otherwise, a small arena could refer to one large buffer a
-    // million times, and the time to check it would explode.
+    // million times, and checking it would take very long.
     template <class T> std::span<const T> view(const arhost_buffer &buffer, const std::string &what) {
         if (buffer.count == 0) {
             if (buffer.offset != 0 || buffer.stride != 0)
@@ -438,7 +438,7 @@ private:
             fail(what + "a directional light cannot have a falloff");
     }
 
-    // "geometry 3 (object 1 'bunny')"
+    // Returns the name of a geometry for messages: "geometry 3 (object 1 'bunny')".
     std::string geometry_name(std::size_t geometry) const {
         std::string text = "geometry " + std::to_string(geometry);
         for (std::size_t i = 0; i < objects_.size(); ++i)
@@ -606,7 +606,7 @@ private:
     std::span<const arhost_channel> channels_;
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
-    std::vector<std::uint32_t> deformers_; // per geometry: object index or ARHOST_NONE
+    std::vector<std::uint32_t> deformers_; // for each geometry: index of the object that deforms it, or ARHOST_NONE
 };
 
 } // namespace

@@ -91,8 +91,8 @@ std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d 
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < count; ++i) {
         const cv::Point2d along = samples[std::min(i + 1, count - 1)] - samples[i > 0 ? i - 1 : 0];
-        const cv::Point2d outward =
-            cv::Point2d(along.y, -along.x) / cv::norm(along); // the corners are in clockwise order
+        // The corners are in clockwise order.
+        const cv::Point2d outward = cv::Point2d(along.y, -along.x) / cv::norm(along);
         if (const auto offset = edge_offset_px(grey, samples[i], outward, sign))
             found.push_back(samples[i] + *offset * outward);
     }

@@ -75,8 +75,8 @@ Encoder::Encoder(const EncoderSettings &settings)
         av_opt_set(context_->priv_data, "tune", "zerolatency", 0);
         av_opt_set_double(context_->priv_data, "crf", settings.crf, 0);
     } else {
-        // Choose the MPEG-4 quantiser (1 to 31) whose step size is that of H.264 at this crf: 2·quantiser =
-        // 0.625·2^(crf/6).
+        // Choose the MPEG-4 quantiser (1 to 31) whose step size equals that of H.264 at this crf:
+        // 2·quantiser = 0.625·2^(crf/6).
         const long quantiser = std::lround(0.3125 * std::exp2(settings.crf / 6.0));
         context_->flags |= AV_CODEC_FLAG_QSCALE | AV_CODEC_FLAG_BITEXACT;
         context_->global_quality = FF_QP2LAMBDA * static_cast<int>(std::clamp(quantiser, 1l, 31l));

@@ -135,8 +135,8 @@ arhost_status Decoder::feed() {
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
         read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
-        end_fault_ =
-            log_.take_reason(); // for Matroska, libav logs "File ended prematurely" but returns no error code
+        // For Matroska, libav logs "File ended prematurely" but returns no error code.
+        end_fault_ = log_.take_reason();
         checked(avcodec_send_packet(codec_.get(), nullptr));
         return ARHOST_STATUS_OK;
     }

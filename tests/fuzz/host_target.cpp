@@ -290,8 +290,8 @@ public:
         if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
             base::throw_errno("pipe2");
         spawned.output.reset(pipe_ends[0]);
-        spawned.pidfd =
-            base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // not a real pidfd, so sending signals fails
+        // Not a real pidfd, so sending signals fails.
+        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
         spawned.pid = next_pid_++;
         workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker),
                               base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"));

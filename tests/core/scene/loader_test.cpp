@@ -21,8 +21,8 @@ using testing::HasSubstr;
 
 namespace {
 
-const std::string start =
-    "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n"; // these are 4 lines
+// Four lines, to which the tests append objects.
+const std::string start = "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n";
 
 Arena load(const std::string &text) {
     Arena arena = load_scene(Node::parse(text, "s.yaml")).build();

@@ -169,9 +169,8 @@ TEST(Obj, ReportsIgnoredMaterials) {
 
 TEST(Obj, ReadsSyntaxVariants) {
     for (const std::string &text :
-         {std::string(
-              "\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows line ends; the last line has none
-          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),         // classic Mac OS line ends
+         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows line ends
+          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // classic Mac OS line ends
           std::string("v 0 \\\n0 0\nv 1 0 0 # last\nv 0 1 0 1.0\nf 1 \\\n 2 3 # f 9 9 9\n"),
           std::string("\t v\t+0 0. .0 0.5 0.5 0.5\nvp 1\nv 1e0 0E5 -0\nv 1e-60 +1.0e+0 0\ng a\ns off\nf 1 2 3\\")}) {
         const TriangleMesh mesh = load_text("a.obj", text).mesh;
