@@ -254,9 +254,8 @@ void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &s
         float *n = &into.normals[3 * v];
         const glm::vec3 yz = glm::cross(y, z);
         const glm::vec3 normal = yz * n[0] + glm::cross(z, x) * n[1] + glm::cross(x, y) * n[2];
-        const float length =
-            std::copysign(glm::length(normal),
-                          glm::dot(x, yz)); // keeps the normal on its side of the surface if the matrix mirrors
+        // A mirroring matrix must not move the normal to the other side of the surface.
+        const float length = std::copysign(glm::length(normal), glm::dot(x, yz));
         const bool usable = length != 0 && std::isfinite(length);
         for (int k = 0; k < 3; ++k)
             n[k] = usable ? normal[k] / length : k == 2;

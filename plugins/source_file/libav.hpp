@@ -28,8 +28,7 @@ public:
     LibavLog &operator=(const LibavLog &) = delete;
 
     // Returns the last error since the previous call, to be appended to an error message: " (moov atom not found)".
-    // Returns
-    // "" if there was no error.
+    // Returns "" if there was no error.
     std::string take_reason();
 
 private:
@@ -38,7 +37,7 @@ private:
     Host host_;
     std::mutex mutex_;
     std::string last_error_;
-    int print_prefix_ = 1; // state of av_log_format_line2: 1 if the next text begins a line
+    int print_prefix_ = 1; // state of av_log_format_line2: 1 if the next text begins a new line
 };
 
 } // namespace arhost

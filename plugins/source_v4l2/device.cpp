@@ -138,7 +138,7 @@ CaptureDevice::CaptureDevice(const std::string &path)
                                   "-aG video $USER', then log in again)");
         if (error == EISDIR)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, not a camera; " + other_devices());
-        fail("open", error);
+        fail("opening it", error);
     }
     v4l2_capability capability{};
     if (const int error = control(VIDIOC_QUERYCAP, &capability); error == ENODEV)
