@@ -16,7 +16,7 @@ constexpr std::uint64_t align_up(std::uint64_t size) {
     return (size + arena_alignment - 1) / arena_alignment * arena_alignment;
 }
 
-// Appends buffers to an arena; only counts bytes if the arena is null.
+// Appends buffers to an arena. If the arena is null, only counts bytes.
 class Writer {
 public:
     explicit Writer(std::byte *arena) : arena_(arena) {}
@@ -26,7 +26,7 @@ public:
         if (values.empty())
             return {};
         if (values.size() > ARHOST_NONE)
-            throw std::length_error("more than 2^32 elements in one buffer of the scene");
+            throw std::length_error("a buffer of the scene has more than 2^32 elements");
         const std::uint64_t offset = end_;
         end_ = align_up(offset + values.size_bytes() + arena_spare_bytes);
         if (arena_) {
@@ -116,7 +116,8 @@ arhost_skin put_skin(Writer &writer, const Skin &skin) {
     return {writer.put(skin.joints), writer.put(skin.node_from_mesh)};
 }
 
-// Writes the buffers of all elements, then the table of rows that refer to them.
+// Writes the buffers of all elements (for example the positions of all meshes), then the table whose rows refer to
+// these buffers.
 template <class Row, class Elements, class Put>
 arhost_buffer put_table(Writer &writer, Elements &elements, const Put &put) {
     std::vector<Row> rows;
@@ -137,7 +138,7 @@ arhost_material make_material(arhost_material_model model) {
     copy(glm::vec3(1), material.reflectivity);
     material.metallic = material.roughness = 1;
     material.index = 1.5f;
-    material.fresnel_exponent = 5; // Schlick's; the minimum is that of an index of 1.5
+    material.fresnel_exponent = 5; // Schlick's approximation; fresnel_minimum is for a refractive index of 1.5
     material.fresnel_minimum = 0.04f;
     material.fresnel_maximum = 1;
     copy(glm::vec3(1), material.refraction);
@@ -235,7 +236,7 @@ std::size_t ArenaBuilder::triangle_count() const {
     return count;
 }
 
-// Same order as `write`.
+// Must visit the buffers in the same order as `write`.
 std::size_t ArenaBuilder::byte_size() const {
     Writer counter(nullptr);
     counter.put(materials_);
@@ -274,7 +275,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.coloured_shadows = settings.coloured_shadows;
     scene.duration_s = settings.duration_s;
 
-    Writer writer(arena.data()); // same order as byte_size
+    Writer writer(arena.data()); // must visit the buffers in the same order as byte_size
     scene.materials = writer.put(materials_);
     scene.objects = writer.put(objects_);
     scene.lights = writer.put(lights_);
@@ -312,7 +313,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     *this = {};
 }
 
-// Sets what depends on the pose at time 0: the transforms of moving objects, and the bounds.
+// Sets the transforms of moving objects at time 0, and the bounds of the scene, which depend on them.
 void ArenaBuilder::apply_initial_motion(std::span<std::byte> arena) const {
     auto &scene = *reinterpret_cast<arhost_scene *>(arena.data());
     const auto elements = [&]<class T>(const arhost_buffer &buffer, T) {

@@ -26,12 +26,13 @@ namespace arhost::scene {
 
 using Spheres = std::vector<glm::vec4>; // centre and radius
 
-// A material with the usual default in each field and no textures: black, except glass and mirrors.
+// Returns a material of the model `model` with the usual default in each field and without textures. Glass and
+// mirrors transmit and reflect all light; materials of the other models are black.
 arhost_material make_material(arhost_material_model model);
-// A white light at the origin that points along −z; area lights are 1 mm wide.
+// Returns a white light at the origin that points along −z. An area light is 1 mm wide.
 arhost_light make_light(arhost_light_type type);
 
-// Uninitialized, move-only memory: a texture may have a gigabyte.
+// Texel memory. Not initialized and not copyable, because a texture may be as large as 1 GiB.
 struct Texels {
     std::unique_ptr<std::byte[]> bytes;
     std::size_t size = 0;
@@ -51,10 +52,10 @@ struct Environment {
     std::uint32_t texture = ARHOST_NONE;
     float intensity = 1;
     glm::mat3 environment_from_world{1};
-    std::vector<float> rows, columns; // cumulative sums
+    std::vector<float> rows, columns; // cumulative sums for importance sampling, see arhost/scene.h
 };
 
-// Not animated: parent_from_node applies. Animated: translation, rotation and scale apply instead.
+// The node's pose is parent_from_node if `animated` is false; otherwise translation, rotation and scale.
 struct MotionNode {
     std::uint32_t parent = ARHOST_NONE;
     bool animated = false;
@@ -77,7 +78,8 @@ struct Skin {
     std::vector<glm::mat4x3> node_from_mesh;
 };
 
-// How an object moves: rigidly with a node, by a skin's joints, or not at all.
+// How an object moves: rigidly with its node (moves), by deformation (deforms: skin, morph targets or both), or not
+// at all.
 struct Motion {
     bool moves = false, deforms = false;
     std::uint32_t node = ARHOST_NONE, skin = ARHOST_NONE;
@@ -120,7 +122,7 @@ public:
     Settings settings;
     Environment environment;
 
-    // Each returns the index of what was added.
+    // Each function returns the index of the new element.
     std::uint32_t add_triangles(TriangleMesh mesh);
     std::uint32_t add_spheres(Spheres spheres);
     std::uint32_t add_texture(const std::string &name, Texture texture);
@@ -135,9 +137,9 @@ public:
 
     std::size_t byte_size() const;
 
-    // Writes into the caller's memory: byte_size() bytes, 64-byte aligned. Frees each mesh and texture once it
-    // is written, to limit peak memory. Moving objects are written at their pose at time 0, which requires
-    // valid input.
+    // Writes the arena to `arena`, which must have byte_size() bytes and be aligned to 64 bytes. Frees each mesh and
+    // texture after writing it, to limit peak memory. Evaluates the pose of moving objects at time 0, so the scene
+    // must be valid if it has any.
     void write(std::span<std::byte> arena) &&;
     Arena build() &&;
 
@@ -163,10 +165,10 @@ private:
     std::string names_;
 };
 
-// Validates an arena that another process wrote. Returns the first problem as the end of a sentence about the
-// scene ("object 2 'ball' has material 7, but there are 3"), or "" if it is valid. Checks every offset, count,
-// index, enumerator and number before using it, so a ray tracer may use all of them unchecked, provided that
-// nobody can write to the arena any more. Time is linear in the arena's size, whatever its content.
+// Validates an arena that another process wrote. Returns "" if it is valid, otherwise a description of the first
+// problem, to be appended to a text such as "the scene is invalid: "; for example "object 2 'ball' refers to material
+// 7, but the scene has only 3". Checks every offset, count, index, enumerator and number, so ray tracers may use them
+// unchecked if nobody can write to the arena any more. Takes linear time in the size of the arena for any content.
 std::string validate(std::span<const std::byte> arena);
 
 } // namespace arhost::scene

@@ -28,8 +28,8 @@ struct Box {
     }
 };
 
-// Independent lanes over blocks of four points, so that the compiler vectorizes the loop; a single running
-// minimum would be a serial dependency.
+// Keeps twelve independent minima and maxima, over blocks of four points, so the compiler can vectorize the loop.
+// With a single running minimum, each iteration would have to wait for the previous one.
 inline Box box_of(std::span<const glm::vec3> points) {
     constexpr std::size_t lanes = 12;
     std::array<float, lanes> low, high;
@@ -62,7 +62,8 @@ inline Box box_of(std::span<const glm::vec4> spheres) {
     return box;
 }
 
-// Bounding box of a transformed box: exact for the identity, larger than necessary for rotations.
+// Returns the bounding box of the eight transformed corners of `box`. It is exact for the identity; with a rotation,
+// it may be larger than the bounding box of the transformed content.
 inline Box transformed(const float *world_from_object, const Box &box) {
     const float *m = world_from_object;
     Box world;

@@ -9,12 +9,13 @@
 
 namespace arhost::scene {
 
-// Progress, log and cancellation of a loader. Each may be empty. Called on the loading thread.
+// Functions that a loader calls to report progress, to log, and to check for cancellation. Each may be empty. They
+// run on the thread that loads.
 struct LoadCallbacks {
-    std::function<void(double fraction, const std::string &what)> progress; // 0 to 1, several times a second
+    std::function<void(double fraction, const std::string &what)> progress; // 0 to 1; called several times a second
     std::function<bool()> cancelled;                                        // true: stop by throwing Cancelled
-    std::function<void(const std::string &)> info, warning;                 // one sentence for the log
-    std::function<void(const std::filesystem::path &)> reads;               // a file that is about to be opened
+    std::function<void(const std::string &)> info, warning;                 // logs one sentence
+    std::function<void(const std::filesystem::path &)> reads;               // called before a file is opened
 };
 
 class Cancelled : public std::runtime_error {
@@ -22,12 +23,13 @@ public:
     Cancelled() : std::runtime_error("loading the scene was cancelled") {}
 };
 
-// Calls the callbacks on behalf of a reader of `what`, usually a file name. `callbacks` must outlive it.
+// Calls the callbacks for one item, usually a file; `what` names it in progress messages. `callbacks` must outlive
+// the Reporter.
 class Reporter {
 public:
     Reporter(const LoadCallbacks &callbacks, std::string what) : callbacks_(callbacks), what_(std::move(what)) {}
 
-    // Negative: progress unknown. Throws Cancelled on request.
+    // A negative `fraction` means that the progress is unknown. Throws Cancelled if the callback requests it.
     void report(double fraction) const {
         if (callbacks_.progress)
             callbacks_.progress(fraction, what_);

@@ -19,21 +19,22 @@
 namespace arhost::scene {
 namespace {
 
-constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // of a .gltf, a .glb, and each external buffer
-constexpr std::size_t empty_accessor_limit = 10'000'000;     // zero elements without a buffer view
-constexpr double min_scale = 1e-6;                           // a scale of 0 hides objects, but has no inverse
-// Required extensions that are accepted: they can be ignored, or need no support.
+constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // for a .gltf, a .glb, and each external buffer
+// Limits the size of accessors without a buffer view, whose elements are all 0.
+constexpr std::size_t empty_accessor_limit = 10'000'000;
+constexpr double min_scale = 1e-6; // a scale of 0 hides objects, but has no inverse
+// Extensions that are accepted even if the file requires them: they can be ignored, or need no special support.
 constexpr std::string_view harmless_extensions[] = {"KHR_mesh_quantization", "KHR_texture_transform",
                                                     "KHR_lights_punctual"};
 
-// Images are decoded later, when a material refers to them.
+// Keeps the encoded image. It is decoded later, when a material refers to it.
 bool keep_image_bytes(tinygltf::Image *image, int, std::string *, std::string *, int, int, const unsigned char *bytes,
                       int size, void *) {
     image->image.assign(bytes, bytes + size);
     return true;
 }
 
-bool is_file(const std::string &file, void *) { // opening a FIFO would block
+bool is_file(const std::string &file, void *) { // rejects FIFOs, which would block when opened
     std::error_code ignored;
     return std::filesystem::is_regular_file(file, ignored);
 }
@@ -54,7 +55,7 @@ std::uint32_t number_at(std::string_view bytes, std::size_t offset) { // little-
     return number;
 }
 
-// The JSON of a .gltf or .glb. Fails if a chunk of a .glb exceeds the file.
+// Returns the JSON of a .gltf or .glb file. Throws if a chunk of a .glb extends past the end of the file.
 std::string_view json_of(const MeshFile &text) {
     const std::string_view all = text.view();
     if (!all.starts_with("glTF"))
@@ -73,13 +74,13 @@ std::string_view json_of(const MeshFile &text) {
     return json;
 }
 
-// Checks that tinygltf lacks: out-of-bounds reads and unbounded recursion.
+// Rejects files with which tinygltf would read out of bounds or recurse without limit.
 void check_structure(const MeshFile &text) {
     using Json = nlohmann::json;
     const auto check_depth = [&](int depth, Json::parse_event_t, Json &) {
         constexpr int max_depth = 64;
         if (depth > max_depth)
-            text.fail("is nested more than 64 deep");
+            text.fail("its JSON is nested more than 64 levels deep");
         return true;
     };
     const std::string_view json = json_of(text);
@@ -94,7 +95,7 @@ void check_structure(const MeshFile &text) {
         if (!object.is_object() || !object.contains(key))
             return 0;
         if (!object[key].is_number_unsigned())
-            text.fail("has a " + std::string(key) + " that is not an unsigned integer");
+            text.fail("a value of '" + std::string(key) + "' is not an unsigned integer");
         return object[key].get<std::uint64_t>();
     };
     const Json asset = root.value("asset", Json());
@@ -138,7 +139,7 @@ tinygltf::Model parse(const std::filesystem::path &file, const Reporter &reporte
         return lines.substr(0, 500);
     };
     if (!good)
-        text.fail("is not a glTF 2.0 file that can be loaded: " + on_one_line(error));
+        text.fail("cannot be loaded as glTF 2.0: " + on_one_line(error));
     if (!warning.empty())
         reporter.info(text.name() + ": " + on_one_line(warning));
     return model;
@@ -150,6 +151,14 @@ template <class T> T component(const unsigned char *from) {
     return value;
 }
 
+const char *type_name(int type) {
+    return type == TINYGLTF_TYPE_SCALAR ? "SCALAR"
+           : type == TINYGLTF_TYPE_VEC2 ? "VEC2"
+           : type == TINYGLTF_TYPE_VEC3 ? "VEC3"
+           : type == TINYGLTF_TYPE_VEC4 ? "VEC4"
+                                        : "MAT4";
+}
+
 // Reads accessors with bounds checks.
 class Accessors {
 public:
@@ -159,19 +168,20 @@ public:
 
     template <class T> const T &at(const std::vector<T> &table, int index, const char *what) const {
         if (index < 0 || static_cast<std::size_t>(index) >= table.size())
-            fail("refers to " + std::string(what) + " " + std::to_string(index) + ", but there are " +
+            fail("refers to " + std::string(what) + " " + std::to_string(index) + ", but the file has only " +
                  std::to_string(table.size()));
         return table[static_cast<std::size_t>(index)];
     }
 
     std::size_t count(int index) const { return at(model_.accessors, index, "accessor").count; }
 
-    // All components of all elements. Normalized integers become 0 to 1 or −1 to 1.
+    // Returns all components of all elements of accessor `index`. `type` is the required element type
+    // (TINYGLTF_TYPE_…). Normalized integers become 0 to 1 or −1 to 1. `what` names the accessor in messages.
     template <class T> std::vector<T> read(int index, int type, const char *what) const {
         const tinygltf::Accessor &accessor = at(model_.accessors, index, "accessor");
         const std::string name = std::string(what) + " (accessor " + std::to_string(index) + ")";
         if (accessor.type != type)
-            fail(name + " has the wrong element type");
+            fail(name + " must have elements of the type " + type_name(type));
         const auto width =
             static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
         const std::size_t size = size_of(accessor.componentType, name);
@@ -186,7 +196,7 @@ public:
             const std::size_t view_stride = at(model_.bufferViews, accessor.bufferView, "buffer view").byteStride;
             const std::size_t stride = view_stride ? view_stride : size * width;
             if (stride < size * width || stride > 4096)
-                fail(name + " has the byte stride " + std::to_string(stride));
+                fail(name + " has the invalid byte stride " + std::to_string(stride));
             const std::size_t length = accessor.count == 0 ? 0 : (accessor.count - 1) * stride + size * width;
             const unsigned char *from = bytes(accessor.bufferView, accessor.byteOffset, length, name);
             values.resize(accessor.count * width); // only after the bounds check
@@ -324,11 +334,11 @@ public:
 
 private:
     struct SceneNode {
-        int file_node;                      // index in the file
+        int file_node;                      // index of the node in the file
         std::uint32_t parent = ARHOST_NONE; // index in nodes_
-        glm::dmat4 placement_from_node{1};  // in the rest pose, to the space of placement_.node
-        bool has_channel = false;           // its translation, rotation or scale is animated
-        bool moves = false;                 // it or an ancestor is animated
+        glm::dmat4 placement_from_node{1};  // in the rest pose; to the coordinates of placement_.node
+        bool has_channel = false;           // the animation changes its translation, rotation or scale
+        bool moves = false;                 // the animation moves this node or an ancestor
         bool has_weights_channel = false;
         std::vector<float> morph_weights;
     };
@@ -350,14 +360,14 @@ private:
             if (std::ranges::find(harmless_extensions, extension) == std::end(harmless_extensions) &&
                 !extension.starts_with("KHR_materials_"))
                 accessors_.fail("requires the unsupported extension '" + printable(extension) +
-                                "'; export it without");
+                                "'; export it without this extension");
         if (!ignored.empty())
-            reporter_.info(name_ + ": ignores the extensions " + printable(ignored));
+            reporter_.info(name_ + ": unsupported extensions are ignored: " + printable(ignored));
     }
 
     // ---- nodes ----
 
-    // Lists the nodes of the default scene, parents before children.
+    // Collects the nodes of the default scene in nodes_, parents before children.
     void collect_nodes() {
         std::vector<std::pair<int, std::uint32_t>> pending; // node, parent
         if (model_.scenes.empty()) {
@@ -463,7 +473,7 @@ private:
             animation_ = &model_.animations[number];
         if (!animation_)
             throw AnimationError(name_ + ": has no animation '" + printable(wanted) + "'" +
-                                 (names.empty() ? ", nor any other" : "; available: " + names));
+                                 (names.empty() ? "; the file has no animations" : "; available: " + names));
         for (const tinygltf::AnimationChannel &channel : animation_->channels) {
             if (const auto node = find_node(channel.target_node)) {
                 if (channel.target_path == "weights")
@@ -476,7 +486,8 @@ private:
         for (SceneNode &node : nodes_) {
             node.moves = node.has_channel || (node.parent != ARHOST_NONE && nodes_[node.parent].moves);
             if (node.has_channel && !model_.nodes[static_cast<std::size_t>(node.file_node)].matrix.empty())
-                accessors_.fail("node " + std::to_string(node.file_node) + " has a matrix, so it cannot be animated");
+                accessors_.fail("node " + std::to_string(node.file_node) +
+                                " has a matrix; animated nodes must have translation, rotation and scale instead");
         }
     }
 
@@ -486,12 +497,13 @@ private:
         if (name == "CUBICSPLINE")
             return ARHOST_INTERPOLATION_CUBIC;
         if (name != "LINEAR") // tinygltf's default
-            accessors_.fail("an animation has the interpolation '" + printable(name) +
+            accessors_.fail("an animation has the unknown interpolation '" + printable(name) +
                             "'; glTF defines LINEAR, STEP and CUBICSPLINE");
         return ARHOST_INTERPOLATION_LINEAR;
     }
 
-    // Index in nodes_ of a node of the file; nothing if it is not in the scene.
+    // Converts the index of a node in the file to its index in nodes_. Returns std::nullopt if the node is not in the
+    // scene.
     std::optional<std::uint32_t> find_node(int node) const {
         if (node < 0 || static_cast<std::size_t>(node) >= scene_index_.size() ||
             scene_index_[static_cast<std::size_t>(node)] == ARHOST_NONE)
@@ -506,8 +518,10 @@ private:
         channel.interpolation = interpolation_of(sampler.interpolation);
         channel.times = accessors_.read<float>(sampler.input, TINYGLTF_TYPE_SCALAR, "an animation's times");
         const auto &times = channel.times;
-        if (times.empty() || !(times.front() >= 0 && times.back() <= duration_limit_s))
-            accessors_.fail("an animation has no keyframes, or times outside 0 to 1e6 s");
+        if (times.empty())
+            accessors_.fail("an animation has no keyframes");
+        if (!(times.front() >= 0 && times.back() <= duration_limit_s))
+            accessors_.fail("an animation has keyframe times outside 0 to 1e6 s");
         for (std::size_t i = 1; i < times.size(); ++i)
             if (!(times[i] > times[i - 1]))
                 accessors_.fail("an animation's times are not strictly increasing");
@@ -531,7 +545,7 @@ private:
             accessors_.fail("an animation has " + std::to_string(values.size()) + " values for " +
                             std::to_string(times.size()) + " keyframes");
         if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
-            accessors_.fail("an animation has a value beyond 1e9");
+            accessors_.fail("an animation has a value whose absolute value exceeds 1e9");
         if (channel.target == ARHOST_CHANNEL_ROTATION)
             for (std::size_t key = 0; key < times.size(); ++key) {
                 float *v = &values[cubic ? key * 12 + 4 : key * 4];
@@ -560,7 +574,8 @@ private:
         return result;
     }
 
-    // Adds a root node for the file's space, all scene nodes below it, and the channels of the animation.
+    // Adds a root node that represents the coordinates of the file, all scene nodes as its descendants, and the
+    // channels of the animation.
     void add_motion() {
         MotionNode root;
         root.parent = placement_.node;
@@ -583,7 +598,7 @@ private:
                                  "' has a duration of 0");
     }
 
-    // The skin; its joints are indices in nodes_ plus `first_node`.
+    // Reads skin `index` of the file. The joints of the result are indices in nodes_ plus `first_node`.
     Skin skin_of(int index, std::uint32_t first_node) const {
         const tinygltf::Skin &from = accessors_.at(model_.skins, index, "skin");
         Skin skin;
@@ -595,14 +610,18 @@ private:
             skin.joints.push_back(first_node + *node);
         }
         if (skin.joints.empty() || skin.joints.size() > 65536)
-            accessors_.fail("skin " + std::to_string(index) + " has no joints, or more than 65536");
+            accessors_.fail("skin " + std::to_string(index) + " has " + std::to_string(skin.joints.size()) +
+                            " joints; it must have 1 to 65536");
         skin.node_from_mesh.assign(skin.joints.size(), glm::mat4x3(1));
         if (from.inverseBindMatrices >= 0) {
             const auto matrices =
-                accessors_.read<float>(from.inverseBindMatrices, TINYGLTF_TYPE_MAT4, "inverse bind matrices");
-            if (matrices.size() < 16 * skin.joints.size() ||
-                !std::ranges::all_of(matrices, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
-                accessors_.fail("skin " + std::to_string(index) + " has too few matrices, or a value beyond 1e9");
+                accessors_.read<float>(from.inverseBindMatrices, TINYGLTF_TYPE_MAT4, "the inverse bind matrices");
+            if (matrices.size() < 16 * skin.joints.size())
+                accessors_.fail("skin " + std::to_string(index) + " has " + std::to_string(matrices.size() / 16) +
+                                " inverse bind matrices for " + std::to_string(skin.joints.size()) + " joints");
+            if (!std::ranges::all_of(matrices, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
+                accessors_.fail("skin " + std::to_string(index) +
+                                " has an inverse bind matrix with a value that is NaN or beyond ±1e9");
             for (std::size_t i = 0; i < skin.joints.size(); ++i)
                 skin.node_from_mesh[i] = glm::mat4x3(glm::make_mat4(&matrices[16 * i]));
         }
@@ -640,7 +659,7 @@ private:
         }
     }
 
-    // Materials of the file may have textures although the mesh has no texture coordinates.
+    // Adds texture coordinates (0, 0) if the material has textures but the mesh has no texture coordinates.
     void add_missing_texcoords(Part &part) const {
         const arhost_material &m = builder_.material(part.material);
         if (!part.mesh.texcoords.empty() ||
@@ -648,7 +667,7 @@ private:
              m.normal_texture == ARHOST_NONE && m.emission_texture == ARHOST_NONE))
             return;
         reporter_.info(part.name +
-                       ": has a texture but no texture coordinates; uses one corner texel for the whole mesh");
+                       ": the mesh has a texture but no texture coordinates; a corner texel colours the whole mesh");
         part.mesh.texcoords.assign(part.mesh.positions.size(), glm::vec2(0));
     }
 
@@ -661,7 +680,7 @@ private:
         const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
         if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
             mode != TINYGLTF_MODE_TRIANGLE_FAN) {
-            reporter_.info(name_ + ": ignores points and lines");
+            reporter_.info(name_ + ": points and lines are ignored");
             return mesh;
         }
         const auto vec3s = [&](int accessor, const char *what) {
@@ -671,7 +690,7 @@ private:
             for (const auto &value : values)
                 for (int i = 0; i < value.length(); ++i)
                     if (!(std::abs(value[i]) <= coordinate_limit_mm))
-                        accessors_.fail(std::string(what) + " has a value that is NaN or beyond 1e9");
+                        accessors_.fail(std::string(what) + " has a value that is NaN or beyond ±1e9");
         };
         const int position = attribute(primitive.attributes, "POSITION");
         if (position < 0)
@@ -698,11 +717,11 @@ private:
             read_joints(attribute(primitive.attributes, "JOINTS_0"), attribute(primitive.attributes, "WEIGHTS_0"),
                         count, mesh);
         if (attribute(primitive.attributes, "JOINTS_1") >= 0)
-            reporter_.info(name_ + ": uses only the first four joints of each vertex");
-        constexpr std::size_t max_offsets = 100'000'000; // total of all targets
+            reporter_.info(name_ + ": vertices have more than four joints; only the first four are used");
+        constexpr std::size_t max_offsets = 100'000'000; // for all morph targets together
         if (primitive.targets.size() > max_offsets / std::max<std::size_t>(count, 1))
             accessors_.fail(std::to_string(primitive.targets.size()) + " morph targets of " + std::to_string(count) +
-                            " vertices are too many");
+                            " vertices each exceed the limit of 1e8 vertex offsets");
         const bool has_normals = !mesh.normals.empty();
         for (const auto &target : primitive.targets) {
             const auto append = [&](const char *name, std::vector<glm::vec3> &to) {
@@ -732,7 +751,7 @@ private:
         }
         for (const std::uint32_t corner : corners)
             if (corner >= vertex_count)
-                accessors_.fail("a triangle refers to vertex " + std::to_string(corner) + ", but there are " +
+                accessors_.fail("a triangle refers to vertex " + std::to_string(corner) + ", but the mesh has only " +
                                 std::to_string(vertex_count));
         std::vector<glm::uvec3> triangles;
         const std::size_t step = mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1;
@@ -750,11 +769,11 @@ private:
 
     void read_joints(int joints, int weights, std::size_t count, TriangleMesh &mesh) const {
         if (joints < 0 || weights < 0)
-            accessors_.fail("a mesh has a skin, but no joints or weights");
+            accessors_.fail("a mesh has a skin, but not both of the attributes JOINTS_0 and WEIGHTS_0");
         const auto indices = accessors_.read<std::uint32_t>(joints, TINYGLTF_TYPE_VEC4, "JOINTS_0");
         mesh.weights = vectors<glm::vec4>(accessors_.read<float>(weights, TINYGLTF_TYPE_VEC4, "WEIGHTS_0"));
         if (indices.size() != 4 * count || mesh.weights.size() != count)
-            accessors_.fail("JOINTS_0 or WEIGHTS_0 does not have one element per vertex");
+            accessors_.fail("JOINTS_0 and WEIGHTS_0 must have one element per vertex");
         mesh.joints.resize(count);
         for (std::size_t v = 0; v < count; ++v) {
             glm::vec4 &w = mesh.weights[v];
@@ -767,9 +786,9 @@ private:
         }
     }
 
-    // Applies skins and morph targets that are not animated, in the rest pose.
+    // Applies skins and morph targets that are not animated to the vertices, in the rest pose.
     void bake_static_deformations() {
-        ArenaBuilder at_rest; // evaluated like an animation
+        ArenaBuilder at_rest; // a temporary scene, evaluated like an animation
         at_rest.settings.duration_s = 1;
         for (const SceneNode &node : nodes_) {
             MotionNode world_node;
@@ -790,7 +809,8 @@ private:
                     for (int i = 0; i < 4; ++i)
                         if (part.mesh.joints[v][i] >= skin.joints.size())
                             accessors_.fail("a vertex refers to joint " + std::to_string(part.mesh.joints[v][i]) +
-                                            ", but the skin has " + std::to_string(skin.joints.size()));
+                                            ", but the skin has only " + std::to_string(skin.joints.size()) +
+                                            " joints");
             }
             part.deforms = (morphs && node.has_weights_channel) ||
                            std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return nodes_[j].moves; });
@@ -831,7 +851,7 @@ private:
         const Transform from_mesh = Transform::of(node.placement_from_node);
         const bool mirrored = glm::determinant(placement_.from_gltf.matrix()) < 0;
         if (part.deforms && part.skin >= 0) {
-            if (mirrored) // skinned vertices are in world space, where the winding is flipped
+            if (mirrored) // skinned vertices are in world space, so mirroring flips the winding
                 for (glm::uvec3 &t : part.mesh.triangles)
                     std::swap(t.y, t.z);
             const std::uint32_t skin = skin_index(part.skin);
@@ -852,7 +872,7 @@ private:
             for (const glm::vec3 &p : part.mesh.positions) {
                 box_.include(p);
                 if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= coordinate_limit_mm))
-                    accessors_.fail("extends beyond 1e9 mm after its transform");
+                    accessors_.fail("the mesh extends beyond 1e9 mm after its transform");
             }
             const bool moves = placement_.node != ARHOST_NONE;
             finish(part, {moves, false, placement_.node, ARHOST_NONE});
@@ -933,8 +953,9 @@ private:
             info(is_textured ? "blended; drawn with holes where its alpha is below 0.5"
                              : "translucent; drawn opaque unless 'material' replaces it, for example with glass");
         else if (alpha < cutoff)
-            info("invisible by its alphaCutoff; drawn where its texture is opaque");
-        if (is_textured && cutoff > 0) // the file's cutoff applies to texture alpha times the factor
+            info("invisible, because its alpha factor is below its alphaCutoff; drawn where its texture is opaque");
+        // In the file, the cutoff applies to the product of texture alpha and alpha factor.
+        if (is_textured && cutoff > 0)
             material.alpha_cutoff = alpha > cutoff ? static_cast<float>(cutoff / alpha) : 1;
     }
 
@@ -942,8 +963,8 @@ private:
         if (info.index < 0)
             return ARHOST_NONE;
         if (info.texCoord != 0)
-            reporter_.info(name_ + ": a texture uses texture coordinates " + std::to_string(info.texCoord) +
-                           "; uses the first ones instead");
+            reporter_.info(name_ + ": a texture uses the texture coordinates TEXCOORD_" +
+                           std::to_string(info.texCoord) + ", which is unsupported; TEXCOORD_0 is used instead");
         const tinygltf::Texture &texture = accessors_.at(model_.textures, info.index, "texture");
         const tinygltf::Image &image = accessors_.at(model_.images, texture.source, "image");
         if (image.image.empty())

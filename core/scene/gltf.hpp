@@ -20,11 +20,11 @@ public:
 
 struct GltfPlacement {
     std::string name;                 // objects are named "name/node"
-    Transform from_gltf;              // to the space of `node`
+    Transform from_gltf;              // transforms glTF coordinates to those of `node`
     std::uint32_t node = ARHOST_NONE; // the parent node, or ARHOST_NONE for the world
     arhost_role role = ARHOST_ROLE_VIRTUAL;
-    std::optional<std::uint32_t> material; // replaces the file's materials
-    std::optional<std::string> animation;  // name or index; absent: static
+    std::optional<std::uint32_t> material; // index of a material that replaces all materials of the file
+    std::optional<std::string> animation;  // name or index of an animation; absent: the objects do not move
 };
 
 // Adds all meshes of the file's default scene. Returns the duration of the animation in seconds, or 0. Throws

@@ -19,7 +19,8 @@
 namespace arhost::scene {
 namespace {
 
-// Never closed: libraries that OpenImageIO loads have threads.
+// Loads the shared object that links OpenImageIO. It is never unloaded, because libraries that OpenImageIO loads may
+// have running threads.
 ReadImage *reader() {
     static ReadImage *const found = [] {
         // Absolute path: the sanitizers' dlopen interceptor ignores our RUNPATH.
@@ -34,8 +35,8 @@ ReadImage *reader() {
     return found;
 }
 
-// OpenImageIO's format name by the file's magic number, since file extensions are unreliable. Other decoders are
-// never used.
+// Returns OpenImageIO's name of the format, according to the file's magic number, because file extensions are
+// unreliable. Only the decoders named here are ever used.
 const char *format_of(std::string_view start) {
     using namespace std::string_view_literals;
     if (start.starts_with("\x89PNG\r\n"sv))
@@ -69,7 +70,7 @@ std::span<float> floats_of(const Texels &texels) {
     return {reinterpret_cast<float *>(texels.bytes.get()), texels.size / sizeof(float)};
 }
 
-// Clamps to 0 .. radiance_limit and reports it.
+// Clamps all values to 0 … radiance_limit and logs the number of clamped values.
 void clamp_radiance(const Image &image, const std::string &name, const Reporter &reporter) {
     std::size_t clamped = 0;
     for (float &value : floats_of(image.texels)) {
@@ -77,12 +78,12 @@ void clamp_radiance(const Image &image, const std::string &name, const Reporter 
             value += 0.f; // −0 becomes 0
             continue;
         }
-        value = value > radiance_limit ? radiance_limit : 0; // NaN: 0
+        value = value > radiance_limit ? radiance_limit : 0; // NaN becomes 0
         ++clamped;
     }
     if (clamped > 0)
         reporter.info(name + ": " + std::to_string(clamped) +
-                      " values below 0, above 1e6 or NaN are clamped to 0 or 1e6");
+                      " values were below 0, above 1e6 or NaN; they were clamped to 0 or 1e6");
 }
 
 const std::array<float, 256> &linear_from_byte() {
@@ -95,7 +96,8 @@ const std::array<float, 256> &linear_from_byte() {
     return table;
 }
 
-// Normalized cumulative sums: the last is 1. Uniform if all values are 0.
+// Writes the cumulative sums of `values` to `sums`, normalized so that the last one is 1. If all values are 0, they
+// count as equal.
 void accumulate(std::span<const double> values, std::span<float> sums) {
     double total = 0;
     for (const double value : values)
@@ -119,7 +121,7 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
         content.empty() ? start_of(file)
                         : std::string(content.begin(), content.begin() + std::min<std::size_t>(8, content.size())));
     if (!format)
-        throw ImageError(name + ": its content is not PNG, JPEG, PPM, HDR or EXR; convert it to one of them");
+        throw ImageError(name + ": is not a PNG, JPEG, PPM, HDR or EXR image; convert it to one of these formats");
     Image image;
     std::exception_ptr stopped; // exceptions must not propagate through OpenImageIO
     ImageRequest request{format, name, content, {}, {}};

@@ -13,7 +13,7 @@
 
 namespace arhost::scene {
 
-// what() is one sentence for the user that starts with the file.
+// what() is one sentence for the user that starts with the file name.
 class ImageError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -21,18 +21,19 @@ public:
 
 struct Image {
     std::uint32_t width = 0, height = 0;
-    bool is_float = false; // RGBA floats, linear light, 0 to 1e6; else RGBA bytes
-    Texels texels;         // first row at the top
+    bool is_float = false; // true: RGBA floats, linear light, 0 to 1e6; false: RGBA bytes
+    Texels texels;         // the top row is first
 };
 
-// Converts integers to 8 bits and keeps floats. Expands grey to RGB and missing alpha to opaque. Reads the file
-// if `content` is empty. Throws ImageError.
+// Decodes `content`, the bytes of an image file, or reads `file` if `content` is empty. Converts integer channels to
+// 8 bits and keeps floats. Expands grey to RGB; images without alpha become opaque. Throws ImageError.
 Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Reporter &reporter);
 
 // Converts to RGBA floats in linear light; decodes sRGB-encoded bytes.
 Image linearized(Image image, const Reporter &reporter);
 
-// Cumulative sums of luminance · sin(πv) for importance sampling. `texture` is RGBA32F.
+// Sets `rows` and `columns` to cumulative sums of luminance · sin(πv), for importance sampling. `texture` must be
+// RGBA32F.
 void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter);
 
 } // namespace arhost::scene

@@ -10,7 +10,7 @@ namespace {
 
 using arhost::scene::ImageRequest;
 
-constexpr int side_limit = 16384; // of arhost/scene.h
+constexpr int side_limit = 16384; // the limit in arhost/scene.h
 
 // Expands one to four channels to RGBA in place.
 template <class T> void expand(T *texels, std::size_t count, bool grey, int alpha, T opaque) {
@@ -25,12 +25,14 @@ template <class T> void expand(T *texels, std::size_t count, bool grey, int alph
 std::string read(const ImageRequest &request) {
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(request.format);
     if (!input)
-        return "cannot be loaded: this OpenImageIO lacks the format '" + std::string(request.format) + "'";
+        return "cannot be loaded: this build of OpenImageIO does not support the format '" +
+               std::string(request.format) + "'";
     OIIO::Filesystem::IOMemReader memory(const_cast<unsigned char *>(request.content.data()), request.content.size());
     OIIO::ImageSpec wanted, spec;
     wanted["oiio:UnassociatedAlpha"] = 1;
     if (!request.content.empty() && !input->set_ioproxy(&memory))
-        return "cannot be loaded: images of the format '" + std::string(request.format) + "' must be separate files";
+        return "cannot be loaded: images of the format '" + std::string(request.format) +
+               "' must be separate files, not embedded";
     if (!input->open(request.file, spec, wanted))
         return "cannot be loaded: " + input->geterror();
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
@@ -39,7 +41,7 @@ std::string read(const ImageRequest &request) {
         return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; the limit is " +
                std::to_string(side_limit) + " per side, so scale it down";
     const bool is_float = spec.format.is_floating_point();
-    // Grey, grey with alpha, RGB, or RGBA; ignores further channels of EXR files.
+    // The image is grey, grey with alpha, RGB, or RGBA. Additional channels of EXR files are ignored.
     const bool grey = spec.nchannels < 3;
     const int alpha = spec.nchannels == 2 ? 1 : spec.nchannels > 3 && spec.alpha_channel == 3 ? 3 : -1;
     const int channels = grey ? spec.nchannels : alpha == 3 ? 4 : 3;
@@ -52,9 +54,10 @@ std::string read(const ImageRequest &request) {
                            texel_size, OIIO::AutoStride, OIIO::AutoStride, progress,
                            const_cast<ImageRequest *>(&request)))
         return "cannot be loaded: " + input->geterror();
-    // The decoder fills in the missing part of a truncated JPEG and only notes it. Its other notes are harmless.
-    if (const std::string noted = input->geterror(); noted.find("Premature end") != noted.npos)
-        return "is truncated: " + noted;
+    // For a truncated JPEG, the decoder fills in the missing part and only sets a warning. Other warnings are
+    // harmless.
+    if (const std::string warning = input->geterror(); warning.find("Premature end") != warning.npos)
+        return "is truncated: " + warning;
     const std::size_t count = std::size_t(spec.width) * spec.height;
     if (is_float)
         expand(reinterpret_cast<float *>(texels), count, grey, alpha, 1.f);

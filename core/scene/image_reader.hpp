@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Interface between the loader and the shared object that links OpenImageIO. OpenImageIO pulls in two hundred
-// libraries, which take a quarter of a second to link at the start of every worker. So the loader opens the
-// shared object only if a scene has images.
+// Interface between the loader and the shared object that links OpenImageIO. OpenImageIO depends on two hundred
+// libraries, whose dynamic linking would take a quarter of a second at the start of every worker. Therefore the
+// loader opens this shared object only if a scene has images.
 #pragma once
 
 #include <cstddef>
@@ -14,14 +14,15 @@
 namespace arhost::scene {
 
 struct ImageRequest {
-    const char *format; // OpenImageIO's format name
+    const char *format; // OpenImageIO's name of the format
     std::string file;
-    std::span<const unsigned char> content; // replaces the file unless empty
+    std::span<const unsigned char> content; // if not empty, these bytes are decoded instead of the file
     std::function<std::byte *(std::uint32_t width, std::uint32_t height, bool is_float)> allocate; // RGBA texels
-    std::function<bool(float fraction)> report;                                                    // false: stop
+    std::function<bool(float fraction)> report; // returns false: stop decoding
 };
 
-// `error` is empty on success. Texels are returned as in the file: straight alpha, floats unchecked.
+// Sets `error` to a message, or leaves it empty on success. Does not change the texel values of the file: alpha is
+// straight (not premultiplied), and floats may be any value.
 using ReadImage = void(const ImageRequest &, std::string &error);
 inline constexpr const char *read_image_symbol = "arhost_read_image";
 

@@ -28,7 +28,7 @@ glm::dvec3 vector_of(const Node &node) {
     return {values[0], values[1], values[2]};
 }
 
-// A number for all three, or a list of three.
+// Reads three components: a list of three numbers, or one number for all three.
 glm::dvec3 number_or_vector(const Node &node) {
     return node.is_sequence() ? vector_of(node) : glm::dvec3(node.real());
 }
@@ -52,7 +52,7 @@ double linear_from_srgb(double encoded) {
     return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-// "#rrggbb" in sRGB; a number, or a list of three, in linear light.
+// Reads a colour: "#rrggbb" in sRGB, or a number or a list of three numbers in linear light.
 glm::vec3 colour_of(const Node &node, double maximum = 1) {
     const std::string requirement = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
                                     std::string(maximum == 1 ? "1)" : "1e6)");
@@ -97,7 +97,7 @@ Settings settings_of(const Node &root) {
         settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
     if (const auto node = root.find("ambient"))
         settings.ambient = colour_of(*node, light_limit);
-    else if (root.find("environment")) // replaces ambient light
+    else if (root.find("environment")) // an environment replaces the ambient light
         settings.ambient = glm::vec3(0);
     if (const auto node = root.find("background"))
         settings.background = colour_of(*node, light_limit);
@@ -123,12 +123,13 @@ float real_or(const Node &parent, std::string_view key, double low, double high,
     return node ? static_cast<float>(node->real(low, high)) : fallback;
 }
 
-// Absorption per mm, given directly or as the remaining colour of white light after a distance.
+// Reads the absorption coefficients per mm: either directly, or from the colour that white light has after it has
+// travelled a given distance.
 glm::vec3 extinction_of(const Node &glass) {
     const auto extinction = glass.find("extinction");
     const auto attenuation = glass.find("attenuation");
     if (extinction && attenuation)
-        attenuation->fail("duplicates 'extinction'; keep one of them");
+        attenuation->fail("cannot be combined with 'extinction'; remove one of them");
     if (extinction)
         return colour_of(*extinction, light_limit);
     if (!attenuation)
@@ -175,7 +176,8 @@ glm::dvec3 up_of(arhost_axes axes) {
     return axes == ARHOST_AXES_Z_UP ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
 }
 
-// A file, or a map with the file and its wrap mode and encoding.
+// Reads a texture: a file name, or a map of file name, wrap mode and encoding. Returns ARHOST_NONE if `key` is
+// absent.
 std::uint32_t texture_or_none(const Node &material, std::string_view key, bool is_colour, Textures &textures) {
     const auto node = material.find(key);
     if (!node)
@@ -215,7 +217,7 @@ Environment environment_of(const Node &node, arhost_axes axes, Textures &texture
         image.fail(error.what());
     }
     environment.intensity = intensity;
-    // Rotating the environment means rotating directions backwards before the lookup.
+    // To rotate the environment, directions are rotated by the inverse before the lookup.
     const Transform y_up = axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
     environment.environment_from_world =
         glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), rotation ? -rotation->real() : 0)).matrix()));
@@ -244,7 +246,7 @@ arhost_material material_of(const Node &node, Textures &textures) {
         material.metallic_roughness_texture = texture_or_none(node, "metallic_roughness_texture", false, textures);
         material.normal_texture = texture_or_none(node, "normal_texture", false, textures);
         material.emission_texture = texture_or_none(node, "emission_texture", true, textures);
-        if (material.emission_texture != ARHOST_NONE) // the texture is multiplied by it
+        if (material.emission_texture != ARHOST_NONE) // `emission` is a factor of the texture; default 1
             set(material.emission, glm::vec3(1));
         const glm::vec3 colour = colour_or(node, "colour", glm::vec3(1));
         set(material.diffuse, colour);
@@ -255,7 +257,7 @@ arhost_material material_of(const Node &node, Textures &textures) {
             set(material.emission, colour_of(*emission, light_limit));
         return material;
     }
-    // Check keys before loading textures.
+    // Check the keys before loading textures, which takes longer.
     if (model == "diffuse")
         node.allow_keys({"model", "ambient", "diffuse", "texture", "alpha_cutoff"});
     else if (model == "specular")
@@ -290,7 +292,7 @@ glm::dvec3 direction_of(const Node &node) {
     return direction / length;
 }
 
-// The half sides of a rectangle light that faces `direction`; the first one is horizontal.
+// Sets the half-side vectors of a rectangle light that points along `direction`. The first one is horizontal.
 void set_sides(arhost_light &light, const glm::dvec3 &direction, const glm::dvec3 &up, const Node &size_node) {
     const std::vector<double> size = size_node.is_sequence() ? size_node.reals(2) : std::vector(2, size_node.real());
     for (const double side : size)
@@ -353,7 +355,7 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
 Transform step_of(const Node &node) {
     node.allow_keys({"translate", "scale", "rotate"});
     if (node.entries().size() != 1)
-        node.fail("each step of a transform must be one of translate, scale and rotate");
+        node.fail("each step of a transform must have exactly one of the keys translate, scale and rotate");
     if (const auto by = node.find("translate"))
         return Transform::translation(position_of(*by));
     if (const auto by = node.find("scale")) {
@@ -376,7 +378,8 @@ Transform transform_of(const Node &object) {
     return world_from_object;
 }
 
-// Keyframe motion of an object: a node, and a channel for each property that any key sets.
+// Keyframe motion of an object: one node, and one channel for each property (translation, rotation, scale) that at
+// least one key sets.
 struct KeyframeMotion {
     MotionNode node;
     std::vector<Channel> channels;
@@ -425,13 +428,15 @@ KeyframeMotion keyframe_motion_of(const Node &node, bool is_sphere) {
             axis = direction_of(node->require("axis"));
             degrees = node->require("degrees").real(-1e6, 1e6);
         }
-        // Between different axes, the interpolation always takes the shortest path.
+        // Interpolation between rotations about different axes always takes the shorter direction, so only rotations
+        // about the same axis need a check.
         const bool same_axis = previous_degrees == 0 || degrees == 0 || glm::length(axis - previous_axis) < 1e-9;
         const double angle = std::abs(degrees - previous_degrees);
         if (!is_first && same_axis && angle >= 180)
             (node ? *node : keys_node)
-                .fail("rotates by " + std::to_string(std::lround(angle)) +
-                      " degrees since the previous key; the limit is below 180, so add a key in between");
+                .fail("the object rotates by " + std::to_string(std::lround(angle)) +
+                      " degrees between this key and the previous one; it must be less than 180, so add a key in "
+                      "between");
         is_first = false;
         previous_degrees = degrees;
         const double half = std::fmod(degrees, 720) * std::numbers::pi / 360;
@@ -448,7 +453,7 @@ KeyframeMotion keyframe_motion_of(const Node &node, bool is_sphere) {
         values.insert(values.end(), {float(by.x), float(by.y), float(by.z)});
     });
     if (motion.channels.empty())
-        keys_node.fail("set none of translate, rotate and scale");
+        keys_node.fail("must set at least one of translate, rotate and scale");
     return motion;
 }
 
@@ -457,7 +462,7 @@ glm::dvec3 centre_of(const Node &shape) {
     return centre ? position_of(*centre) : glm::dvec3(0);
 }
 
-// The sides of a box.
+// Reads the side lengths of a box, in mm.
 glm::dvec3 size_of(const Node &node) {
     const glm::dvec3 size = number_or_vector(node);
     for (int i = 0; i < 3; ++i)
@@ -510,7 +515,7 @@ std::string extent_of(const TriangleMesh &mesh) {
     return text;
 }
 
-// The replacement for a missing mesh file.
+// Reads the size and triangle count of the stand-in from the scene file, and creates its mesh.
 TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
     node.allow_keys({"faces", "size"});
     const std::int64_t faces = node.require("faces").integer(stand_in_faces_minimum, stand_in_faces_maximum);
@@ -530,7 +535,7 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
     const bool missing = stand_in && !std::filesystem::exists(path.input_path(), unknown) && !unknown;
     if (missing && callbacks.warning)
         callbacks.warning(path.input_path().string() +
-                          " is missing; drawing a stand-in with the triangle count given in the scene; "
+                          " is missing; a stand-in with the triangle count set in the scene is drawn instead; "
                           "tools/get-models downloads the available meshes");
     try {
         TriangleMesh mesh =
@@ -565,7 +570,7 @@ public:
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
             if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_))).second)
-                node.fail("duplicate material; keep one of them");
+                node.fail("another material has the same name; rename or remove one of them");
         }
         if (const auto lights = root_.find("lights"))
             for (const Node &node : lights->items())
@@ -596,7 +601,7 @@ private:
         const Transform world_from_object = transform_of(node);
         const std::uint32_t motion_node = add_motion(node, shape_key == "sphere");
 
-        LoadCallbacks part = callbacks_; // maps its progress to the whole scene's
+        LoadCallbacks part = callbacks_; // converts the progress of this object to that of the whole scene
         if (callbacks_.progress)
             part.progress = [&](double fraction, const std::string &what) {
                 callbacks_.progress(
@@ -617,7 +622,8 @@ private:
         Reporter(part, name).report(1);
     }
 
-    // Adds the node and channels of the object's `motion`; ARHOST_NONE if it has none.
+    // Adds a node and channels for the object's `motion`. Returns the index of the node, or ARHOST_NONE if the object
+    // has no `motion`.
     std::uint32_t add_motion(const Node &object, bool is_sphere) {
         const auto motion = object.find("motion");
         if (!motion)
@@ -663,7 +669,7 @@ private:
         for (const char *key : {"mesh", "gltf", "sphere", "cuboid", "plane"})
             if (const auto shape = node.find(key)) {
                 if (!found.empty())
-                    shape->fail("the object has a " + found + " already; split it into two objects");
+                    shape->fail("the object already has a " + found + "; split it into two objects");
                 found = key;
             }
         if (found.empty())

@@ -11,8 +11,8 @@
 
 namespace arhost::scene {
 
-// Reads a scene file and its meshes. Throws yaml::Error, which names the scene file, line, column and key, for
-// errors in either; throws Cancelled on request of the callback.
+// Reads a scene file and its meshes. Throws yaml::Error for errors in the scene file or a mesh; its message names the
+// scene file, line, column and key. Throws Cancelled if the callback requests it.
 ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks = {});
 ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks = {});
 

@@ -13,7 +13,8 @@
 namespace arhost::scene {
 namespace {
 
-// Index of the first vertex at the same position, for each vertex. Hash table with open addressing.
+// Returns, for each vertex, the index of the first vertex at the same position. Uses a hash table with open
+// addressing.
 std::vector<std::uint32_t> welded(std::span<const glm::vec3> positions) {
     std::vector<std::uint32_t> table(std::bit_ceil(positions.size() * 2), ARHOST_NONE), same(positions.size());
     for (std::uint32_t i = 0; i < positions.size(); ++i) {
@@ -32,7 +33,7 @@ std::vector<std::uint32_t> welded(std::span<const glm::vec3> positions) {
     return same;
 }
 
-// In double precision: squared lengths of tiny meshes underflow in floats.
+// Normalizes in double precision, because squared lengths in tiny meshes underflow in floats.
 glm::vec3 unit(const glm::dvec3 &v) {
     const double length = glm::length(v);
     return length > 0 && std::isfinite(length) ? glm::vec3(v / length) : glm::vec3(0);
@@ -52,7 +53,7 @@ std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh) {
     std::vector<glm::vec3> normals(mesh.positions.size());
     for (std::size_t i = 0; i < normals.size(); ++i) {
         normals[i] = unit(sums[same[i]]);
-        if (normals[i] == glm::vec3(0)) // no triangle, or only degenerate ones
+        if (normals[i] == glm::vec3(0)) // the vertex has no triangles, or only degenerate ones
             normals[i].z = 1;
     }
     return normals;

@@ -19,24 +19,25 @@ struct TriangleMesh {
     std::vector<glm::vec3> normals;   // one per vertex, unit length; empty: flat shading
     std::vector<glm::vec2> texcoords; // one per vertex, or empty
     std::vector<glm::uvec3> triangles;
-    // Only for meshes that deform; layout as in arhost_geometry.
+    // Empty unless the mesh deforms. The layout is that of arhost_geometry.
     std::vector<glm::u16vec4> joints{};
     std::vector<glm::vec4> weights{};
     std::vector<glm::vec3> morph_positions{}, morph_normals{};
 };
 
-// what() is one sentence for the user that starts with the file and the line, or the byte offset in binary
-// files: "bunny.ply:12: a vertex needs three numbers".
+// what() is one sentence for the user. It starts with the file name and, if known, the line (in binary files: the
+// byte offset): "bunny.ply:12: a vertex needs three numbers".
 class MeshError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-// Area-weighted means of the triangles' normals. Vertices at the same position share one, which hides
-// texture seams.
+// Returns one normal per vertex: the area-weighted mean of the normals of its triangles. Vertices at the same
+// position get the same normal, so texture seams do not show in the shading.
 std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh);
 
-// Applies MeshOptions::smooth, normalizes the normals, and computes missing and zero-length ones.
+// Applies `smooth` as described at MeshOptions::smooth, normalizes all normals, and computes those that are missing
+// or have length 0.
 void complete_normals(TriangleMesh &mesh, std::optional<bool> smooth);
 
 } // namespace arhost::scene

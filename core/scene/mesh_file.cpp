@@ -16,7 +16,7 @@
 namespace arhost::scene {
 namespace {
 
-constexpr std::size_t chunk = 1 << 20; // bytes between two progress reports
+constexpr std::size_t chunk = 1 << 20; // bytes read between two progress reports
 
 class File {
 public:
@@ -63,7 +63,7 @@ Bytes read_whole(const std::string &name, std::uint64_t byte_limit, const Report
         if (count < 0)
             fail(name, std::string("cannot be read: ") + std::strerror(errno));
         if (count == 0)
-            fail(name, "shrank while it was read");
+            fail(name, "became shorter while it was being read");
         done += static_cast<std::size_t>(count);
         reporter.report(-1);
     }
@@ -92,7 +92,7 @@ public:
         while (true) {
             if (written == out.size()) {
                 if (out.size() >= byte_limit)
-                    fail(name_, "uncompresses to more than the limit of " + mebibytes(byte_limit));
+                    fail(name_, "its decompressed content exceeds the limit of " + mebibytes(byte_limit));
                 out.resize(std::min<std::uint64_t>(byte_limit, std::max(chunk, 2 * out.size())));
             }
             stream_.next_in = reinterpret_cast<Bytef *>(compressed_.data() + consumed);
@@ -107,8 +107,8 @@ public:
                 if (ends_at(consumed))
                     break;
                 if (!is_gzip(compressed_.data() + consumed, compressed_.size() - consumed))
-                    fail(name_,
-                         "the gzip data is corrupt at byte " + std::to_string(consumed) + ": not a gzip member");
+                    fail(name_, "the gzip data is corrupt at byte " + std::to_string(consumed) +
+                                    ": a gzip header is expected here");
                 inflateReset(&stream_);
             } else if (status == Z_MEM_ERROR) {
                 throw std::bad_alloc();
@@ -126,7 +126,8 @@ public:
     }
 
 private:
-    // The trailer states the size modulo 2^32; deflate's best ratio is 1032:1.
+    // Estimates the decompressed size from the gzip trailer, which has the size modulo 2^32. The trailer may be
+    // wrong, so the estimate is limited to deflate's highest compression ratio, 1032:1.
     std::uint64_t estimated_size(std::uint64_t byte_limit) const {
         std::uint64_t stated = 0;
         for (std::size_t i = 0; i < 4 && compressed_.size() >= 18; ++i)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A file's content in memory, and functions that parse numbers in it. Private to core/scene.
+// The content of a mesh file in memory, and functions that parse it. Private to core/scene.
 #pragma once
 
 #include "scene/callbacks.hpp"
@@ -32,19 +32,20 @@ private:
     std::size_t size_ = 0;
 };
 
-// A file's content, uncompressed.
+// The content of a file, after gzip decompression if it is compressed.
 class MeshFile {
 public:
-    // Throws MeshError.
+    // Throws MeshError, also if the file or its decompressed content has more than `byte_limit` bytes.
     static MeshFile read(const std::filesystem::path &file, std::uint64_t byte_limit, const Reporter &reporter);
 
     const char *begin() const { return bytes_.get()->data(); }
     const char *end() const { return bytes_.get()->data() + bytes_.get()->size(); }
     std::string_view view() const { return {begin(), bytes_->size()}; }
     const std::string &name() const { return name_; }
-    void normalize_line_ends(); // CR-only files (classic Mac OS) to LF
+    void normalize_line_ends(); // converts CR line ends (classic Mac OS) to LF
 
-    // Throw MeshError: about the file, the line at `at`, or the byte offset of `at`.
+    // Each function throws a MeshError that names the file. fail_line also names the line that contains `at`;
+    // fail_byte names the byte offset of `at`.
     [[noreturn]] void fail(const std::string &message) const;
     [[noreturn]] void fail_line(const char *at, const std::string &message) const;
     [[noreturn]] void fail_byte(const char *at, const std::string &message) const;
@@ -71,10 +72,10 @@ inline void skip_line(const char *&p, const char *end) {
     p = newline ? static_cast<const char *>(newline) + 1 : end;
 }
 
-// The token at p for error messages: shortened, control characters replaced.
+// Returns the token at p for error messages: shortened, and with '?' for each character that is not printable ASCII.
 std::string token_at(const char *p, const char *end);
 
-// Parses the number at p and moves p past it; false if there is no number.
+// Parses the number at p and moves p past it. Returns false if there is no number.
 inline bool read_number(const char *&p, const char *end, float &value) {
     const char *begin = p < end && *p == '+' ? p + 1 : p;
     const auto [stop, error] = std::from_chars(begin, end, value);

@@ -30,9 +30,10 @@ Kind kind_of(const std::filesystem::path &file) {
         return Kind::Obj;
     if (extension == ".ply")
         return Kind::Ply;
-    throw MeshError(file.string() + ": " +
-                    (extension.empty() ? "a mesh file without extension" : "mesh files '*" + extension + "'") +
-                    " cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)");
+    throw MeshError(
+        file.string() + ": " +
+        (extension.empty() ? "the file name has no extension" : "the format '" + extension + "' is unsupported") +
+        "; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)");
 }
 
 void check_content(const MeshFile &file, Kind kind) {
@@ -40,12 +41,12 @@ void check_content(const MeshFile &file, Kind kind) {
     if (content.empty())
         file.fail("is empty");
     if (content.starts_with("\xfe\xff") || content.starts_with("\xff\xfe"))
-        file.fail("is text in UTF-16; save it as UTF-8 or ASCII");
+        file.fail("is UTF-16 text; save it as UTF-8 or ASCII");
     const bool is_ply = content.starts_with("ply\n") || content.starts_with("ply\r");
     if (kind == Kind::Ply && !is_ply)
-        file.fail_line(file.begin(), "a PLY file begins with a line 'ply', this one does not");
+        file.fail_line(file.begin(), "the first line must be 'ply'");
     if (kind == Kind::Obj && is_ply)
-        file.fail("is a PLY file by its content; name it .ply");
+        file.fail("has the extension .obj but contains a PLY mesh; rename it to .ply");
 }
 
 } // namespace
@@ -60,7 +61,7 @@ TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &opt
         check_content(content, kind);
         mesh = kind == Kind::Obj ? parse_obj(content, reporter) : parse_ply(content, reporter);
     }
-    for (glm::vec2 &texcoord : mesh.texcoords) // v starts at the texture's bottom in these formats
+    for (glm::vec2 &texcoord : mesh.texcoords) // in OBJ and PLY, v = 0 is the bottom of the texture
         texcoord.y = 1 - texcoord.y;
     complete_normals(mesh, options.smooth);
     return mesh;

@@ -13,15 +13,15 @@
 namespace arhost::scene {
 
 struct MeshOptions {
-    // true: normals from the file, computed if it has none; false: no normals, flat shading; absent: normals
-    // if the file has them.
+    // true: smooth shading, with the normals of the file, or computed ones if it has none; false: flat shading,
+    // without normals; absent: smooth shading if the file has normals.
     std::optional<bool> smooth;
-    // Of the file, and of its uncompressed content: 40 million triangles are about 2 GiB of text.
+    // Maximum size of the file and of its decompressed content. 40 million triangles are about 2 GiB of text.
     std::uint64_t byte_limit = std::uint64_t(4) << 30;
 };
 
-// At least one triangle; vertices as in the file, texcoords as arhost/scene.h defines them, unit normals,
-// polygons triangulated. Throws MeshError.
+// Returns a mesh with at least one triangle. Positions are those of the file, texture coordinates are as defined in
+// arhost/scene.h, normals have unit length, and polygons are triangulated. Throws MeshError.
 TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &options = {},
                        const LoadCallbacks &callbacks = {});
 

@@ -15,7 +15,7 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t spare_floats = 4;
-constexpr float min_scale = 1e-6f; // animations hide objects by a scale of 0, which has no inverse
+constexpr float min_scale = 1e-6f; // animations hide objects with a scale of 0, which has no inverse
 
 glm::vec3 vector_of(const float *v) {
     return {v[0], v[1], v[2]};
@@ -43,8 +43,8 @@ glm::dmat4 matrix_of(const glm::vec3 &translation, const glm::quat &rotation, co
     return matrix;
 }
 
-// Shrinks the object to a point if ray tracers could not use the matrix: it is nearly singular, or extreme values
-// have multiplied along the node hierarchy.
+// Writes the matrix to `to`. If ray tracers could not use it, because it is nearly singular or because extreme values
+// have multiplied along the node hierarchy, writes a matrix that shrinks the object to almost a point.
 void write(const glm::dmat4 &matrix, float (&to)[12]) {
     std::array<float, 12> values;
     for (int column = 0; column < 4; ++column)
@@ -64,14 +64,14 @@ void write(const glm::dmat4 &matrix, float (&to)[12]) {
     std::ranges::copy(values, to);
 }
 
-// NaN becomes the limit.
+// Clamps to ±coordinate_limit_mm. NaN becomes the limit.
 void clamp_coordinates(std::vector<float> &values) {
     constexpr float limit = coordinate_limit_mm;
     for (float &v : values)
         v = v < limit ? (v > -limit ? v : -limit) : limit;
 }
 
-// The keyframe interval that contains a time.
+// The interval between two keyframes that contains a given time.
 struct Interval {
     std::size_t before, after;
     float fraction; // position in the interval, 0 to 1
@@ -136,7 +136,7 @@ void MotionEvaluator::evaluate_nodes(float time_s) {
     }
     for (const arhost_channel &channel : view<arhost_channel>(scene_.channels))
         apply(channel, time_s);
-    for (std::size_t i = 0; i < nodes.size(); ++i) { // parents come first
+    for (std::size_t i = 0; i < nodes.size(); ++i) { // parents precede their children
         const Pose &pose = poses_[i];
         const glm::dmat4 parent_from_node = nodes[i].animated ? matrix_of(pose.translation, pose.rotation, pose.scale)
                                                               : matrix_of(nodes[i].parent_from_node);
@@ -154,7 +154,7 @@ void MotionEvaluator::apply(const arhost_channel &channel, float time_s) {
     const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
     const float t = channel.interpolation == ARHOST_INTERPOLATION_STEP ? 0 : interval.fraction;
     const float *values = view<float>(channel.values).data();
-    // Keyframes hold in-tangent, value and out-tangent, or only a value.
+    // A cubic keyframe has an in-tangent, a value and an out-tangent; other keyframes have only a value.
     const auto part = [&](std::size_t key, std::size_t which) {
         return values + (cubic ? key * 3 + which : key) * width;
     };
@@ -220,8 +220,8 @@ void MotionEvaluator::deform(const arhost_object &object, Deformed &into) const 
     clamp_coordinates(into.positions);
 }
 
-// Linear blend skinning (glTF 2.0, 3.7.3.3). Normals use the inverse transpose of the blended matrix: its cofactor
-// matrix, whose missing division by the determinant does not matter after normalization.
+// Linear blend skinning (glTF 2.0, 3.7.3.3). Normals are transformed by the cofactor matrix of the blended matrix. It
+// equals the inverse transpose except for the factor 1/determinant, which normalization removes.
 void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const {
     using Matrix = std::array<float, 12>;
     const auto joints = view<std::uint32_t>(skin.joints);
@@ -254,7 +254,8 @@ void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &s
         float *n = &into.normals[3 * v];
         const glm::vec3 yz = glm::cross(y, z);
         const glm::vec3 normal = yz * n[0] + glm::cross(z, x) * n[1] + glm::cross(x, y) * n[2];
-        const float length = std::copysign(glm::length(normal), glm::dot(x, yz)); // keeps the side if mirrored
+        // A mirroring matrix must not move the normal to the other side of the surface.
+        const float length = std::copysign(glm::length(normal), glm::dot(x, yz));
         const bool usable = length != 0 && std::isfinite(length);
         for (int k = 0; k < 3; ++k)
             n[k] = usable ? normal[k] / length : k == 2;

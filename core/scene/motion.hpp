@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Evaluates the motion of a scene at a time, as arhost/motion.h passes it to ray tracers.
+// Evaluates the motion of a scene at a given time. The result has the form in which arhost/motion.h passes it to ray
+// tracers.
 #pragma once
 
 #include <arhost/motion.h>
@@ -21,7 +22,7 @@ class MotionEvaluator {
 public:
     explicit MotionEvaluator(const arhost_scene &scene);
 
-    // The motion repeats every duration_s. The result is valid until the next call.
+    // Returns the motion at `time_s`. It repeats with the period duration_s of the scene. Valid until the next call.
     arhost_motion at(double time_s);
 
 private:
@@ -32,7 +33,8 @@ private:
         std::vector<float> morph_weights;
     };
     struct Deformed {
-        std::vector<float> positions, normals; // FLOAT3, followed by spare floats
+        std::vector<float> positions,
+            normals; // three floats per vertex, followed by the spare floats of arhost/motion.h
     };
 
     template <class T> std::span<const T> view(const arhost_buffer &buffer) const {

@@ -17,7 +17,7 @@ public:
         : file_(file), reporter_(reporter), p_(file.begin()), end_(file.end()) {}
 
     TriangleMesh parse() {
-        if (file_.view().starts_with("\xef\xbb\xbf")) // UTF-8's byte order mark
+        if (file_.view().starts_with("\xef\xbb\xbf")) // UTF-8 byte order mark
             p_ += 3;
         const char *next_report = p_;
         while (p_ < end_) {
@@ -30,9 +30,9 @@ public:
         }
         if (corners_[0].empty())
             file_.fail("contains no triangles" + std::string(other_shapes_ ? ", only points, lines or curves" : "") +
-                       (positions_.empty() ? ", nor vertices" : ""));
+                       (positions_.empty() ? ", and no vertices" : ""));
         if (uses_materials_)
-            reporter_.info(file_.name() + ": ignores its MTL materials; the scene file defines the materials");
+            reporter_.info(file_.name() + ": the MTL materials are ignored; the scene file defines the materials");
         return mesh();
     }
 
@@ -64,7 +64,7 @@ private:
         return true;
     }
 
-    // Skips blanks and line continuations (backslash at the line end).
+    // Skips blanks and line continuations (a backslash at the end of a line).
     void skip_gap() {
         while (true) {
             skip_blanks(p_, end_);
@@ -89,14 +89,14 @@ private:
             if (at_line_end()) {
                 if (i >= needed)
                     break;
-                file_.fail_line(line, std::string(what) + " needs " + std::to_string(needed) + " numbers, has " +
+                file_.fail_line(line, std::string(what) + " needs " + std::to_string(needed) + " numbers, but has " +
                                           std::to_string(i));
             }
             const char *token = p_;
             if (!read_number(p_, end_, values[i]) || !at_token_end())
                 file_.fail_line(token, "'" + token_at(token, end_) + "' is not a number");
             if (!std::isfinite(values[i]))
-                file_.fail_line(token, std::string(what) + " has the number '" + token_at(token, end_) + "'");
+                file_.fail_line(token, std::string(what) + " has the invalid number '" + token_at(token, end_) + "'");
         }
         return values;
     }
@@ -126,7 +126,8 @@ private:
         }
         const auto &polygon = polygon_[Position];
         if (polygon.size() < 3)
-            file_.fail_line(line, "a face needs three corners, has " + std::to_string(polygon.size()));
+            file_.fail_line(line, "a face needs at least three corners, but this one has " +
+                                      std::to_string(polygon.size()));
         const auto triangles = triangulate(polygon, positions_, triangles_);
         if (triangles.empty())
             file_.fail_line(line, "a concave face has " + std::to_string(polygon.size()) + " corners, more than " +
@@ -139,7 +140,7 @@ private:
                 if (kind != Position && !used_[kind]) {
                     if (from[t.x] == ARHOST_NONE && from[t.y] == ARHOST_NONE && from[t.z] == ARHOST_NONE)
                         continue;
-                    used_[kind] = true; // earlier triangles have none
+                    used_[kind] = true; // earlier triangles have no such attribute
                     corners_[kind].resize(corners_[Position].size() - 1, glm::uvec3(ARHOST_NONE));
                 }
                 corners_[kind].emplace_back(from[t.x], from[t.y], from[t.z]);
@@ -153,14 +154,14 @@ private:
             file_.fail_line(token, "'" + token_at(token, end_) + "' is not a corner of a face");
         const std::int64_t zero_based = value < 0 ? static_cast<std::int64_t>(count) + value : value - 1;
         if (value == 0 || zero_based < 0 || zero_based >= static_cast<std::int64_t>(count))
-            file_.fail_line(token, "a face refers to " + std::string(what) + " " + std::to_string(value) + ", but " +
-                                       std::to_string(count) + " are defined above");
+            file_.fail_line(token, "a face refers to " + std::string(what) + " " + std::to_string(value) +
+                                       ", but only " + std::to_string(count) + " are defined above");
         return static_cast<std::uint32_t>(zero_based);
     }
 
     TriangleMesh mesh() {
         if (used_[Normal] && has_gap(corners_[Normal])) {
-            reporter_.info(file_.name() + ": only some faces have normals; ignores all of them");
+            reporter_.info(file_.name() + ": only some faces have normals; all normals are ignored");
             used_[Normal] = false;
         }
         if (!used_[Normal] && !used_[Texcoord])
@@ -175,7 +176,8 @@ private:
         return false;
     }
 
-    // One vertex per distinct triple of position, texcoord and normal. Hash table with open addressing.
+    // Returns a mesh with one vertex for each distinct combination of position, texcoord and normal. Finds them with
+    // a hash table with open addressing.
     TriangleMesh with_joined_vertices() {
         TriangleMesh mesh;
         const std::size_t corner_count = corners_[Position].size() * 3;

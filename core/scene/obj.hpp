@@ -10,7 +10,7 @@
 
 namespace arhost::scene {
 
-// Texcoords as in the file: v = 0 at the texture's bottom. Throws MeshError.
+// Does not flip texcoords: v = 0 is the bottom of the texture. Throws MeshError.
 TriangleMesh parse_obj(MeshFile &file, const Reporter &reporter);
 
 } // namespace arhost::scene

@@ -60,14 +60,15 @@ public:
         : file_(file), reporter_(reporter), p_(file.begin()) {}
 
     Header parse() {
-        // The first line's ending determines the others'; binary data may contain any of these bytes.
+        // All header lines must end like the first one (LF, CR LF or CR). The following binary data may contain any
+        // of these bytes.
         const std::string_view all = file_.view();
         if (all.starts_with("ply\r") && !all.starts_with("ply\r\n"))
             line_end_ = '\r';
         next_line(); // "ply"
         while (true) {
             if (p_ == file_.end())
-                file_.fail_line(line_, "the header lacks end_header");
+                file_.fail_line(line_, "the header has no line 'end_header'");
             next_line();
             const std::string_view key = word();
             if (key == "end_header")
@@ -79,11 +80,11 @@ public:
             else if (key == "property")
                 property();
             else if (!key.empty() && key != "comment" && key != "obj_info")
-                reporter_.info(file_.name() + ": ignores the unknown header line '" + std::string(line_, line_stop_) +
-                               "'");
+                reporter_.info(file_.name() + ": an unknown header line is ignored: '" +
+                               std::string(line_, line_stop_) + "'");
         }
         if (header_.format == Format::None)
-            file_.fail_line(file_.begin(), "the header lacks a format");
+            file_.fail_line(file_.begin(), "the header has no line 'format'");
         header_.data = p_;
         return std::move(header_);
     }
@@ -133,14 +134,14 @@ private:
         std::int64_t value = -1;
         const char *p = count.data();
         if (!read_integer(p, count.data() + count.size(), value) || p != count.data() + count.size() || value < 0)
-            fail("the element '" + element.name + "' has the count " + quoted(count));
+            fail("the element '" + element.name + "' has the invalid count " + quoted(count));
         element.count = static_cast<std::uint64_t>(value);
         header_.elements.push_back(std::move(element));
     }
 
     void property() {
         if (header_.elements.empty())
-            fail("a property precedes the first element");
+            fail("the header has a property before the first element");
         Property property;
         std::string_view type_name = word();
         if (type_name == "list") {
@@ -169,8 +170,8 @@ private:
     Header header_;
 };
 
-// The two readers return the values of an element in order. At the end of the file they fail with an error
-// that names the element.
+// AsciiReader and BinaryReader return the values of an element in the order of its properties. If the file ends too
+// early, they throw an error that names the element.
 class AsciiReader {
 public:
     static constexpr std::size_t min_value_size(Type) { return 2; } // a digit and a separator
@@ -196,7 +197,7 @@ public:
         while (!at_token_end())
             ++p_;
     }
-    // Each element has its own line, so that a missing number cannot shift the following elements.
+    // Each element is on its own line, so a missing number cannot shift the numbers of the following elements.
     void begin_element(const Element &element, std::uint64_t index) {
         element_ = &element;
         index_ = index;
@@ -210,7 +211,7 @@ public:
         skip_blanks(p_, file_.end());
         value_ = p_;
         if (p_ < file_.end() && *p_ != '\n')
-            fail(here() + " has more values than properties");
+            fail(here() + " has more values than the header declares properties");
     }
     std::uint64_t bytes_left() const { return static_cast<std::uint64_t>(file_.end() - p_) + 1; }
     double fraction() const {
@@ -271,7 +272,7 @@ public:
         case Type::Float64:
             break;
         }
-        fail(here() + ": must be an integer, but the property has a float type");
+        fail(here() + ": the value must be an integer, but the header declares the property as a float");
     }
     void skip(Type type) { take(size_of(type)); }
     void begin_element(const Element &element, std::uint64_t index) {
@@ -339,11 +340,11 @@ public:
                 read_faces(element);
             else
                 each(element, [&](const Property &property) { skip_value(property); });
-            if (&element == faces) // ignore everything after the faces
+            if (&element == faces) // nothing after the faces is needed
                 break;
         }
         if (mesh_.triangles.empty())
-            file_.fail("contains no triangles: its faces have fewer than three corners");
+            file_.fail("contains no triangles: all faces have fewer than three corners");
         return std::move(mesh_);
     }
 
@@ -356,7 +357,7 @@ private:
         if (element.count > ARHOST_NONE / 4 ||
             element.count * std::max<std::uint64_t>(element_size, 1) > reader_.bytes_left())
             file_.fail("the header declares " + std::to_string(element.count) + " elements '" + element.name +
-                       "', but only " + std::to_string(reader_.bytes_left()) + " bytes are left for them");
+                       "', but the file has only " + std::to_string(reader_.bytes_left()) + " bytes for them");
     }
 
     template <class Read> void each(const Element &element, Read &&read) {
@@ -400,7 +401,7 @@ private:
                 present[static_cast<std::size_t>(slot)] = true;
         }
         if (!(present[X] && present[X + 1] && present[X + 2]))
-            file_.fail("the vertices lack x, y or z");
+            file_.fail("each vertex must have the properties x, y and z");
         const bool has_normals = present[NX] && present[NX + 1] && present[NX + 2];
         const bool has_texcoords = present[S] && present[S + 1];
         mesh_ = {};
@@ -441,8 +442,8 @@ private:
             for (std::uint64_t i = 0; i < count; ++i) {
                 const std::int64_t index = reader_.integer(property.type);
                 if (index < 0 || static_cast<std::uint64_t>(index) >= mesh_.positions.size())
-                    reader_.fail(reader_.here() + " refers to vertex " + std::to_string(index) + ", but " +
-                                 std::to_string(mesh_.positions.size()) + " are defined above");
+                    reader_.fail(reader_.here() + " refers to vertex " + std::to_string(index) + ", but only " +
+                                 std::to_string(mesh_.positions.size()) + " are defined");
                 polygon_.push_back(static_cast<std::uint32_t>(index));
             }
             add_polygon();

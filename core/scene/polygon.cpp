@@ -11,7 +11,8 @@
 namespace arhost::scene {
 namespace {
 
-// Newell's method (Sutherland et al. 1974): robust for collinear and slightly non-coplanar corners.
+// Returns the normal by Newell's method (Sutherland et al. 1974), which is robust for collinear and slightly
+// non-coplanar corners.
 glm::dvec3 newell_normal(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions) {
     glm::dvec3 normal(0);
     for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -21,12 +22,12 @@ glm::dvec3 newell_normal(std::span<const std::uint32_t> polygon, std::span<const
     return normal;
 }
 
-// Twice the signed area of a triangle; positive if counter-clockwise.
+// Returns twice the signed area of a triangle; it is positive for counter-clockwise corners.
 double signed_area2(const glm::dvec2 &a, const glm::dvec2 &b, const glm::dvec2 &c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// Drops the largest component of the normal; the result is counter-clockwise.
+// Projects the polygon to 2D by dropping the axis along which its normal is longest. The result is counter-clockwise.
 std::vector<glm::dvec2> projected(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions) {
     const glm::dvec3 normal = newell_normal(polygon, positions), size = glm::abs(normal);
     const int dropped = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
@@ -62,7 +63,7 @@ void clip_ears(const std::vector<glm::dvec2> &points, std::vector<glm::uvec3> &t
                                     signed_area2(points[b], points[c], p) >= 0 &&
                                     signed_area2(points[c], points[a], p) >= 0;
                          });
-        // A self-intersecting polygon can run out of ears; then clip any corner.
+        // A self-intersecting polygon may have no ear left; in that case, clip any corner.
         if (ear || failed == n) {
             triangles.emplace_back(a, b, c);
             remaining.erase(remaining.begin() + static_cast<std::ptrdiff_t>(at % n));

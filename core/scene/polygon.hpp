@@ -11,12 +11,13 @@
 
 namespace arhost::scene {
 
-// Concave polygons with more corners are rejected: ear clipping takes at least quadratic time.
+// Concave polygons with more corners are rejected, because ear clipping takes at least quadratic time.
 inline constexpr std::size_t concave_corner_limit = 1000;
 
-// Triangles as indices into `polygon`, with its winding: a fan for a convex polygon, ear clipping (Meisters
-// 1975) for a concave one. Empty if it is concave with more than concave_corner_limit corners. `polygon` holds
-// at least 3 indices into `positions`; the result is stored in `triangles`.
+// Triangulates `polygon`, which has at least 3 indices into `positions`. Returns triangles as indices into `polygon`,
+// with the same winding; their memory is `triangles`. Makes a fan from a convex polygon and clips the ears of a
+// concave one (Meisters 1975). Returns nothing if the polygon is concave and has more than concave_corner_limit
+// corners.
 std::span<const glm::uvec3> triangulate(std::span<const std::uint32_t> polygon, std::span<const glm::vec3> positions,
                                         std::vector<glm::uvec3> &triangles);
 

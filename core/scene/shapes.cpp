@@ -30,7 +30,7 @@ Transform Transform::rotation(const glm::dvec3 &k, double degrees) {
 }
 
 std::optional<double> Transform::uniform_scale() const {
-    const glm::dmat3 squared = glm::transpose(linear_) * linear_; // scale² · identity, if it is uniform
+    const glm::dmat3 squared = glm::transpose(linear_) * linear_; // equals scale² · identity if the scale is uniform
     const double scale_squared = (squared[0][0] + squared[1][1] + squared[2][2]) / 3;
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
@@ -76,7 +76,7 @@ TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::d
             glm::dvec3 normal(0), middle(centre);
             normal[axis] = side * 2;
             middle[axis] += side * size[axis];
-            // The axes along which the face's width and height run.
+            // The axes of the face's width and height.
             const bool horizontal = glm::dot(up, normal) != 0;
             const int along = horizontal ? 3 - axis : up.z != 0 ? 2 : 1, across = 3 - axis - along;
             const glm::dvec2 extent =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Transforms that are baked into vertices, and the built-in shapes of scene files. Private to core/scene.
+// Transforms that are applied to vertices during loading, and the built-in shapes of scene files. Private to
+// core/scene.
 #pragma once
 
 #include "scene/mesh.hpp"
@@ -28,11 +29,11 @@ public:
     glm::dmat4 matrix() const;
     glm::dvec3 operator()(const glm::dvec3 &point) const { return linear_ * point + offset_; }
 
-    // The scale factor, or nothing if it depends on the direction.
+    // Returns the scale factor, or std::nullopt if it depends on the direction.
     std::optional<double> uniform_scale() const;
 
-    // Normals by the inverse transpose. A mirroring transform flips the winding, so that front faces stay front
-    // faces.
+    // Transforms positions, and normals by the inverse transpose. If the transform mirrors, flips the winding, so
+    // front faces remain front faces.
     void apply(TriangleMesh &mesh) const;
 
 private:
@@ -41,12 +42,13 @@ private:
     glm::dvec3 offset_{0};
 };
 
-// 2 triangles, counter-clockwise seen from the side `normal` points to. The first side is horizontal, the second
-// as close to `up` as possible. In a horizontal rectangle, they run along x and along y (z-up) or −z (y-up).
+// Returns two triangles that are counter-clockwise seen from the side to which `unit_normal` points. size.x is the
+// length of the horizontal side; the other side points as much as possible along `up`. If the rectangle itself is
+// horizontal, its sides are along x and along y (z-up scenes) or −z (y-up scenes).
 TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &unit_normal, const glm::dvec3 &up,
                        const glm::dvec2 &size);
 
-// Six rectangles that face outwards, each with the whole texture, upright.
+// Returns six rectangles that face outwards. Each shows the whole texture, upright.
 TriangleMesh cuboid(const glm::dvec3 &centre, const glm::dvec3 &up, const glm::dvec3 &size);
 
 } // namespace arhost::scene

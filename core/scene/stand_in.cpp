@@ -13,8 +13,9 @@ namespace {
 
 constexpr double two_pi = 2 * std::numbers::pi;
 
-// (2,3) torus knot on a torus of radii 2 and 1 with axis z. `along` and `around`, 0 to 1, are the position on the
-// tube; seen from outside, `around` runs counter-clockwise from `along`.
+// Returns a point of a tube along the (2,3) torus knot; the torus has the radii 2 and 1 and the axis z. `along` (0 to
+// 1) is the position along the knot, `around` (0 to 1) the position around the tube. Seen from outside, the direction
+// of `around` is 90° counter-clockwise from that of `along`.
 glm::dvec3 on_knot(double along, double around) {
     const double t = two_pi * along, angle = two_pi * around;
     const auto centre = [](double t) {
@@ -43,8 +44,8 @@ void fit(TriangleMesh &mesh, const glm::dvec3 &size) {
 } // namespace
 
 TriangleMesh stand_in(std::uint32_t faces, const glm::dvec3 &size) {
-    // Roughly square quads of two triangles. To reach the exact count, some quads are split into four triangles,
-    // and finally one triangle into two.
+    // The tube consists of roughly square quads of two triangles each. To reach the exact count, some quads are split
+    // into four triangles, and if the count is odd, one triangle is split into two.
     const std::uint32_t pairs = faces / 2;
     const auto around = std::clamp(static_cast<std::uint32_t>(std::sqrt(pairs / 9.0)), 3u, pairs / 3);
     const std::uint32_t along = pairs / around;

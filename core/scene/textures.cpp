@@ -4,7 +4,7 @@
 namespace arhost::scene {
 namespace {
 
-// Names are shown to users, and `validate` rejects control characters.
+// Replaces control characters, which `validate` rejects in names.
 std::string printable(std::string text) {
     for (char &c : text)
         if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
@@ -16,7 +16,7 @@ std::string printable(std::string text) {
 
 LoadCallbacks Textures::image_callbacks() const {
     LoadCallbacks callbacks = callbacks_;
-    if (callbacks_.progress) // images do not advance the scene's progress
+    if (callbacks_.progress) // loading images does not advance the progress of the scene
         callbacks.progress = [this](double fraction, const std::string &what) {
             callbacks_.progress(0, what + ": " + std::to_string(static_cast<int>(fraction * 100)) + " %");
         };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The textures of a scene during loading. Private to core/scene.
+// Loads the textures of a scene and adds them to an ArenaBuilder. Private to core/scene.
 #pragma once
 
 #include "scene/image.hpp"
@@ -18,12 +18,13 @@ class Textures {
 public:
     Textures(ArenaBuilder &builder, const LoadCallbacks &callbacks) : builder_(builder), callbacks_(callbacks) {}
 
-    // The texture's index. The same image with the same use is loaded once. For an image embedded in `file`,
-    // `content` holds its bytes and `part` identifies it. Throws ImageError.
+    // Loads an image and returns the index of its texture. Loads the same image with the same `use` only once. If the
+    // image is embedded in `file`, `content` must have its bytes, and `part` must identify it within the file. Throws
+    // ImageError.
     std::uint32_t add(const std::filesystem::path &file, const TextureUse &use,
                       std::span<const unsigned char> content = {}, const std::string &part = "");
 
-    // Includes the cumulative sums. Throws ImageError.
+    // Loads an environment map and computes its cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
 
 private:

@@ -17,7 +17,7 @@ namespace arhost::scene {
 namespace {
 
 constexpr float extinction_limit = 1e6f;
-// Rounding tolerance of lengths, weight sums and bounds.
+// Tolerance for rounding errors in lengths, sums of weights, and bounds.
 constexpr float tolerance = 1e-3f;
 
 struct Invalid {
@@ -34,7 +34,7 @@ std::string number(double value) {
     return text;
 }
 
-// NaN compares as false, so it is outside every range.
+// Returns false for NaN, because all comparisons with NaN are false.
 bool within(float value, float low, float high) {
     return value >= low && value <= high;
 }
@@ -45,8 +45,9 @@ void check_floats(std::span<const float> values, float low, float high, const st
             fail(what + " is " + number(value) + ", outside " + number(low) + " to " + number(high));
 }
 
-// A float with a cleared sign bit compares like the integer of its bits; infinity and NaN are largest. The integer
-// loop is limited by memory bandwidth only.
+// Returns whether all absolute values are within coordinate_limit_mm. With the sign bit cleared, floats have the same
+// order as their bit patterns read as integers, and infinity and NaN are the largest. The integer comparison
+// vectorizes, so only memory bandwidth limits the loop.
 bool all_within_limit(std::span<const float> values) {
     const std::int32_t limit = std::bit_cast<std::int32_t>(coordinate_limit_mm);
     std::int32_t outside = 0;
@@ -55,7 +56,8 @@ bool all_within_limit(std::span<const float> values) {
     return !outside;
 }
 
-// Likewise for 0 to 1e6: the sign bit of a negative float makes it the largest unsigned integer.
+// Returns whether all values are 0 to 1e6, with the same method: the sign bit makes negative floats larger than all
+// positive ones when read as unsigned integers.
 bool all_radiances(std::span<const float> values) {
     std::uint32_t highest = 0;
     for (const float value : values)
@@ -115,9 +117,9 @@ public:
 private:
     void check_header() {
         if (reinterpret_cast<std::uintptr_t>(arena_.data()) % arena_alignment != 0)
-            fail("it is not aligned to 64 bytes in memory");
+            fail("its memory is not aligned to 64 bytes");
         if (arena_.size() < sizeof(arhost_scene))
-            fail("it is too short for its header");
+            fail("it is shorter than the header");
         scene_ = reinterpret_cast<const arhost_scene *>(arena_.data());
         if (scene_->magic != ARHOST_SCENE_MAGIC)
             fail("it does not begin with the magic number of scenes");
@@ -125,14 +127,14 @@ private:
             fail("its version is " + std::to_string(scene_->version) + ", not " +
                  std::to_string(ARHOST_SCENE_VERSION));
         if (scene_->struct_size != sizeof(arhost_scene))
-            fail("its header has the wrong size");
+            fail("the struct_size of its header is wrong");
         if (scene_->byte_size < sizeof(arhost_scene) || scene_->byte_size > arena_.size())
             fail("its header states " + std::to_string(scene_->byte_size) + " bytes, but the arena has " +
                  std::to_string(arena_.size()));
         arena_ = arena_.first(scene_->byte_size);
         unused_bytes_ = scene_->byte_size - sizeof(arhost_scene);
         if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
-            fail("its axes are unknown");
+            fail("its value of 'axes' is unknown");
         if (scene_->max_depth > max_depth_limit)
             fail("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
                  std::to_string(max_depth_limit));
@@ -145,8 +147,9 @@ private:
         check_floats(scene_->bounds_max, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_max");
     }
 
-    // The elements of a buffer, after checking that they and the spare bytes lie in the arena. The sizes of all
-    // buffers may not exceed the arena's: else a small arena could refer to one large buffer a million times.
+    // Checks that the buffer and its spare bytes are inside the arena, and returns its elements. The total size of
+    // all buffers must not exceed the size of the arena; otherwise, a small arena could refer to one large buffer a
+    // million times, and checking it would take very long.
     template <class T> std::span<const T> view(const arhost_buffer &buffer, const std::string &what) {
         if (buffer.count == 0) {
             if (buffer.offset != 0 || buffer.stride != 0)
@@ -171,14 +174,14 @@ private:
 
     void check_names() {
         if (!names_.empty() && names_.back() != '\0')
-            fail("the last name is not terminated");
+            fail("the last name has no terminating zero");
         for (const char c : names_)
             if (c != '\0' && (static_cast<unsigned char>(c) < 0x20 || c == 0x7f))
                 fail("a name contains a control character");
     }
 
     std::string name_of(std::size_t object) const {
-        constexpr std::size_t shown = 64; // a million objects could share a name of one gigabyte
+        constexpr std::size_t shown = 64; // names may be gigabytes long
         const char *name = names_.data() + objects_[object].name;
         return "object " + std::to_string(object) + " '" + std::string(name, strnlen(name, shown)) + "'";
     }
@@ -189,7 +192,7 @@ private:
             fail("the name of object " + std::to_string(i) + " is outside the table of names");
         const auto in_table = [&](std::uint32_t index, std::size_t count, const char *what) {
             if (index >= count)
-                fail(name_of(i) + " has " + what + " " + std::to_string(index) + ", but there are " +
+                fail(name_of(i) + " refers to " + what + " " + std::to_string(index) + ", but the scene has only " +
                      std::to_string(count));
         };
         in_table(object.geometry, geometries_.size(), "geometry");
@@ -203,7 +206,7 @@ private:
             fail(name_of(i) + " has an unknown role");
         const float *m = object.world_from_object;
         check_floats(object.world_from_object, -coordinate_limit_mm, coordinate_limit_mm,
-                     name_of(i) + ": a number of world_from_object");
+                     name_of(i) + ": an element of world_from_object");
         const glm::dvec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         const double size = glm::length(x) * glm::length(y) * glm::length(z);
         if (!(std::abs(glm::dot(glm::cross(x, y), z)) > 1e-9 * size))
@@ -220,9 +223,10 @@ private:
         if (object.skin != ARHOST_NONE)
             in_table(object.skin, skins_.size(), "skin");
         if (object.skin != ARHOST_NONE && (object.moves || !object.deforms || !is_identity(object.world_from_object)))
-            fail(name_of(i) + " has a skin, so it must deform, not move, and have the identity as world_from_object");
+            fail(name_of(i) + " has a skin; it must therefore set deforms, not moves, and its world_from_object must "
+                              "be the identity");
         if (object.deforms && geometries_[object.geometry].type != ARHOST_GEOMETRY_TRIANGLES)
-            fail(name_of(i) + " deforms, but has no triangles");
+            fail(name_of(i) + " deforms, but its geometry is not a triangle mesh");
     }
 
     static bool is_identity(const float (&m)[12]) {
@@ -232,7 +236,7 @@ private:
         return true;
     }
 
-    // Finds the object that deforms each geometry; no other object may use it.
+    // Finds the object that deforms each geometry. No other object may use a deforming geometry.
     void check_deforming() {
         deformers_.assign(geometries_.size(), ARHOST_NONE);
         std::vector<std::uint32_t> uses(geometries_.size(), 0);
@@ -259,7 +263,7 @@ private:
             fail(what + "its name is outside the table of names");
         if (texture.width - 1 >= texture_side_limit || texture.height - 1 >= texture_side_limit)
             fail(what + "it has " + std::to_string(texture.width) + " x " + std::to_string(texture.height) +
-                 " texels, outside 1 to " + std::to_string(texture_side_limit) + " a side");
+                 " texels; each side must have 1 to " + std::to_string(texture_side_limit));
         if (texture.texels.count != std::uint64_t(texture.width) * texture.height)
             fail(what + "it has " + std::to_string(texture.texels.count) + " texels for " +
                  std::to_string(texture.width) + " x " + std::to_string(texture.height));
@@ -269,7 +273,7 @@ private:
                    !all_radiances(texels)) {
             for (std::size_t t = 0; t < texels.size(); ++t)
                 if (!all_radiances(texels.subspan(t, 1)))
-                    fail(what + "texel " + std::to_string(t / 4) + " has the number " + number(texels[t]));
+                    fail(what + "texel " + std::to_string(t / 4) + " has the invalid value " + number(texels[t]));
         }
     }
 
@@ -283,15 +287,15 @@ private:
             return;
         }
         if (environment.texture >= textures_.size())
-            fail("the environment has texture " + std::to_string(environment.texture) + ", but there are " +
-                 std::to_string(textures_.size()));
+            fail("the environment refers to texture " + std::to_string(environment.texture) +
+                 ", but the scene has only " + std::to_string(textures_.size()));
         const arhost_texture &texture = textures_[environment.texture];
         if (texture.format != ARHOST_TEXEL_RGBA32F)
             fail("the environment's texture is not RGBA32F");
         check_floats({&environment.intensity, 1}, 0, radiance_limit, "the environment's intensity");
         const float *m = environment.environment_from_world;
         check_floats(environment.environment_from_world, -1 - tolerance, 1 + tolerance,
-                     "a number of environment_from_world");
+                     "an element of environment_from_world");
         const glm::vec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         if (!(glm::length(glm::cross(x, y) - z) <= tolerance && glm::length(glm::cross(y, z) - x) <= tolerance &&
               glm::length(glm::cross(z, x) - y) <= tolerance && is_unit({m, 3})))
@@ -334,7 +338,7 @@ private:
         const arhost_channel &channel = channels_[i];
         const std::string what = "channel " + std::to_string(i) + ": ";
         if (channel.node >= nodes_.size())
-            fail(what + "it has node " + std::to_string(channel.node) + ", but there are " +
+            fail(what + "it refers to node " + std::to_string(channel.node) + ", but the scene has only " +
                  std::to_string(nodes_.size()));
         if (channel.target < ARHOST_CHANNEL_TRANSLATION || channel.target > ARHOST_CHANNEL_MORPH_WEIGHTS)
             fail(what + "its target is unknown");
@@ -359,7 +363,7 @@ private:
         const bool cubic = channel.interpolation == ARHOST_INTERPOLATION_CUBIC;
         if (width == 0 || values.size() != times.size() * width * (cubic ? 3 : 1))
             fail(what + "it has " + std::to_string(values.size()) + " values for " + std::to_string(times.size()) +
-                 " keys of " + std::to_string(width));
+                 " keys with " + std::to_string(width) + " components each");
         check_floats(values, -coordinate_limit_mm, coordinate_limit_mm, what + "a value");
         if (channel.target == ARHOST_CHANNEL_ROTATION)
             for (std::size_t key = 0; key < times.size(); ++key)
@@ -376,7 +380,7 @@ private:
                  " matrices");
         for (const std::uint32_t joint : joints)
             if (joint >= nodes_.size())
-                fail(what + "it has node " + std::to_string(joint) + ", but there are " +
+                fail(what + "it refers to node " + std::to_string(joint) + ", but the scene has only " +
                      std::to_string(nodes_.size()));
         check_floats(floats_of(matrices), -coordinate_limit_mm, coordinate_limit_mm, what + "node_from_mesh");
     }
@@ -389,7 +393,7 @@ private:
         for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
                                             material.normal_texture, material.emission_texture})
             if (texture != ARHOST_NONE && texture >= textures_.size())
-                fail(what + "it has texture " + std::to_string(texture) + ", but there are " +
+                fail(what + "it refers to texture " + std::to_string(texture) + ", but the scene has only " +
                      std::to_string(textures_.size()));
         check_floats(material.ambient, 0, 1, what + "ambient");
         check_floats(material.diffuse, 0, 1, what + "diffuse");
@@ -434,7 +438,7 @@ private:
             fail(what + "a directional light cannot have a falloff");
     }
 
-    // "geometry 3 (object 1 'bunny')"
+    // Returns the name of a geometry for messages: "geometry 3 (object 1 'bunny')".
     std::string geometry_name(std::size_t geometry) const {
         std::string text = "geometry " + std::to_string(geometry);
         for (std::size_t i = 0; i < objects_.size(); ++i)
@@ -462,7 +466,7 @@ private:
         }
     }
 
-    // Joints and morph targets must be present exactly if an object uses them.
+    // A geometry must have joints if, and only if, its object has a skin; likewise morph targets.
     void check_deformation(const arhost_geometry &geometry, std::size_t i) {
         const std::uint64_t vertices = geometry.positions.count;
         const auto joints = view<glm::u16vec4>(geometry.joints, "the buffer of joints");
@@ -484,7 +488,8 @@ private:
                  std::to_string(targets) + " targets and " + std::to_string(vertices) + " vertices");
         if (!morph_normals.empty() && (morph_normals.size() != morph_positions.size() || geometry.normals.count == 0))
             fail("it has " + std::to_string(morph_normals.size()) + " morph_normals for " +
-                 std::to_string(morph_positions.size()) + " morph_positions, or no normals");
+                 std::to_string(morph_positions.size()) + " morph_positions and " +
+                 std::to_string(geometry.normals.count) + " normals; morph_normals need normals");
         check_coordinates(floats_of(morph_positions), 3, "morph position");
         check_coordinates(floats_of(morph_normals), 3, "morph normal");
         if (!skinned)
@@ -493,10 +498,13 @@ private:
         for (std::size_t v = 0; v < joints.size(); ++v) {
             const glm::u16vec4 &j = joints[v];
             if (std::max({j.x, j.y, j.z, j.w}) >= joint_count)
-                fail("vertex " + std::to_string(v) + " has a joint beyond the skin's " + std::to_string(joint_count));
+                fail("vertex " + std::to_string(v) + " refers to joint " +
+                     std::to_string(std::max({j.x, j.y, j.z, j.w})) + ", but the skin has only " +
+                     std::to_string(joint_count) + " joints");
             const glm::vec4 &w = weights[v];
             if (!(std::min({w.x, w.y, w.z, w.w}) >= 0 && within(w.x + w.y + w.z + w.w, 1 - tolerance, 1 + tolerance)))
-                fail("vertex " + std::to_string(v) + " has negative weights, or weights whose sum is not 1");
+                fail("vertex " + std::to_string(v) +
+                     " has invalid joint weights; they must not be negative, and their sum must be 1");
         }
     }
 
@@ -505,7 +513,7 @@ private:
             return;
         for (std::size_t i = 0; i < values.size(); ++i)
             if (!within(values[i], -coordinate_limit_mm, coordinate_limit_mm))
-                fail(std::string(what) + " " + std::to_string(i / components) + " has the coordinate " +
+                fail(std::string(what) + " " + std::to_string(i / components) + " has the invalid coordinate " +
                      number(values[i]));
     }
 
@@ -551,8 +559,8 @@ private:
         for (std::size_t i = 0; i < triangles.size(); ++i)
             if (const std::uint32_t index = std::max({triangles[i].x, triangles[i].y, triangles[i].z});
                 index >= vertex_count)
-                fail("triangle " + std::to_string(i) + " has the vertex " + std::to_string(index) +
-                     ", but there are " + std::to_string(vertex_count));
+                fail("triangle " + std::to_string(i) + " refers to vertex " + std::to_string(index) +
+                     ", but the mesh has only " + std::to_string(vertex_count));
     }
 
     Box check_spheres(const arhost_geometry &geometry) {
@@ -566,7 +574,7 @@ private:
         check_coordinates(floats_of(spheres), 4, "sphere");
         for (std::size_t i = 0; i < spheres.size(); ++i)
             if (!(spheres[i].w > 0))
-                fail("sphere " + std::to_string(i) + " has the radius " + number(spheres[i].w));
+                fail("sphere " + std::to_string(i) + " has the invalid radius " + number(spheres[i].w));
         return box_of(spheres);
     }
 
@@ -577,7 +585,7 @@ private:
             fail("bounds_min is above bounds_max");
         const glm::vec3 margin = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
         for (std::size_t i = 0; i < objects_.size(); ++i) {
-            if (objects_[i].deforms) // its extent depends on its motion
+            if (objects_[i].deforms) // its bounding box changes over time
                 continue;
             const Box box = transformed(objects_[i].world_from_object, boxes[objects_[i].geometry]);
             const glm::vec3 below = low - box.min - margin, above = box.max - high - margin;
@@ -598,7 +606,7 @@ private:
     std::span<const arhost_channel> channels_;
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
-    std::vector<std::uint32_t> deformers_; // per geometry: object index or ARHOST_NONE
+    std::vector<std::uint32_t> deformers_; // for each geometry: index of the object that deforms it, or ARHOST_NONE
 };
 
 } // namespace

@@ -12,8 +12,10 @@ namespace arhost::aruco {
 struct DictionaryType {
     const char *option;
     PredefinedDictionary name;
-    const char *family;     // AprilTag's name for its families, else the option's
-    int april_tag_bits = 0; // bits that an AprilTag family can correct; OpenCV's tables have 0
+    const char *family; // reported name: AprilTag's name for its families, otherwise the name in the option
+    // Number of bit errors that an AprilTag family can correct, which OpenCV's tables lack; 0: not an AprilTag
+    // family.
+    int april_tag_bits = 0;
 
     // OpenCV's AprilTag dictionaries are rotated by 180° relative to AprilTag's own library.
     constexpr bool is_april_tag() const { return april_tag_bits > 0; }

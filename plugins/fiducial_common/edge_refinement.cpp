@@ -26,18 +26,19 @@ double sample(const cv::Mat &grey, cv::Point2d at) {
     return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
 }
 
-// The edge's offset from `at` along the outward normal: the mean weighted by the squared gradient, as in AprilTag.
-// std::nullopt if no gradient of that sign exceeds the noise.
+// Returns the offset of the edge from `at` along the outward normal: the mean position weighted by the squared
+// gradient, as in AprilTag. Only uses gradients of the sign `sign`. Returns std::nullopt if none of them exceeds the
+// noise.
 std::optional<double> edge_offset_px(const cv::Mat &grey, cv::Point2d at, cv::Point2d outward, double sign) {
-    constexpr double step = 0.25, min_rise = 8;                                 // px; grey levels
-    constexpr int search = 9, half_baseline = 3, ends = search + half_baseline; // steps
+    constexpr double step = 0.25, min_rise = 8;                                 // step in px; min_rise in grey levels
+    constexpr int search = 9, half_baseline = 3, ends = search + half_baseline; // all in steps
     std::array<double, 2 * ends + 1> profile;
     for (int i = -ends; i <= ends; ++i)
         profile[i + ends] = sample(grey, at + i * step * outward);
     double weighted = 0, weights = 0;
     for (int i = -search; i <= search; ++i) {
         const double rise = sign * (profile[i + half_baseline + ends] - profile[i - half_baseline + ends]);
-        if (rise > min_rise) { // false for NaN
+        if (rise > min_rise) { // also false if `rise` is NaN
             weighted += rise * rise * i;
             weights += rise * rise;
         }
@@ -51,7 +52,8 @@ Line fit_line(const std::vector<cv::Point2f> &points) {
     return {cv::Point2d(line[2], line[3]), cv::Point2d(line[0], line[1])};
 }
 
-// Rejects outliers; std::nullopt if fewer than half of the `sampled` points are left.
+// Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
+// std::nullopt if fewer than half of them remain.
 std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled) {
     constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
@@ -76,10 +78,10 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
     }
 }
 
-// In undistorted pixels.
+// Fits a line in undistorted pixels to the edge between two corners.
 std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d to, const Lens &lens, double sign) {
     const double length = cv::norm(to - from);
-    // Near a corner the search would hit the other edge.
+    // Close to a corner, the search would hit the adjacent edge.
     const double margin = std::min(3.0, length / 4) / length;
     const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
     std::vector<cv::Point2d> samples;
@@ -89,14 +91,15 @@ std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d 
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < count; ++i) {
         const cv::Point2d along = samples[std::min(i + 1, count - 1)] - samples[i > 0 ? i - 1 : 0];
-        const cv::Point2d outward = cv::Point2d(along.y, -along.x) / cv::norm(along); // corners go clockwise
+        // The corners are in clockwise order.
+        const cv::Point2d outward = cv::Point2d(along.y, -along.x) / cv::norm(along);
         if (const auto offset = edge_offset_px(grey, samples[i], outward, sign))
             found.push_back(samples[i] + *offset * outward);
     }
     const auto straight = lens.undistort(found);
     if (!straight)
         return std::nullopt;
-    std::vector<cv::Point2f> relative; // to `from`, which keeps float precise enough
+    std::vector<cv::Point2f> relative; // relative to `from`, so the precision of float suffices
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
     auto line = fit_line_robustly(std::move(relative), count);
@@ -105,7 +108,7 @@ std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d 
     return line;
 }
 
-// +1: the square is darker than its surroundings.
+// Returns +1 if the square is darker than its surroundings, otherwise −1.
 double contrast_sign(const cv::Mat &grey, const Corners &corners) {
     const cv::Point2d centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
     double sum = 0;
@@ -149,7 +152,7 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
                                                             before.direction;
             moved = std::max(moved, cv::norm(crossing - corners[i]));
             corners[i] = crossing;
-            if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // false for NaN
+            if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // the comparison is false for NaN
                 return std::nullopt;
         }
     }

@@ -7,10 +7,10 @@
 
 namespace arhost::fiducial {
 
-// Fits lines to the four edges of the black (or inverted: white) square near the rough corners, and returns their
-// intersections. Unlike a search at the corner itself, this uses the whole edge, has no inward bias, and tolerates a
-// hidden corner. Lines are fitted in undistorted pixels, where edges are straight. std::nullopt if the image does not
-// have four such edges.
+// Fits lines to the four edges of the black square (white, if the marker is inverted) near the rough corners, and
+// returns the intersections of these lines. Unlike a search for the corner itself, this method uses the whole edge,
+// has no inward bias, and tolerates a hidden corner. It fits the lines in undistorted pixels, where edges are
+// straight. Returns std::nullopt if it does not find four edges.
 std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens);
 
 } // namespace arhost::fiducial

@@ -17,7 +17,7 @@ struct Located {
     PlanarPose pose;
 };
 
-// A total order, so that the result depends on neither the detector's order nor its threads.
+// A total order, so the result depends neither on the order of the detections nor on the detector's threads.
 bool is_better(const Located &a, const Located &b) {
     const auto key = [](const Located &l) {
         const cv::Point2d &corner = l.detection.corners_px[0];
@@ -50,7 +50,7 @@ MarkerReport::MarkerReport(const arhost_tracker_setup &setup, const std::string 
     : lens_(*setup.intrinsics), family_(family) {
     if (setup.marker_count < 1 || setup.marker_count > ARHOST_MAX_MARKERS)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::to_string(setup.marker_count) +
-                                                             " markers are listed; list 1 to " +
+                                                             " markers are listed under 'markers'; list 1 to " +
                                                              std::to_string(ARHOST_MAX_MARKERS));
     for (std::uint32_t i = 0; i < setup.marker_count; ++i) {
         const arhost_marker_config &marker = listed_marker(setup, i);

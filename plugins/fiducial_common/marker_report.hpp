@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Converts a detector's output to arhost_tracker_result, for all fiducial trackers.
+// Converts the output of a detector to arhost_tracker_result. All fiducial trackers use it.
 #pragma once
 
 #include "planar_pose.hpp"
@@ -12,22 +12,23 @@
 namespace arhost::fiducial {
 
 struct Detection {
-    std::size_t listed; // index into the setup's markers
+    std::size_t listed; // index in the list of markers in arhost_tracker_setup
     Corners corners_px;
-    double quality = 0; // of two detections of one marker the higher one is kept
+    double quality = 0; // if a marker is detected twice, the detection of higher quality is kept
 };
 
 class MarkerReport {
 public:
-    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if a listed id is not in 0 … id_count − 1. `family` is
-    // written to every record.
+    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if a listed id is not in 0 … id_count − 1. Every record gets
+    // the family name `family`.
     MarkerReport(const arhost_tracker_setup &setup, const std::string &family, std::size_t id_count);
 
-    const std::vector<int> &ids() const { return ids_; } // in the setup's order
+    const std::vector<int> &ids() const { return ids_; } // in the order of the setup
     const Lens &lens() const { return lens_; }
 
-    // Writes one record for each listed marker that was detected and has a pose, in the setup's order. Of several
-    // detections of one marker it keeps the one with the highest quality, then with the lowest reprojection error.
+    // Writes one record for each listed marker that was detected and has a pose, in the order of the setup. If a
+    // marker was detected several times, keeps the detection of the highest quality; among equals, the one with the
+    // lowest reprojection error.
     void write(std::span<const Detection> detections, arhost_tracker_result &result) const;
 
 private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One interface for OpenCV's ArUco detector: the contrib module up to 4.6, objdetect from 4.7.
+// A common interface to OpenCV's ArUco detector, which is in a contrib module up to OpenCV 4.6 and in objdetect
+// from 4.7.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -34,7 +35,7 @@ inline cv::aruco::Dictionary predefined(PredefinedDictionary name) {
 #endif
 }
 
-// One pixel per cell if `side_px` is markerSize + 2·border_bits.
+// Draws a marker. Each cell is one pixel if `side_px` is markerSize + 2·border_bits.
 inline void draw(const cv::aruco::Dictionary &dictionary, int id, int side_px, cv::Mat &image, int border_bits) {
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
     dictionary.generateImageMarker(id, side_px, image, border_bits);

@@ -17,7 +17,7 @@ using Square = std::array<cv::Point3d, 4>;
 using Jacobian = cv::Matx<double, 8, 6>;
 
 struct Motion {
-    cv::Vec3d rotation, translation; // marker to OpenCV's camera axes (x right, y down, z forward)
+    cv::Vec3d rotation, translation; // from the marker to OpenCV's camera axes (x right, y down, z forward)
 };
 
 double rms(const Corners &a, const Corners &b) {
@@ -27,7 +27,8 @@ double rms(const Corners &a, const Corners &b) {
     return std::sqrt(sum / 4);
 }
 
-// Convex, with no angle near 0° or 180°, and clockwise in the image (y down), as the front face of a marker is.
+// Returns whether `quad` is convex, has no angle near 0° or 180°, and is clockwise in the image (y down), like the
+// front face of a marker.
 bool is_convex_front(const std::vector<cv::Point2d> &quad) {
     constexpr double min_sine = 1e-3;
     for (int i = 0; i < 4; ++i) {
@@ -38,7 +39,7 @@ bool is_convex_front(const std::vector<cv::Point2d> &quad) {
     return true;
 }
 
-// All corners are in front of the camera, and the print's front faces it.
+// Returns whether all corners are in front of the camera and the front of the print faces the camera.
 bool is_visible(const Motion &motion, const Square &square) {
     cv::Matx33d r;
     cv::Rodrigues(motion.rotation, r);
@@ -48,7 +49,7 @@ bool is_visible(const Motion &motion, const Square &square) {
     return r.col(2).dot(motion.translation) < 0;
 }
 
-// The pose of a square parallel to the image plane, from its undistorted pixels.
+// Computes the pose of a square that is parallel to the image plane, from the undistorted pixels of its corners.
 Motion frontal_pose(const std::vector<cv::Point2d> &quad, const Lens &lens, double side_mm) {
     const auto on_plane = [&](const cv::Point2d &px) { // z = 1
         return cv::Point2d(px.x / lens.undistorted_matrix()(0, 0), px.y / lens.undistorted_matrix()(1, 1));
@@ -62,7 +63,7 @@ Motion frontal_pose(const std::vector<cv::Point2d> &quad, const Lens &lens, doub
     return motion;
 }
 
-// Levenberg–Marquardt on the reprojection error in distorted pixels.
+// Minimizes the reprojection error in distorted pixels with the Levenberg–Marquardt method.
 void refine(Motion &motion, const Corners &corners_px, const Lens &lens, const Square &square) {
     double damping = 1e-6;
     Jacobian jacobian;
@@ -123,10 +124,10 @@ Lens::Lens(const arhost_intrinsics &intrinsics)
         (intrinsics.distortion == ARHOST_DISTORTION_FISHEYE && count == 4) ||
         (intrinsics.distortion == ARHOST_DISTORTION_BROWN && (count == 4 || count == 5 || count == 8 || count == 12));
     if (!valid || !(intrinsics.fx > 0) || !(intrinsics.fy > 0))
-        throw Failure(
-            ARHOST_STATUS_ERROR_CONFIGURATION,
-            "the camera's calibration is invalid: fx and fy must be > 0, and the distortion none, brown with "
-            "4, 5, 8 or 12 coefficients, or fisheye with 4");
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "the camera calibration is invalid: fx and fy must be greater than 0, and the distortion must "
+                      "be none, brown "
+                      "with 4, 5, 8 or 12 coefficients, or fisheye with 4 coefficients");
     coefficients_.create(static_cast<int>(count), count ? 1 : 0);
     std::copy_n(intrinsics.coefficients, count, coefficients_.begin());
 }
@@ -148,7 +149,8 @@ std::optional<std::vector<cv::Point2d>> Lens::undistort(const std::vector<cv::Po
         cv::fisheye::undistortPoints(pixels, result, matrix_, coefficients_, cv::noArray(), ideal_matrix_, criteria);
     else
         cv::undistortPoints(pixels, result, matrix_, coefficients_, cv::noArray(), ideal_matrix_, criteria);
-    // Where the model is not one-to-one, the iteration may converge to a wrong point.
+    // Where the distortion model is not one-to-one, the iteration may converge to a wrong point. Distort the result
+    // again to detect this.
     const std::vector<cv::Point2d> check = distort(result);
     for (std::size_t i = 0; i < pixels.size(); ++i)
         if (!(cv::norm(check[i] - pixels[i]) < 1e-4))
@@ -179,7 +181,7 @@ Corners Lens::project(const Square &points_mm, const cv::Vec3d &rotation, const 
     const std::vector<cv::Point3d> points(points_mm.begin(), points_mm.end());
     std::vector<cv::Point2d> projected;
     cv::Mat_<double> derivatives;
-    int first = 0; // the rotation's three columns start here; the translation's follow
+    int first = 0; // first of three columns for the rotation; three columns for the translation follow
     if (fisheye_) {
         cv::fisheye::projectPoints(points, projected, rotation, translation, matrix_, coefficients_, 0, derivatives);
         first = 8;
@@ -198,7 +200,7 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
     if (!ideal || !is_convex_front(*ideal))
         return std::nullopt;
     const double h = side_mm / 2;
-    const Square square{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}; // the order that IPPE_SQUARE requires
+    const Square square{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}; // IPPE_SQUARE requires this order
     std::vector<cv::Vec3d> rotations, translations;
     cv::solvePnPGeneric(std::vector<cv::Point3d>(square.begin(), square.end()), *ideal, lens.undistorted_matrix(),
                         cv::noArray(), rotations, translations, false, cv::SOLVEPNP_IPPE_SQUARE);
@@ -214,12 +216,14 @@ std::optional<PlanarPose> planar_pose(const Corners &corners_px, const Lens &len
         if (is_visible(motion, square) && std::isfinite(pose.reprojection_px))
             solutions.push_back({motion, pose});
     }
-    // OpenCV's IPPE fails if the marker is exactly parallel to the image plane, a rotation by 180° in its axes.
+    // OpenCV's IPPE fails if the marker is exactly parallel to the image plane, which is a rotation by 180° in
+    // OpenCV's axes.
     if (solutions.empty())
         solutions.push_back({frontal_pose(*ideal, lens, side_mm), {}});
     if (solutions.size() == 2 && solutions[1].pose.reprojection_px < solutions[0].pose.reprojection_px)
         std::swap(solutions[0], solutions[1]);
-    // Refine only the better one: near markers have a single minimum, to which the other would converge as well.
+    // Refine only the better solution. For a near marker, the error has a single minimum, to which the other solution
+    // would converge as well.
     refine(solutions[0].motion, corners_px, lens, square);
     const Pose best = pose_of(solutions[0].motion, corners_px, lens, square);
     if (solutions.size() == 1)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Owning pointers to libav's objects.
+// Owning pointers to libav objects.
 #pragma once
 
 extern "C" {
@@ -31,14 +31,14 @@ using FramePointer = std::unique_ptr<AVFrame, Delete>;
 using PacketPointer = std::unique_ptr<AVPacket, Delete>;
 using SwsPointer = std::unique_ptr<SwsContext, Delete>;
 
-// Throws std::bad_alloc if libav returned NULL.
+// Returns an owning pointer to the result of a libav allocation. Throws std::bad_alloc if it is NULL.
 template <class Pointer> Pointer allocated(typename Pointer::pointer pointer) {
     if (!pointer)
         throw std::bad_alloc();
     return Pointer(pointer);
 }
 
-// "Invalid data found when processing input"
+// Returns libav's text for an error code, such as "Invalid data found when processing input".
 inline std::string error_text(int code) {
     char text[AV_ERROR_MAX_STRING_SIZE] = "";
     av_strerror(code, text, sizeof text);

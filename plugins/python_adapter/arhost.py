@@ -17,7 +17,7 @@ from arhost_abi import *
 
 
 class Failure(Exception):
-    """An error for the user: a message that says what to change, and one of STATUS_ERROR_…"""
+    """An error that arhost reports to the user: a message that says what to change, and a status STATUS_ERROR_…"""
 
     def __init__(self, message, status=STATUS_ERROR_CONFIGURATION):
         super().__init__(message)
@@ -25,7 +25,7 @@ class Failure(Exception):
 
 
 class Host:
-    """The host's callbacks, callable on any thread. When cancelled() is true, raise Failure("", STATUS_ERROR_CANCELLED)."""
+    """Functions of the host. Any thread may call them. If cancelled() is true, raise Failure("", STATUS_ERROR_CANCELLED)."""
 
     def __init__(self, log, progress, cancelled):
         self.log, self.progress, self.cancelled = log, progress, cancelled
@@ -38,7 +38,7 @@ class Host:
 
 
 class Fields:
-    """The fields of a struct, and further values, as attributes."""
+    """Provides the fields of a struct, and additional values, as attributes."""
 
     def __init__(self, record=None, /, **more):
         for name in record.dtype.names if record is not None else ():
@@ -59,13 +59,13 @@ class Scene(Fields):
             setattr(self, name, self.elements(getattr(self, name), dtype))
 
     def elements(self, buffer, dtype):
-        """A view of a buffer: elements(scene.geometries[0]["positions"], "3f4"), or "3u4" for indices."""
+        """Returns a buffer as an array, without copying: elements(scene.geometries[0]["positions"], "3f4"); "3u4" for indices."""
         field = (lambda name: buffer[name]) if isinstance(buffer, np.void) else (lambda name: getattr(buffer, name))
         dtype, count, stride = np.dtype(dtype), int(field("count")), int(field("stride"))
         if count == 0:
             return np.zeros((0,) + dtype.shape, dtype.base)
         if dtype.itemsize > stride:
-            raise ValueError(f"elements of {dtype.itemsize} bytes do not fit the buffer's stride of {stride}")
+            raise ValueError(f"the elements have {dtype.itemsize} bytes, but the buffer has a stride of {stride} bytes")
         shape, strides = (count,) + dtype.shape, (stride,) + (dtype.base.itemsize,) * len(dtype.shape)
         return np.ndarray(shape, dtype.base, self._arena, int(field("offset")), strides)
 
@@ -119,7 +119,7 @@ class _Adapter:
             self.plugin = self._class_in(module, script, class_name)(self.host, **keywords)
             return STATUS_OK
 
-        # A script that fails to load would fail again on every retry.
+        # Report a configuration error: if the script fails to load now, it would also fail on every retry.
         return self._guarded(load, STATUS_ERROR_CONFIGURATION)
 
     def _class_in(self, module, script, wanted):
@@ -157,7 +157,7 @@ class _Adapter:
             return status, f"{''.join(place)}{type(error).__name__}: {error}"
 
     def _with_memory(self, memory, call):
-        """Runs `call` and warns once if the script still holds arrays over `memory`, which are invalid afterwards."""
+        """Runs `call`. Warns once if the script keeps arrays that refer to `memory`, which is invalid after the call."""
         references = [sys.getrefcount(view) for view in memory]
         result = self._guarded(call)
         if result[0] > 0 and not self.warned and references != [sys.getrefcount(view) for view in memory]:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Runs a class of a Python script in CPython. This file starts the interpreter and passes memory to arhost.py as
-// memoryviews; arhost.py presents it to the class. The GIL is held only during calls, so the script's threads run in
-// between.
+// memoryviews; arhost.py turns them into the objects that the class receives. The GIL is held only during calls, so
+// threads of the script can run between calls.
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
@@ -34,7 +34,7 @@ namespace {
 
 using namespace arhost;
 
-// An owned reference; null if Python raised an exception.
+// An owned reference to a Python object; null if Python raised an exception.
 class Object {
 public:
     Object(PyObject *owned = nullptr) : object_(owned) {} // NOLINT(google-explicit-constructor)
@@ -72,7 +72,7 @@ std::string text_of(PyObject *object) {
     return bytes ? bytes : "";
 }
 
-// The message of an exception that arhost.py did not handle.
+// Clears an exception that arhost.py did not handle, and returns its message.
 std::string take_error() {
     PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
     PyErr_Fetch(&type, &value, &trace);
@@ -113,7 +113,7 @@ template <class Plane> Object views_of_planes(const arhost_frame_format &format,
     return tuple_of(std::move(views));
 }
 
-// ---- the host's callbacks; `self` is a capsule that holds the Host ----
+// ---- functions that the script can call; `self` is a capsule that holds the Host ----
 
 const Host &host_of(PyObject *self) {
     return *static_cast<const Host *>(PyCapsule_GetPointer(self, nullptr));
@@ -143,8 +143,9 @@ PyMethodDef callbacks[] = {{"log", py_log, METH_VARARGS, "log(severity, text)"},
 
 // ---- the interpreter ----
 
-// Serialises the interpreter's start. In arhost-inprocess the adapters of several kinds share one process as separate
-// libraries; the only mutexes they share are those of the C library, such as that of stderr.
+// Serialises the start of the interpreter. In arhost-inprocess, the adapters of several kinds are separate libraries
+// in one process. The only mutexes that they share are those of the C library, so this class locks the mutex of
+// stderr.
 class ProcessLock {
 public:
     ProcessLock() { ::flockfile(stderr); }
@@ -157,7 +158,7 @@ void initialise(const std::string &interpreter) {
     const ProcessLock lock;
     if (Py_IsInitialized())
         return;
-    // Extension modules need libpython's symbols globally, but this plugin was opened with RTLD_LOCAL.
+    // Extension modules need the symbols of libpython to be global, but this plugin was opened with RTLD_LOCAL.
     Dl_info info{};
     if (::dladdr(reinterpret_cast<void *>(&Py_IsInitialized), &info))
         ::dlopen(info.dli_fname, RTLD_NOW | RTLD_GLOBAL | RTLD_NOLOAD);
@@ -165,8 +166,8 @@ void initialise(const std::string &interpreter) {
     PyConfig_InitPythonConfig(&config);
     config.install_signal_handlers = 0;
     config.parse_argv = 0;
-    config.buffered_stdio = 0; // keeps print() in order with the log
-    config.write_bytecode = 0; // no __pycache__ next to the script
+    config.buffered_stdio = 0; // keeps the output of print() in order with the log
+    config.write_bytecode = 0; // do not write __pycache__ next to the script
     PyConfig_SetBytesString(&config, &config.program_name, interpreter.c_str());
     const PyStatus status = Py_InitializeFromConfig(&config);
     PyConfig_Clear(&config);
@@ -176,7 +177,7 @@ void initialise(const std::string &interpreter) {
     PyEval_SaveThread();
 }
 
-// Creates the modules arhost_abi and arhost, which the script imports.
+// Creates the modules arhost_abi and arhost, which the script can import.
 Object import_arhost(const std::string &interpreter) {
     if (PyObject *already = PyImport_AddModule("arhost"); already && PyObject_HasAttrString(already, "_Adapter"))
         return Py_NewRef(already);
@@ -363,12 +364,13 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INPUT_PATH, "script", nullptr, "The Python script that defines the class."),
-    option(ARHOST_OPTION_TEXT, "class", "", "Class name; empty: the only class with a method '" METHOD "'."),
-    option(ARHOST_OPTION_TEXT, "arguments", "{}", "Further constructor arguments, as a JSON object."),
+    option(ARHOST_OPTION_TEXT, "class", "",
+           "Name of the class; empty: the only class that has a method '" METHOD "'."),
+    option(ARHOST_OPTION_TEXT, "arguments", "{}", "Additional constructor arguments, as a JSON object."),
     option(ARHOST_OPTION_INPUT_PATH, "interpreter", "/usr/bin/python3",
-           "The python whose packages are used, e.g. that of a virtual environment."),
+           "Path of the python whose packages are used, for example the python of a virtual environment."),
 #if defined(KIND_SINK)
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", "", "The output file, for classes that write one."),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", "", "Path of the output file, for classes that write a file."),
 #endif
 };
 

@@ -24,15 +24,16 @@ const char *advice_for(int error_number) {
         return "choose a writable path";
     case ENOTDIR:
     case EEXIST:
-        return "a folder in the path is a file";
+        return "a part of the path is a file, not a folder";
     case EISDIR:
-        return "the path is a folder: add a file's name";
+        return "the path is a folder; add a file name";
     default:
         return "choose another path";
     }
 }
 
-// Pipes and devices can neither be truncated after a restart nor replaced.
+// Throws unless `fd` is a regular file. The sinks truncate or replace their files, which is impossible for pipes and
+// devices.
 void require_regular_file(int fd, const std::filesystem::path &path) {
     struct stat status {};
     if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
@@ -67,7 +68,7 @@ void check_can_write(const std::filesystem::path &file) {
         throw io_failure("cannot open", file, errno);
     std::error_code error;
     if (std::filesystem::is_symlink(
-            std::filesystem::symlink_status(file, error))) { // a dangling link: check its target
+            std::filesystem::symlink_status(file, error))) { // `file` is a dangling link, so check its target
         std::filesystem::path target = std::filesystem::read_symlink(file, error);
         return check_can_write(target.is_absolute() ? target : file.parent_path() / target);
     }
@@ -75,7 +76,7 @@ void check_can_write(const std::filesystem::path &file) {
     if (fd < 0)
         throw io_failure("cannot open", file, errno);
     ::close(fd);
-    remove_file(file); // created above
+    remove_file(file); // open() created it
 }
 
 void remove_file(const std::filesystem::path &file) {
@@ -137,7 +138,8 @@ void File::read_at(std::uint64_t offset, std::span<std::uint8_t> bytes) const {
             bytes = bytes.subspan(static_cast<std::size_t>(got));
             offset += static_cast<std::uint64_t>(got);
         } else if (got == 0) {
-            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path_.string() + "' is shorter than expected");
+            throw Failure(ARHOST_STATUS_ERROR_IO,
+                          "'" + path_.string() + "' became shorter while arhost was using it");
         } else if (errno != EINTR) {
             throw io_failure("cannot read", path_, errno);
         }
@@ -156,7 +158,7 @@ void replace_file(const std::filesystem::path &target, const std::filesystem::pa
         if (::rename(scratch.c_str(), target.c_str()) != 0)
             throw io_failure("cannot write", target, errno);
     } catch (const Failure &) {
-        ::unlink(scratch.c_str()); // leave no partial file
+        ::unlink(scratch.c_str()); // do not leave a partial file
         throw;
     }
 }

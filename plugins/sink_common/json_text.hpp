@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// JSON lines, one per frame.
+// Writes and reads files with one JSON object per line and one line per frame.
 #pragma once
 
 #include <charconv>
@@ -14,13 +14,13 @@
 
 namespace arhost::json_text {
 
-// The shortest digits that read back as the same number.
+// Appends the shortest digits that read back as the same number.
 template <class Number> void append_number(std::string &text, Number number) {
-    char digits[32]; // a double needs at most 24
+    char digits[32]; // a double needs up to 24
     text.append(digits, std::to_chars(digits, digits + sizeof digits, number).ptr);
 }
 
-// JSON cannot express infinities and NaN: null.
+// Appends a number. Infinities and NaN, which JSON cannot express, become null.
 inline void append(std::string &text, double number) {
     if (std::isfinite(number))
         append_number(text, number);
@@ -37,10 +37,11 @@ inline void append(std::string &text, std::span<const double> numbers) {
     text += ']';
 }
 
-// The beginning of a line; the frame number and a comma follow.
+// Each line begins with this text, followed by the frame number and a comma.
 inline constexpr std::string_view frame_start = "{\"frame\": ";
 
-// The frame number of a complete or truncated line; nullopt if the number itself is incomplete or missing.
+// Returns the frame number of a line, which may be truncated. Returns std::nullopt if the number itself is truncated
+// or missing.
 inline std::optional<std::uint64_t> frame_of_line(std::string_view line) {
     if (!line.starts_with(frame_start))
         return std::nullopt;

@@ -15,7 +15,7 @@ void LineFile::start(std::uint64_t first_sequence, const std::function<bool(std:
     if (first_sequence == 0)
         return check_can_write(path_);
     open();
-    // The file has whole lines in ascending frame order; after a kill it may end in a partial line.
+    // The file has whole lines, sorted by frame. If the previous process was killed, it may end with a partial line.
     std::string text(file_->size(), '\0');
     file_->read_at(0, {reinterpret_cast<std::uint8_t *>(text.data()), text.size()});
     for (std::size_t next = 0; (next = text.find('\n', end_)) != std::string::npos; end_ = next + 1)
@@ -23,7 +23,7 @@ void LineFile::start(std::uint64_t first_sequence, const std::function<bool(std:
             break;
     if (end_ == 0)
         host_.warn("'" + path_.string() + "' has no frame before " + std::to_string(first_sequence) +
-                   ": the lines from before the restart are lost");
+                   "; the lines from before the restart are lost");
     file_->truncate(end_);
 }
 
@@ -35,7 +35,7 @@ void LineFile::append(std::string_view lines) {
     try {
         file_->append({reinterpret_cast<const std::uint8_t *>(lines.data()), lines.size()});
     } catch (const Failure &) {
-        file_->truncate(end_); // remove the partial line
+        file_->truncate(end_); // removes the partial line
         throw;
     }
     end_ += lines.size();

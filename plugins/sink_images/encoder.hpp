@@ -8,7 +8,7 @@
 
 namespace arhost::images {
 
-// BGR8, top row first.
+// An image in BGR8. The top row is first.
 struct Image {
     std::uint32_t width, height;
     std::size_t stride; // bytes per row
@@ -16,7 +16,7 @@ struct Image {
     const std::uint8_t *row(std::uint32_t y) const { return bgr + y * stride; }
 };
 
-// Encodes an image file. The same image always gives the same bytes.
+// Encodes images in a file format. The same image always gives the same bytes.
 class Encoder {
 public:
     virtual ~Encoder() = default;

@@ -19,7 +19,7 @@ public:
 
     std::span<const std::uint8_t> encode(const Image &image) override {
         const int width = static_cast<int>(image.width), height = static_cast<int>(image.height);
-        // High quality implies sharp coloured edges: no chroma subsampling.
+        // Chroma subsampling blurs coloured edges, so do not use it at high quality.
         const int subsampling = quality_ >= 90 ? TJSAMP_444 : TJSAMP_420;
         file_.resize(tjBufSize(width, height, subsampling));
         unsigned char *bytes = file_.data();
@@ -27,7 +27,7 @@ public:
         if (tjCompress2(compressor_.get(), image.bgr, width, static_cast<int>(image.stride), height, TJPF_BGR, &bytes,
                         &size, subsampling, quality_, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
-                          std::string("cannot encode the JPEG: ") + tjGetErrorStr2(compressor_.get()));
+                          std::string("cannot encode the JPEG image: ") + tjGetErrorStr2(compressor_.get()));
         return std::span(file_).first(size);
     }
 

@@ -6,7 +6,7 @@
 
 namespace arhost::images {
 
-// File layout: slot 0, slot 1, two marks.
+// The file has the pixels of slot 0, the pixels of slot 1, and the marks of both slots.
 LastFrame::LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height,
                      std::uint64_t first_sequence)
     : file_(file, O_RDWR | O_CREAT), width_(width), height_(height), slot_size_(3ull * width * height) {

@@ -12,17 +12,18 @@
 
 namespace arhost::images {
 
-// Keeps the newest frame in a file until the run ends: which frame is the last is not known in advance, and encoding
-// every frame is expensive. The raw pixels go to the older of two slots, which is marked empty before and filled
-// after, so that a slot marked filled is complete even if the process is killed.
+// Keeps the newest frame in a file until the run ends, because it is not known in advance which frame is the last,
+// and encoding every frame is expensive. `keep` writes the raw pixels to the older of two slots. It marks this slot
+// as empty before writing and as filled afterwards, so a slot marked as filled is complete even if the process is
+// killed.
 class LastFrame {
 public:
-    // Discards kept frames with numbers from `first_sequence` on.
+    // Discards kept frames whose number is `first_sequence` or higher.
     LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height,
               std::uint64_t first_sequence);
 
     void keep(const Image &image, std::uint64_t sequence);
-    std::optional<Image> newest(); // valid until the next call
+    std::optional<Image> newest(); // std::nullopt if there is no frame; valid until the next call
 
 private:
     std::size_t newest_slot() const;
@@ -31,7 +32,8 @@ private:
     files::File file_;
     std::uint32_t width_, height_;
     std::uint64_t slot_size_;
-    std::array<std::uint64_t, 2> marks_{}; // a slot's sequence number + 1; 0: empty
+    std::array<std::uint64_t, 2>
+        marks_{}; // for each slot: the frame's sequence number + 1, or 0 if the slot is empty
     std::vector<std::uint8_t> pixels_;
 };
 

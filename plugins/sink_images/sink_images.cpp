@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writes frames as image files: numbered ones, or a single one.
+// sink_images: writes frames as numbered image files, or one frame as a single image file.
 #include "encoder.hpp"
 #include "last_frame.hpp"
 #include "sink_common/files.hpp"
@@ -32,7 +32,7 @@ std::unique_ptr<images::Encoder> make_encoder(const fs::path &path, const Option
     throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "path: '" + path.string() + "' must end in .png, .jpg or .jpeg");
 }
 
-// nullopt if the file name has no percent sign: a single image.
+// Returns std::nullopt if the file name has no percent sign, which means a single image.
 std::optional<NumberedName> numbered_name_of(const fs::path &path) try {
     const std::string name = path.filename().string();
     return name.find('%') == std::string::npos ? std::nullopt : std::optional<NumberedName>(name);
@@ -50,15 +50,15 @@ public:
         if (pattern_ && frame_ >= 0)
             throw Failure(
                 ARHOST_STATUS_ERROR_CONFIGURATION,
-                "frame: selects one frame for a path without a number, such as out/demo.png; 'path' has a number");
+                "frame: is only allowed if 'path' names a single image, such as out/demo.png; this path is numbered");
         if (!pattern_ && every_ != 1)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "every: needs a numbered 'path', such as out/frame_%05d.png");
+                          "every: is only allowed if 'path' is numbered, such as out/frame_%05d.png");
     }
 
     void start(const arhost_sink_setup &setup) {
         files::make_parent_folders(path_);
-        files::check_can_write(scratch_); // fail now rather than at the first frame
+        files::check_can_write(scratch_); // reports an error now, not only at the first frame
         if (pattern_) {
             if (setup.first_sequence == 0)
                 warn_of_older_images();
@@ -71,14 +71,14 @@ public:
         setup_ = setup;
         if (frame_ < 0 && setup.first_sequence > 0)
             begin_keeping();
-        may_be_older_ = frame_ < 0 ? setup.first_sequence == 0 : setup.first_sequence <= wanted();
+        may_be_older_ = frame_ < 0 ? setup.first_sequence == 0 : setup.first_sequence <= frame_number();
     }
 
     arhost_status write(const arhost_output &output) {
         const Image image{output.width, output.height, output.stride, output.bgr};
         const std::uint64_t sequence = output.record->sequence;
-        // Delete an older image at the first frame, not at start, since the run may still fail. From then on the
-        // file's existence means, also after a restart, that this run wrote it.
+        // Delete an older image when the first frame arrives, not in start(), because the run may still fail before.
+        // From then on, also after a restart, the file exists only if this run wrote it.
         if (may_be_older_)
             files::remove_file(path_);
         may_be_older_ = false;
@@ -89,7 +89,7 @@ public:
             if (!kept_)
                 begin_keeping();
             kept_->keep(image, sequence);
-        } else if (sequence >= wanted() && !fs::exists(path_)) {
+        } else if (sequence >= frame_number() && !fs::exists(path_)) {
             replace(path_, image);
         }
         return ARHOST_STATUS_OK;
@@ -109,7 +109,7 @@ public:
 private:
     void begin_keeping() { kept_.emplace(kept_path_, setup_.width, setup_.height, setup_.first_sequence); }
 
-    std::uint64_t wanted() const { return static_cast<std::uint64_t>(frame_); }
+    std::uint64_t frame_number() const { return static_cast<std::uint64_t>(frame_); }
 
     void replace(const fs::path &target, const Image &image) {
         files::replace_file(target, scratch_, encoder_->encode(image));
@@ -121,8 +121,8 @@ private:
             std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
                           [&](const auto &e) { return pattern_->number(e.path().filename().string()).has_value(); });
         if (older > 0)
-            host_.warn("'" + folder.string() + "' holds " + std::to_string(older) +
-                       " images of an earlier run with matching names; those that this run does not replace remain");
+            host_.warn("'" + folder.string() + "' already contains " + std::to_string(older) +
+                       " images whose names match the pattern; this run keeps those it does not overwrite");
     }
 
     Host host_;
@@ -130,8 +130,8 @@ private:
     fs::path scratch_, kept_path_; // temporary files next to `path_`
     std::optional<NumberedName> pattern_;
     std::unique_ptr<images::Encoder> encoder_;
-    std::int64_t frame_;  // without a number: the frame to write, or -1 for the last
-    std::uint64_t every_; // with a number
+    std::int64_t frame_;  // for a single image: the frame to write, or -1 for the last
+    std::uint64_t every_; // for numbered images
     arhost_sink_setup setup_{};
     std::optional<images::LastFrame> kept_;
     bool may_be_older_ = false; // the file at `path_` may be from an earlier run
@@ -139,11 +139,11 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr,
-           "Images to write (out/frame_%05d.png, numbered by frame) or one image (out/demo.png); PNG or JPEG."),
-    option(ARHOST_OPTION_INTEGER, "frame", "-1", "For a path without a number: the frame to write; -1: the last one.",
-           -1, 9e15),
+           "PNG or JPEG files to write: one per frame (out/frame_%05d.png), or a single image (out/demo.png)."),
+    option(ARHOST_OPTION_INTEGER, "frame", "-1",
+           "For a single image: number of the frame to write; -1: the last frame.", -1, 9e15),
     option(ARHOST_OPTION_INTEGER, "every", "1",
-           "For a numbered path: write the frames whose number is a multiple of this.", 1, 1e9),
+           "For a numbered path: write only the frames whose number is a multiple of this.", 1, 1e9),
     option(ARHOST_OPTION_INTEGER, "compression", "1", "PNG compression: 1 (fast) to 12 (small); lossless.", 1, 12),
     option(ARHOST_OPTION_INTEGER, "quality", "95", "JPEG quality: 1 to 100; from 90 on, chroma is not subsampled.", 1,
            100),
@@ -157,7 +157,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Writes frames as PNG or JPEG files, numbered ones or a single one.",
+    "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
     0,
     std::size(options),
     options,

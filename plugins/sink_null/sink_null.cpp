@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Discards frames: to measure everything else, or the effect of a slow sink.
+// sink_null: discards frames. Used to measure the rest of the pipeline, or the effect of a slow sink.
 #include <arhost-cpp/plugin.hpp>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "delay_ms", "0", "Time per frame in milliseconds.", 0, 600000),
+    arhost::option(ARHOST_OPTION_INTEGER, "delay_ms", "0", "Time to wait per frame, in milliseconds.", 0, 600000),
 };
 
 constexpr arhost_descriptor descriptor = {

@@ -13,7 +13,8 @@ namespace {
 using json_text::append;
 using json_text::append_number;
 
-// Family names are ASCII; other bytes come from a defective tracker and must not corrupt the line.
+// Appends a JSON string and replaces all bytes that are not printable ASCII with '?'. Family names are ASCII; other
+// bytes can only come from a defective tracker.
 void append_text(std::string &text, std::string_view value) {
     text += '"';
     for (const char c : value) {

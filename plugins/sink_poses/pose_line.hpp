@@ -7,7 +7,7 @@
 
 namespace arhost::poses {
 
-// Appends the record of a frame as one JSON line with its line end. README.md lists the keys.
+// Appends the record of a frame as one line of JSON, including the line end. README.md lists the keys.
 void append_line(std::string &text, const arhost_record &record);
 
 } // namespace arhost::poses

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pose log: one JSON line per frame.
+// sink_poses: writes the pose log, which has one line of JSON per frame.
 #include "pose_line.hpp"
 #include "sink_common/json_text.hpp"
 #include "sink_common/line_file.hpp"
@@ -46,7 +46,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Writes markers, poses and camera of each frame as a JSON line.",
+    "Writes the markers, poses and camera of each frame as one line of JSON.",
     0,
     std::size(options),
     options,

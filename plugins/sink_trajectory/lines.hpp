@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The lines of both formats (docs/trajectories.md), with line ends.
+// Functions that append the lines of both formats (docs/trajectories.md), including line ends.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -9,12 +9,12 @@
 
 namespace arhost::trajectory {
 
-// Format `arhost`: a header, then one object per frame. Numbers read back as the same double.
+// Format `arhost`: a header line, then one JSON object per frame. Numbers read back as the same double.
 void append_header(std::string &text, const arhost_intrinsics &intrinsics, arhost_clock clock, double fps);
 void append_frame(std::string &text, const arhost_record &record);
 
-// Format `dissertation`: nine numbers with six significant digits, each followed by a space. A frame without a camera
-// is an empty line, which the dissertation's programs skip.
+// Format `dissertation`: nine numbers per line, with six significant digits, each followed by a space. A frame
+// without a camera gets an empty line, which the programs of the dissertation skip.
 void append_dissertation_frame(std::string &text, const arhost_record &record);
 
 } // namespace arhost::trajectory

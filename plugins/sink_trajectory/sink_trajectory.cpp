@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Records the camera of every frame for `arhost replay`.
+// sink_trajectory: records the camera of every frame for `arhost replay`.
 #include "lines.hpp"
 #include "sink_common/json_text.hpp"
 #include "sink_common/line_file.hpp"
@@ -39,7 +39,7 @@ public:
         const arhost_record &record = *output.record;
         text_.clear();
         if (dissertation_) {
-            // Lines have no frame number, so each frame that live mode dropped needs a line too.
+            // The lines have no frame numbers, so frames that live mode dropped need a line, too.
             if (record.sequence > next_line_)
                 text_.assign(record.sequence - next_line_, '\n');
             arhost::trajectory::append_dissertation_frame(text_, record);
@@ -58,7 +58,7 @@ private:
     bool dissertation_;
     arhost_intrinsics intrinsics_{};
     double fps_ = 0;
-    std::uint64_t next_line_ = 0; // dissertation: the frame of the next line
+    std::uint64_t next_line_ = 0; // for `dissertation`: frame number of the next line
     std::string text_;
 };
 

@@ -12,7 +12,7 @@ const AVCodec *find_encoder(const std::string &codec) {
     const AVCodec *found =
         codec == "h264" ? avcodec_find_encoder_by_name("libx264") : avcodec_find_encoder(AV_CODEC_ID_MPEG4);
     if (!found)
-        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "codec: this machine's libavcodec has no encoder for " +
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "codec: libavcodec on this machine has no encoder for " +
                                                            codec +
                                                            (codec == "h264" ? " (libx264); try codec: mpeg4" : ""));
     return found;
@@ -36,8 +36,8 @@ SwsPointer make_converter(int width, int height) {
     av_opt_set_int(sws.get(), "dsth", height, 0);
     av_opt_set_int(sws.get(), "src_format", AV_PIX_FMT_BGR24, 0);
     av_opt_set_int(sws.get(), "dst_format", AV_PIX_FMT_YUV420P, 0);
-    // Without accurate rounding luma is half a step too dark; without full chroma input every second pixel's colour
-    // is ignored.
+    // Without SWS_ACCURATE_RND, luma would be half a step too dark. Without SWS_FULL_CHR_H_INP, the colour of every
+    // second pixel would be ignored.
     av_opt_set_int(sws.get(), "sws_flags", SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_BITEXACT, 0);
     av_opt_set_int(sws.get(), "dst_h_chr_pos", 0, 0); // AVCHROMA_LOC_LEFT
     av_opt_set_int(sws.get(), "dst_v_chr_pos", 128, 0);
@@ -69,17 +69,18 @@ Encoder::Encoder(const EncoderSettings &settings)
     context_->chroma_sample_location = AVCHROMA_LOC_LEFT;
     context_->max_b_frames = 0;
     context_->thread_count = settings.threads;
-    context_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER; // required by MP4
+    context_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER; // MP4 requires it
     if (settings.codec == "h264") {
         av_opt_set(context_->priv_data, "preset", settings.preset.c_str(), 0);
         av_opt_set(context_->priv_data, "tune", "zerolatency", 0);
         av_opt_set_double(context_->priv_data, "crf", settings.crf, 0);
     } else {
-        // The MPEG-4 quantiser, 1 to 31, with the step size of H.264 at this crf: 2·quantiser = 0.625·2^(crf/6).
+        // Choose the MPEG-4 quantiser (1 to 31) whose step size equals that of H.264 at this crf:
+        // 2·quantiser = 0.625·2^(crf/6).
         const long quantiser = std::lround(0.3125 * std::exp2(settings.crf / 6.0));
         context_->flags |= AV_CODEC_FLAG_QSCALE | AV_CODEC_FLAG_BITEXACT;
         context_->global_quality = FF_QP2LAMBDA * static_cast<int>(std::clamp(quantiser, 1l, 31l));
-        context_->gop_size = 250; // x264's default
+        context_->gop_size = 250; // the default of x264
     }
     if (const int code = avcodec_open2(context_.get(), codec, nullptr); code < 0)
         throw libav_failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
@@ -93,7 +94,7 @@ Encoder::Encoder(const EncoderSettings &settings)
 
 AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number) {
     copy_padded(bgr, stride);
-    if (av_frame_make_writable(yuv_.get()) < 0) // the encoder may still reference the previous frame
+    if (av_frame_make_writable(yuv_.get()) < 0) // the encoder may still refer to the previous frame
         throw std::bad_alloc();
     sws_scale(converter_.get(), bgr_->data, bgr_->linesize, 0, bgr_->height, yuv_->data, yuv_->linesize);
     yuv_->pts = number;
@@ -107,8 +108,8 @@ AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int6
     return *packet_;
 }
 
-// Copies into a frame of even size; an odd last column or row is repeated. The copy is needed in any case: swscale
-// reads past the pixels, which the host's memory does not allow.
+// Copies the image into a frame of even size and repeats an odd last column or row. Even sizes need the copy as well,
+// because swscale reads past the end of the pixels, which is not allowed in the host's memory.
 void Encoder::copy_padded(const std::uint8_t *bgr, std::size_t stride) {
     const std::size_t row_size = 3 * static_cast<std::size_t>(width_);
     for (int y = 0; y < bgr_->height; ++y) {

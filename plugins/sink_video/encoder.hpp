@@ -10,7 +10,7 @@
 namespace arhost::video {
 
 struct EncoderSettings {
-    int width, height; // px, of the input; the film is padded to even sizes
+    int width, height; // size of the input in px; the film is padded to even sizes
     AVRational fps;
     std::string codec; // "h264" or "mpeg4"
     int crf;
@@ -18,15 +18,15 @@ struct EncoderSettings {
     int threads;
 };
 
-// Encodes BGR8 frames as YUV 4:2:0, BT.709, limited range. There is no look-ahead: each call returns the packet of
-// its frame, which can be written at once.
+// Encodes BGR8 frames as YUV 4:2:0, BT.709, limited range. It uses no look-ahead, so each call returns the packet of
+// its own frame, which can be written immediately.
 class Encoder {
 public:
-    explicit Encoder(const EncoderSettings &settings); // throws Failure of ARHOST_STATUS_ERROR_UNSUPPORTED
+    explicit Encoder(const EncoderSettings &settings); // throws Failure (ARHOST_STATUS_ERROR_UNSUPPORTED)
 
     const AVCodecContext &context() const { return *context_; }
 
-    // Times are frame numbers, in units of 1/fps. The packet is valid until the next call.
+    // The time stamps of the packet are frame numbers, in units of 1/fps. It is valid until the next call.
     AVPacket &encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number);
 
 private:

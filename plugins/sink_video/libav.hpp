@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// libav's muxer with its file, and its errors.
+// Owning pointer to a libav muxer and its file, and conversion of libav's errors to Failure.
 #pragma once
 
 #include "libav_common/libav_pointers.hpp"

@@ -19,7 +19,7 @@ void check_written(int code, const fs::path &path) {
         throw files::io_failure("cannot write", path, AVUNERROR(code));
 }
 
-// The prefix keeps libav from parsing the path as a URL.
+// Returns the path with a prefix that prevents libav from parsing it as a URL.
 std::string url(const fs::path &path) {
     return "file:" + path.string();
 }
@@ -28,9 +28,9 @@ OutputPointer open_output(const fs::path &path, const char *format) {
     AVFormatContext *context = nullptr;
     if (avformat_alloc_output_context2(&context, nullptr, format, url(path).c_str()) < 0)
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                      std::string("this machine's libavformat cannot write ") + format);
+                      std::string("libavformat on this machine cannot write ") + format);
     OutputPointer output(context);
-    output->flags |= AVFMT_FLAG_BITEXACT; // no dates and versions
+    output->flags |= AVFMT_FLAG_BITEXACT; // do not write dates and versions
     check_written(avio_open(&output->pb, url(path).c_str(), AVIO_FLAG_WRITE), path);
     return output;
 }
@@ -50,14 +50,14 @@ bool same_codec(const AVCodecParameters &a, const AVCodecParameters &b) {
                               std::span(b.extradata, static_cast<std::size_t>(b.extradata_size)));
 }
 
-// The joined film. Its file and header are created with the first frame.
+// The joined film. The first frame creates its file and writes the header.
 class Film {
 public:
     Film(const fs::path &path, const char *format, AVRational fps) : path_(path), format_(format), fps_(fps) {}
 
     std::int64_t frames() const { return frames_; }
 
-    // Appends the frames of the segment with numbers below `end`.
+    // Appends the frames of a segment whose number is below `end`.
     void append(AVFormatContext &segment, const fs::path &segment_path, std::int64_t end,
                 const std::function<void(double)> &progress) {
         check_fits(*segment.streams[0]->codecpar, segment_path);
@@ -66,7 +66,7 @@ public:
         for (; av_read_frame(&segment, packet.get()) >= 0; av_packet_unref(packet.get())) {
             const std::int64_t number = av_rescale_q(packet->pts, in.time_base, av_inv_q(fps_));
             if (packet->flags & AV_PKT_FLAG_CORRUPT || number >= end)
-                return; // truncated by a kill, or repeated in the next segment
+                return; // the segment was truncated by a kill, or the next segment repeats the frame
             if (frames_ == 0)
                 begin(*in.codecpar, number);
             packet->pts = packet->dts = av_rescale_q(number - first_, av_inv_q(fps_), out_->time_base);
@@ -78,7 +78,7 @@ public:
             if (++frames_ % 256 == 0)
                 progress(static_cast<double>(avio_tell(segment.pb)) / static_cast<double>(avio_size(segment.pb)));
         }
-        if (segment.pb->error < 0) // an I/O error; a truncated segment does not set it
+        if (segment.pb->error < 0) // set by I/O errors, but not by a truncated segment
             throw files::io_failure("cannot read", segment_path, AVUNERROR(segment.pb->error));
     }
 
@@ -102,9 +102,10 @@ private:
         out_ = &add_stream(*output_, fps_);
         if (avcodec_parameters_copy(out_->codecpar, &codec) < 0)
             throw std::bad_alloc();
-        out_->codecpar->codec_tag = 0; // chosen by the container
+        out_->codecpar->codec_tag = 0; // let the container choose it
         out_->sample_aspect_ratio = codec.sample_aspect_ratio;
-        // MP4: index first, so that playback can start during a download. Matroska ignores it.
+        // Write the index of an MP4 file first, so playback can start during a download. Matroska ignores this
+        // option.
         av_opt_set(output_->priv_data, "movflags", "faststart", 0);
         check_written(avformat_write_header(output_.get(), nullptr), path_);
     }
@@ -113,7 +114,7 @@ private:
     const char *format_;
     AVRational fps_;
     OutputPointer output_;
-    AVStream *out_ = nullptr; // of output_
+    AVStream *out_ = nullptr; // owned by output_
     std::int64_t first_ = 0, frames_ = 0;
 };
 
@@ -154,7 +155,7 @@ void SegmentWriter::append(AVPacket &packet) {
     av_packet_rescale_ts(&packet, time_base_, output_->streams[0]->time_base);
     packet.stream_index = 0;
     const int code = av_write_frame(output_.get(), &packet);
-    flush(code < 0 ? code : av_write_frame(output_.get(), nullptr)); // ends the cluster
+    flush(code < 0 ? code : av_write_frame(output_.get(), nullptr)); // ends the Matroska cluster
 }
 
 void SegmentWriter::flush(int code) {
@@ -172,14 +173,15 @@ std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, co
         if (const int code =
                 avformat_open_input(&context, url(path).c_str(), av_find_input_format("matroska"), nullptr);
             code < 0) {
-            if (code != AVERROR_EOF) // AVERROR_EOF: a header without a frame, after a restart without further frames
+            if (code != AVERROR_EOF) // AVERROR_EOF: the segment has no frames, because none arrived after a restart
                 warn(libav_failure(ARHOST_STATUS_ERROR_IO, "cannot read a frame from '" + path.string() + "'", code)
                          .what());
             continue;
         }
         const InputPointer segment(context);
         if (segment->nb_streams != 1)
-            throw Failure(ARHOST_STATUS_ERROR_IO, "'" + path.string() + "' is not a segment of a film; delete it");
+            throw Failure(ARHOST_STATUS_ERROR_IO,
+                          "'" + path.string() + "' cannot be read as a segment of the film; delete it");
         joined.append(*segment, path,
                       i + 1 < segments.size() ? segments[i + 1].first : std::numeric_limits<std::int64_t>::max(),
                       progress);

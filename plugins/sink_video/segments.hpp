@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A film is written in segments, one per start of the sink, which are joined at the end. A segment is a Matroska file
-// with one cluster per frame: all complete clusters of a truncated file can be read. (A fragmented MP4 would do too,
-// but libav loses the gaps between frames there.)
+// A film is written in segments, which are joined at the end. Each start of the sink begins a new segment. A segment
+// is a Matroska file with one cluster per frame, because all complete clusters of a truncated file can be read. (The
+// same is true for fragmented MP4, but there libav loses the gaps between frames.)
 #pragma once
 
 #include "libav.hpp"
@@ -16,16 +16,16 @@ namespace arhost::video {
 
 struct Segment {
     std::filesystem::path path; // ".demo.mp4.from120.mkv" next to "demo.mp4"
-    std::int64_t first;         // its lowest frame number
+    std::int64_t first;         // number of its first frame
 };
 
 Segment segment_of(const std::filesystem::path &film, std::int64_t first);
-std::vector<Segment> find_segments(const std::filesystem::path &film); // ascending
+std::vector<Segment> find_segments(const std::filesystem::path &film); // sorted by `first`
 
 class SegmentWriter {
 public:
     SegmentWriter(const std::filesystem::path &path, const AVCodecContext &encoder);
-    void append(AVPacket &packet); // with times in the encoder's time base; modifies them
+    void append(AVPacket &packet); // packet times must be in the time base of the encoder; they are modified
 
 private:
     void flush(int code);
@@ -35,9 +35,9 @@ private:
     OutputPointer output_;
 };
 
-// Copies the packets of all segments to a film of libav's format `format` ("mp4"). A frame that is in two segments is
-// taken from the later one. Returns the number of frames; if 0, `film` is unusable. Calls `progress` regularly with 0
-// to 1, and `warn` with messages for the user.
+// Copies the packets of all segments to `film`. `format` is libav's name of the file format ("mp4"). If two segments
+// have the same frame, takes it from the later segment. Returns the number of frames; if it is 0, `film` is unusable.
+// Calls `progress` regularly with a fraction from 0 to 1, and `warn` with messages for the user.
 std::int64_t join(const std::vector<Segment> &segments, const std::filesystem::path &film, const char *format,
                   AVRational fps, const std::function<void(double)> &progress,
                   const std::function<void(const std::string &)> &warn);

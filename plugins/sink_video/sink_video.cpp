@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writes a film. Frames are encoded immediately into a segment file; at the end all segments (one per restart) are
-// joined without re-encoding and replace the film atomically.
+// sink_video: writes a film. Encodes each frame immediately and writes it to a segment file. Each restart begins a
+// new segment. At the end, joins all segments without re-encoding and atomically replaces the film.
 #include "encoder.hpp"
 #include "segments.hpp"
 #include "sink_common/files.hpp"
@@ -34,13 +34,14 @@ const char *format_of(const fs::path &path) {
 
 AVRational rational(double fps) {
     if (!(fps > 0))
-        return {30, 1}; // unknown
-    // Segments have millisecond time stamps, from which frame numbers are recovered.
+        return {30, 1}; // the rate is unknown
+    // Frame numbers are recovered from the time stamps of the segments, which have a resolution of 1 ms. This limits
+    // the frame rate.
     if (fps < 0.001 || fps > 500)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "the frame rate of a film must be 0.001 to 500, not the source's " + std::to_string(fps) +
-                          "; set the source's fps");
-    return av_d2q(fps, 65535); // MPEG-4 stores it in 16 bits
+                      "the source has " + std::to_string(fps) +
+                          " frames per second, but a film must have 0.001 to 500; set 'fps' of the source");
+    return av_d2q(fps, 65535); // MPEG-4 stores the denominator in 16 bits
 }
 
 class VideoSink {
@@ -76,11 +77,11 @@ public:
 
     arhost_status write(const arhost_output &output) {
         if (static_cast<int>(output.width) != settings_.width || static_cast<int>(output.height) != settings_.height)
-            throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the frame size differs from the setup's");
+            throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the size of a frame differs from that in the setup");
         if (failed_)
-            return ARHOST_STATUS_ERROR_IO; // already reported
+            return ARHOST_STATUS_ERROR_IO; // the error was already reported
         if (!writer_) {
-            failed_ = true; // until the next lines succeed
+            failed_ = true; // reset below after success
             begin();
             failed_ = false;
         }
@@ -94,7 +95,7 @@ public:
         if (failed_)
             return files::remove_file(segment_of(path_, first_).path);
         if (!writer_)
-            return host_.warn("there was no frame: '" + path_.string() + "' was not written");
+            return host_.warn("'" + path_.string() + "' was not written, because there were no frames");
         writer_.reset();
         encoder_.reset();
         const std::vector<Segment> segments = find_segments(path_);
@@ -105,17 +106,18 @@ public:
     }
 
 private:
-    // At the first frame, not at start: a run that fails to start keeps the segments of an earlier run.
+    // Begins a segment. Called for the first frame, not in start(), so a run that fails to start does not delete the
+    // segments of an earlier run.
     void begin() {
         bool has_beginning = false;
         for (const Segment &segment : find_segments(path_))
             if (segment.first >= first_)
-                files::remove_file(segment.path); // created below, or left by an earlier run
+                files::remove_file(segment.path); // the segment created below, or one left by an earlier run
             else
                 has_beginning |= segment.first == 0;
         files::remove_file(partial_);
-        // Once the film is in place, segment 0 is deleted first: without it, a restarted sink knows that the film is
-        // done.
+        // When the film is complete, stop() deletes segment 0 first. A restarted sink therefore knows from the
+        // missing segment 0 that the film is complete.
         std::error_code ignored;
         finished_ = first_ > 0 && !has_beginning && fs::exists(path_, ignored);
         if (first_ > 0 && !has_beginning && !finished_)
@@ -131,7 +133,7 @@ private:
                 [&](double fraction) { host_.progress(fraction, "finishing the film"); },
                 [&](const std::string &text) { host_.warn(text); });
             if (frames == 0)
-                host_.warn("there was no frame: '" + path_.string() + "' was not written");
+                host_.warn("'" + path_.string() + "' was not written, because there were no frames");
             else if (std::error_code error; fs::rename(partial_, path_, error), error)
                 throw files::io_failure("cannot write", path_, error.value());
         } catch (const Failure &failure) {
@@ -143,13 +145,13 @@ private:
 
     Host host_;
     fs::path path_, partial_;
-    const char *format_; // libav's name
+    const char *format_; // libav's name of the file format
     EncoderSettings settings_;
     std::optional<Encoder> encoder_;
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the first frame
     bool failed_ = false;    // the segment could not be opened
-    bool finished_ = false;  // by a previous process that was killed before it acknowledged
+    bool finished_ = false;  // a previous process completed the film, but was killed before it acknowledged this
 };
 
 constexpr const char *codecs[] = {"h264", "mpeg4", nullptr};
@@ -159,9 +161,10 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The film to write: .mp4, .mkv or .mov."),
     option(ARHOST_OPTION_TEXT, "codec", "h264", "Video codec: h264 or mpeg4.", 0, 0, codecs),
     option(ARHOST_OPTION_INTEGER, "crf", "18",
-           "Quality: 0 (best; lossless with h264) to 51; 18 is visually lossless.", 0, 51),
-    option(ARHOST_OPTION_TEXT, "preset", "veryfast", "x264 preset; slower ones give smaller files.", 0, 0, presets),
-    option(ARHOST_OPTION_INTEGER, "threads", "1", "Encoder threads.", 1, 64),
+           "Quality: 0 (best; lossless with h264) to 51 (worst); 18 is visually lossless.", 0, 51),
+    option(ARHOST_OPTION_TEXT, "preset", "veryfast", "x264 preset; slower presets give smaller files.", 0, 0,
+           presets),
+    option(ARHOST_OPTION_INTEGER, "threads", "1", "Number of encoder threads.", 1, 64),
 };
 
 constexpr arhost_descriptor descriptor = {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shows frames in a window. OpenGL 2.1 with its fixed pipeline suffices for one textured rectangle and runs on every
-// driver.
+// sink_window: shows frames in a window. Uses the fixed-function pipeline of OpenGL 2.1, which suffices for one
+// textured rectangle and is available with every driver.
 #include <arhost-cpp/plugin.hpp>
 
 #define GLFW_INCLUDE_GLEXT
@@ -48,7 +48,7 @@ struct Rectangle {
     int x, y, width, height;
 };
 
-// The largest centred rectangle with the aspect ratio of the image within `width`×`height`.
+// Returns the largest centred rectangle within `width`×`height` that has the aspect ratio of the image.
 Rectangle fit(int image_width, int image_height, int width, int height) {
     const double scale =
         std::min(static_cast<double>(width) / image_width, static_cast<double>(height) / image_height);
@@ -121,7 +121,7 @@ private:
             if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS)
                 glfwSetWindowShouldClose(w, GLFW_TRUE);
         });
-        // Letters according to the keyboard layout.
+        // The character callback delivers letters according to the keyboard layout.
         glfwSetCharCallback(window_.get(), [](GLFWwindow *w, unsigned letter) {
             if (letter == 'q')
                 glfwSetWindowShouldClose(w, GLFW_TRUE);
@@ -134,10 +134,10 @@ private:
         GLint largest = 0;
         glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
         if (width_ > largest || height_ > largest)
-            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "this machine's OpenGL supports images of at most " +
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "OpenGL on this machine supports images of up to " +
                                                                std::to_string(largest) +
                                                                " px per side; use smaller frames");
-        GLuint texture = 0; // freed with the context
+        GLuint texture = 0; // deleted together with the context
         glGenTextures(1, &texture);
         glBindTexture(GL_TEXTURE_2D, texture);
         glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
@@ -156,7 +156,7 @@ private:
     void upload(const arhost_output &output) {
         const std::size_t row_size = 3 * std::size_t{output.width};
         const std::uint8_t *pixels = output.bgr;
-        if (output.stride != row_size) { // OpenGL row lengths are whole pixels
+        if (output.stride != row_size) { // the stride may not be a multiple of the pixel size, which OpenGL requires
             packed_.resize(row_size * output.height);
             for (std::size_t y = 0; y < output.height; ++y)
                 std::memcpy(packed_.data() + y * row_size, output.bgr + y * output.stride, row_size);
@@ -171,7 +171,7 @@ private:
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_.get(), &width, &height);
         if (width < 1 || height < 1)
-            return; // minimised
+            return; // the window is minimised
         glViewport(0, 0, width, height);
         glClear(GL_COLOR_BUFFER_BIT);
         const Rectangle r = fit(width_, height_, width, height);
@@ -205,7 +205,7 @@ private:
         }
     }
 
-    // The monitor with the centre of the window, or the primary one.
+    // Returns the monitor that shows the centre of the window, or the primary monitor.
     GLFWmonitor *monitor_in_view() const {
         const int x = windowed_.x + windowed_.width / 2, y = windowed_.y + windowed_.height / 2;
         int count = 0;
@@ -223,7 +223,7 @@ private:
     std::string title_;
     double scale_;
     bool vsync_;
-    int width_ = 0, height_ = 0; // px, of the frames
+    int width_ = 0, height_ = 0; // frame size in px
     std::optional<Glfw> glfw_;
     std::unique_ptr<GLFWwindow, DestroyWindow> window_;
     Rectangle windowed_{}; // where the window was before full screen

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Paths in messages.
+// Text for messages about paths.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +8,9 @@
 
 namespace arhost {
 
-std::string quoted(const std::filesystem::path &path); // 'path'
+std::string quoted(const std::filesystem::path &path); // the path in single quotes
 
-// "the folder '/x/frames' has 3 entries: a.png, b.png, c.png".
+// Returns, for example: "the folder '/x/frames' has 3 entries: a.png, b.png, c.png".
 std::string describe_folder(const std::filesystem::path &folder);
 
 } // namespace arhost

@@ -21,7 +21,7 @@ std::string size_text(const cv::Mat &image) {
     return std::to_string(image.cols) + "×" + std::to_string(image.rows);
 }
 
-// Converts 16-bit images to 8 bits, drops alpha, applies the Exif orientation.
+// Reads an image. Converts 16 bits to 8, drops alpha, and applies the Exif orientation.
 cv::Mat read_image(const fs::path &file, int flags) {
     cv::Mat image;
     std::string reason = "damaged or unknown image format";
@@ -50,7 +50,8 @@ NumberedName numbered_name_of(const fs::path &path) try {
     return NumberedName(path.filename().string());
 } catch (const std::invalid_argument &error) {
     throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                  "path: " + quoted(path) + " does not exist, nor is it a numbered name: " + error.what());
+                  "path: " + quoted(path) +
+                      " does not exist and is not a valid name of numbered images: " + error.what());
 }
 
 } // namespace
@@ -86,8 +87,8 @@ arhost_status ImageSequence::go_to(std::uint64_t index) {
     const cv::Mat next = read_image(files_[index], image_.channels() == 1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR);
     if (next.size() != image_.size())
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "the size changes within the sequence: " + quoted(files_[index]) + " is " + size_text(next) +
-                          ", but " + quoted(files_.front()) + " is " + size_text(image_));
+                      "all images of a sequence must have the same size: " + quoted(files_[index]) + " is " +
+                          size_text(next) + ", but " + quoted(files_.front()) + " is " + size_text(image_));
     image_ = next;
     current_ = index;
     return ARHOST_STATUS_OK;
@@ -104,7 +105,7 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
     const fs::path folder = path.parent_path();
     const NumberedName pattern = numbered_name_of(path);
     std::map<std::uint64_t, fs::path> found;
-    std::error_code ignored; // describe_folder reports a folder that cannot be listed
+    std::error_code ignored; // if the folder cannot be listed, describe_folder reports it
     for (const auto &entry : fs::directory_iterator(folder, ignored))
         if (const auto number = pattern.number(entry.path().filename().string()))
             found.emplace(*number, entry.path());
@@ -116,9 +117,9 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
         if (found.empty())
             message += describe_folder(folder);
         else
-            message.append("there are ")
+            message.append("the folder has ")
                 .append(std::to_string(found.size()))
-                .append(" from number ")
+                .append(" matching files, with numbers from ")
                 .append(std::to_string(found.begin()->first))
                 .append(" to ")
                 .append(std::to_string(found.rbegin()->first))
@@ -130,7 +131,7 @@ std::vector<fs::path> numbered_files(const fs::path &path, std::int64_t start, c
         files.push_back(next->second);
     if (next != found.end())
         host.warn(quoted(folder / pattern.name(number)) +
-                  " is missing: the sequence ends before it, though there are files up to number " +
+                  " is missing, so the sequence ends before it; there are files with higher numbers, up to " +
                   std::to_string(found.rbegin()->first));
     return files;
 }

@@ -10,10 +10,10 @@
 
 namespace arhost {
 
-// Whether the extension is that of an image format. Other files are decoded by libav.
+// Returns whether the extension is that of an image format. Files with other extensions are decoded by libav.
 bool is_image_name(const std::filesystem::path &path);
 
-// One image per file. The first determines size and pixel format (grey or colour).
+// A sequence of image files. The first image determines the size and the pixel format (grey or colour).
 class ImageSequence final : public Reader {
 public:
     explicit ImageSequence(std::vector<std::filesystem::path> files); // at least one
@@ -29,8 +29,8 @@ private:
     cv::Mat image_; // the current image, 8-bit, 1 or 3 channels
 };
 
-// The files of a numbered name ("frames/image_%04d.png") from number `start` (−1: the lowest) up to the first missing
-// number. Throws Failure if there is none.
+// Returns the files that match a numbered name ("frames/image_%04d.png"), from number `start` (−1: the lowest number
+// that exists) up to the first missing number. Throws Failure if there are no such files.
 std::vector<std::filesystem::path> numbered_files(const std::filesystem::path &path, std::int64_t start,
                                                   const Host &host);
 

@@ -8,7 +8,7 @@ namespace arhost {
 
 namespace {
 
-// The callback has no user argument, so the log in use is global: the newest one.
+// The callback has no user argument, so the current log must be global. It is the most recently created LibavLog.
 struct {
     std::mutex mutex;
     LibavLog *log = nullptr;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// libav's log.
+// Forwards libav's log messages to the host.
 #pragma once
 
 extern "C" {
@@ -27,7 +27,8 @@ public:
     LibavLog(const LibavLog &) = delete;
     LibavLog &operator=(const LibavLog &) = delete;
 
-    // The last error since the previous call, for the user's message: " (moov atom not found)", or "".
+    // Returns the last error since the previous call, to be appended to an error message: " (moov atom not found)".
+    // Returns "" if there was no error.
     std::string take_reason();
 
 private:
@@ -36,7 +37,7 @@ private:
     Host host_;
     std::mutex mutex_;
     std::string last_error_;
-    int print_prefix_ = 1; // state of av_log_format_line2: whether a new line begins
+    int print_prefix_ = 1; // state of av_log_format_line2: 1 if the next text begins a new line
 };
 
 } // namespace arhost

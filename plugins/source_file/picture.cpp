@@ -16,7 +16,7 @@ bool is_full_range(const AVFrame &picture) {
            picture.format == AV_PIX_FMT_YUVJ440P || picture.format == AV_PIX_FMT_YUVJ411P;
 }
 
-// The colour matrix; if the stream does not specify it, the same guess as in common players.
+// Returns the colour matrix. If the stream does not specify it, guesses it like common players.
 AVColorSpace colour_space(const AVFrame &picture) {
     if (picture.colorspace != AVCOL_SPC_UNSPECIFIED && picture.colorspace != AVCOL_SPC_RESERVED)
         return picture.colorspace;
@@ -30,26 +30,26 @@ std::optional<arhost_yuv_matrix> yuv_matrix(const AVFrame &picture) {
     case AVCOL_SPC_BT470BG:
     case AVCOL_SPC_SMPTE170M:
         return ARHOST_YUV_MATRIX_BT601;
-    default: // BT.2020 and others: converted by swscale
+    default: // swscale converts BT.2020 and others
         return std::nullopt;
     }
 }
 
 bool is_grey(AVPixelFormat format) {
-    return av_pix_fmt_desc_get(format)->nb_components <= 2; // grey, grey with alpha, black and white
+    return av_pix_fmt_desc_get(format)->nb_components <= 2; // grey, grey with alpha, or black and white
 }
 
 std::size_t bytes_a_pixel(arhost_pixel_format format, std::uint32_t plane) {
     return format == ARHOST_PIXEL_FORMAT_BGR8 ? 3 : format == ARHOST_PIXEL_FORMAT_NV12 && plane == 1 ? 2 : 1;
 }
 
-// A plane rotated by a multiple of 90°: pixel (x, y) is at offset x·step_x + y·step_y.
+// A plane as seen after a rotation by a multiple of 90°: pixel (x, y) is at offset x·step_x + y·step_y.
 struct Plane {
     const std::uint8_t *origin;
     std::ptrdiff_t step_x, step_y;
 };
 
-// `width` and `height`: before rotation.
+// `width` and `height` are those before the rotation.
 Plane turned(const std::uint8_t *data, std::ptrdiff_t stride, std::ptrdiff_t width, std::ptrdiff_t height,
              std::ptrdiff_t bytes, int quarter_turns_clockwise) {
     switch (quarter_turns_clockwise) {
@@ -112,7 +112,7 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
         if (!scaler_)
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                           std::string("cannot convert from the pixel format '") + av_get_pix_fmt_name(format) + "'");
-        // AVColorSpace and SWS_CS_… have the same values.
+        // sws_getCoefficients takes SWS_CS_…, which has the same values as AVColorSpace.
         const int *matrix = sws_getCoefficients(colour_space(picture));
         const bool to_full = target_ == AV_PIX_FMT_BGR24 || format_.yuv_range == ARHOST_YUV_RANGE_FULL;
         sws_setColorspaceDetails(scaler_.get(), matrix, is_full_range(picture), matrix, to_full, 0, 1 << 16, 1 << 16);

@@ -10,10 +10,10 @@
 namespace arhost {
 
 // Converts decoded pictures to one pixel format. Formats that the host supports (4:2:0 with BT.601 or BT.709, and
-// grey) pass unchanged; others become BGR, or grey if they have no colour.
+// grey) remain unchanged. Others become BGR, or grey if they have no colour.
 class PictureConverter {
 public:
-    // `first` determines the format. All pictures are rotated clockwise by `quarter_turns` × 90°.
+    // The picture `first` determines the format of all pictures. They are rotated clockwise by `quarter_turns` × 90°.
     PictureConverter(const AVFrame &first, int quarter_turns);
 
     const arhost_frame_format &format() const { return format_; } // without plane layout
@@ -24,7 +24,7 @@ private:
     AVPixelFormat source_, target_;
     arhost_frame_format format_{};
     libav::SwsPointer scaler_;
-    std::vector<std::uint8_t> upright_; // a converted picture before rotation
+    std::vector<std::uint8_t> upright_; // buffer for a converted picture before its rotation
 };
 
 } // namespace arhost

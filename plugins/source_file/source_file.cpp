@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// source_file: frames from videos, numbered images and single images.
+// source_file: reads frames from videos, numbered images and single images.
 #include "folder.hpp"
 #include "image_sequence.hpp"
 #include "video.hpp"
@@ -74,12 +74,12 @@ private:
         std::error_code error;
         const fs::file_status status = fs::status(path_, error);
         if (fs::is_directory(status))
-            throw Failure(
-                ARHOST_STATUS_ERROR_CONFIGURATION,
-                "path: " + quoted(path_) +
-                    " is a folder; set a video, an image, or numbered images such as 'folder/image_%04d.png'; " +
-                    arhost::describe_folder(path_));
-        // The name of an existing file may have a percent sign.
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "path: " + quoted(path_) +
+                              " is a folder; set the path of a video, of an image, or of numbered images "
+                              "('folder/image_%04d.png'); " +
+                              arhost::describe_folder(path_));
+        // A percent sign in the name of an existing file is part of that name.
         if (!fs::exists(status) && path_.string().find('%') != std::string::npos) {
             reader_ = std::make_unique<arhost::ImageSequence>(arhost::numbered_files(path_, start_, host_));
             return;
@@ -102,27 +102,28 @@ private:
         }
     }
 
-    // Seeks to `frame`, counted over all iterations of a loop.
+    // Seeks to `frame`. In a loop, frame numbers continue in each iteration.
     arhost_status go_to(std::uint64_t frame) {
         if (limit_ && frame >= limit_)
             return ARHOST_STATUS_END;
         for (;;) {
-            const arhost_status status = reader_->go_to(round_frames_ ? frame % round_frames_ : frame);
-            if (status < ARHOST_STATUS_END || !loop_ || round_frames_)
+            const arhost_status status = reader_->go_to(loop_frames_ ? frame % loop_frames_ : frame);
+            if (status < ARHOST_STATUS_END || !loop_ || loop_frames_)
                 return status;
-            round_frames_ = reader_->frame_count(); // the true length of a video is known only at its end
-            round_ns_ = reader_->end_ns();
+            loop_frames_ = reader_->frame_count(); // the true length of a video is known only at its end
+            loop_ns_ = reader_->end_ns();
         }
     }
 
     std::int64_t time_ns(std::uint64_t frame) const {
         if (counts_time_)
             return std::llround(static_cast<double>(frame) * 1e9 / fps_);
-        const std::uint64_t round = round_frames_ ? frame / round_frames_ : 0;
-        return static_cast<std::int64_t>(round) * round_ns_ + *reader_->media_ns();
+        const std::uint64_t iteration = loop_frames_ ? frame / loop_frames_ : 0;
+        return static_cast<std::int64_t>(iteration) * loop_ns_ + *reader_->media_ns();
     }
 
-    // Waits until `frame` is due. If it is late, advances `frame` to the one that is due now.
+    // Waits until `frame` is due. If it is late by a frame period or more, first advances `frame` to the frame that
+    // is due now.
     arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
         const auto period_ns = std::max(static_cast<std::int64_t>(1e9 / fps_), std::int64_t{1});
         if (!epoch_set_) {
@@ -130,12 +131,12 @@ private:
             epoch_set_ = true;
         }
         if (const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame); late_ns >= period_ns) {
-            // Skips at most one second: after a longer pause playback resumes where it stopped.
+            // Skip no more than one second. After a longer pause, playback resumes close to where it stopped.
             info.skipped = static_cast<std::uint32_t>(std::min(late_ns, std::int64_t{1'000'000'000}) / period_ns);
             frame += info.skipped;
             if (const arhost_status status = go_to(frame); status != ARHOST_STATUS_OK)
                 return status;
-            // A decoder that is too slow plays slower instead of skipping more and more.
+            // If the decoder is too slow even so, play slower instead of skipping more and more frames.
             if (now_ns() - epoch_ns_ - time_ns(frame) >= period_ns)
                 epoch_ns_ = now_ns() - time_ns(frame);
         }
@@ -145,15 +146,15 @@ private:
 
     arhost::Host host_;
     fs::path path_;
-    std::int64_t start_; // −1: the lowest number
+    std::int64_t start_; // −1: the lowest number that exists
     bool loop_;
     std::uint64_t limit_; // total number of frames; 0: no limit
 
     std::unique_ptr<arhost::Reader> reader_;
-    bool counts_time_ = true; // frame n is at n/fps; otherwise the reader has time stamps
+    bool counts_time_ = true; // true: frame n is at n/fps; false: use the time stamps of the reader
     double fps_ = 0;
-    std::uint64_t round_frames_ = 0; // frames per loop iteration, once known
-    std::int64_t round_ns_ = 0;
+    std::uint64_t loop_frames_ = 0; // frames per iteration of the loop; 0: not known yet
+    std::int64_t loop_ns_ = 0;
 
     bool paced_ = false, epoch_set_ = false;
     std::int64_t epoch_ns_ = 0; // CLOCK_MONOTONIC at media time 0
@@ -162,12 +163,12 @@ private:
 using arhost::option;
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INPUT_PATH, "path", nullptr,
-           "A video, an image, or numbered images: 'frames/image_%04d.png'."),
-    option(ARHOST_OPTION_INTEGER, "start", "-1", "First number of numbered images; -1: the lowest that exists.", -1,
-           2'147'483'647),
-    option(ARHOST_OPTION_BOOL, "loop", "false", "Restart at the end."),
+           "Path of a video, an image, or numbered images ('frames/image_%04d.png')."),
+    option(ARHOST_OPTION_INTEGER, "start", "-1",
+           "First number of numbered images; -1: the lowest number that exists.", -1, 2'147'483'647),
+    option(ARHOST_OPTION_BOOL, "loop", "false", "Start again after the last frame."),
     option(ARHOST_OPTION_INTEGER, "frames", "0",
-           "Number of frames; 0: all (1 for a single image, which is repeated).", 0, 2'147'483'647),
+           "Number of frames to deliver; 0: all (1 for a single image, which is repeated).", 0, 2'147'483'647),
 };
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),

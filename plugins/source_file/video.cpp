@@ -14,15 +14,16 @@ namespace arhost {
 
 namespace {
 
-// Out of memory is the only failure that the file does not cause.
+// Throws std::bad_alloc if libav ran out of memory: the only error that the file does not cause. Returns other codes.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
     return code;
 }
 
-// Whether `file` is shorter than its AVI header says; nullopt if it is not an AVI. The header's frame count cannot be
-// used: it counts time slots, of which some may be empty (Microsoft, AVI RIFF File Reference).
+// Returns whether `file` is shorter than its AVI header declares, or std::nullopt if it is not an AVI file. The frame
+// count in the header cannot be used, because it counts time slots, some of which may be empty (Microsoft, AVI RIFF
+// File Reference).
 std::optional<bool> is_short_avi(const std::filesystem::path &file) {
     std::ifstream stream(file, std::ios::binary);
     unsigned char head[12] = {};
@@ -53,9 +54,9 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
         throw std::bad_alloc();
     context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
                                    this};
-    AVDictionary *options = nullptr; // a playlist must refer to files only
+    AVDictionary *options = nullptr; // restricts playlists to local files
     av_dict_set(&options, "protocol_whitelist", "file", 0);
-    // "file:" keeps libav from taking the path for a URL. It frees the context if it fails.
+    // "file:" prevents libav from parsing the path as a URL. avformat_open_input frees the context if it fails.
     const int opened = checked(avformat_open_input(&context, ("file:" + file.string()).c_str(), nullptr, &options));
     av_dict_free(&options);
     if (opened < 0)
@@ -66,7 +67,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
 
     const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
     if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
-        throw refuse("there is no video stream");
+        throw refuse("it has no video stream");
     stream_ = context->streams[index];
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != stream_)
@@ -74,12 +75,13 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
 
     const AVCodec *decoder = avcodec_find_decoder(stream_->codecpar->codec_id);
     if (!decoder)
-        throw refuse(std::string("this machine's libavcodec has no decoder for '") +
+        throw refuse(std::string("libavcodec on this machine has no decoder for '") +
                      avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
     codec_ = libav::allocated<libav::CodecPointer>(avcodec_alloc_context3(decoder));
     checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
     codec_->pkt_timebase = stream_->time_base;
-    // Threads share a picture, never a run of pictures: so damaged data decodes to the same pictures each time.
+    // Let threads share the slices of one picture, but not decode several pictures at once. Otherwise, damaged data
+    // might decode to different pictures each time.
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
@@ -93,7 +95,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (first == ARHOST_STATUS_ERROR_CANCELLED)
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
     if (first >= ARHOST_STATUS_END)
-        throw refuse("no picture can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
+        throw refuse("none of its pictures can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
 arhost_status Decoder::next() {
@@ -118,10 +120,10 @@ arhost_status Decoder::next() {
         else if (const arhost_status fed = feed(); fed != ARHOST_STATUS_OK)
             return fed;
     }
-    return cut_short_.empty() ? ARHOST_STATUS_END : ARHOST_STATUS_END_TRUNCATED;
+    return truncation_.empty() ? ARHOST_STATUS_END : ARHOST_STATUS_END_TRUNCATED;
 }
 
-// Sends the next packet to the decoder, or signals the end.
+// Sends the next packet to the decoder, or signals the end of the stream.
 arhost_status Decoder::feed() {
     if (host_.cancelled())
         return ARHOST_STATUS_ERROR_CANCELLED;
@@ -133,13 +135,14 @@ arhost_status Decoder::feed() {
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
         read_error_ = read == AVERROR_EOF ? (file_->pb ? file_->pb->error : 0) : read;
-        end_fault_ = log_.take_reason(); // Matroska's "File ended prematurely" has no error code
+        // For Matroska, libav logs "File ended prematurely" but returns no error code.
+        end_fault_ = log_.take_reason();
         checked(avcodec_send_packet(codec_.get(), nullptr));
         return ARHOST_STATUS_OK;
     }
     if (packet_->stream_index != stream_->index)
         return ARHOST_STATUS_OK;
-    // Drop a truncated packet: a half-grey picture would look like a valid one.
+    // Drop a truncated packet. Its picture would be partly grey, but not marked as damaged.
     if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
         return ARHOST_STATUS_OK;
@@ -168,10 +171,10 @@ void Decoder::finish() {
     const bool has_all = short_avi_ ? !*short_avi_ : packets_ >= declared;
     if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
-    cut_short_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);
+    truncation_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);
     if (declared > count_ && !short_avi_)
-        cut_short_ += " of " + std::to_string(declared);
-    cut_short_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
+        truncation_ += " of " + std::to_string(declared);
+    truncation_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
 }
 
 std::uint64_t Decoder::declared_count() const {
@@ -233,21 +236,21 @@ std::uint64_t Video::frame_count() const {
 }
 
 arhost_status Video::go_to(std::uint64_t index) {
-    // Seeking back reopens the file: every picture is then decoded from the same data in the same order, which
-    // seeking to a keyframe does not guarantee. At the end the decoder has no picture.
+    // To seek back, reopen the file: then every picture is decoded from the same data in the same order, which
+    // seeking to a keyframe does not guarantee. After the end, the decoder has no current picture.
     if (index < (decoder_->ended() ? decoder_->count() : decoder_->index()))
         open();
     const std::uint64_t from = decoder_->index();
-    auto told = std::chrono::steady_clock::now();
+    auto reported = std::chrono::steady_clock::now();
     while (decoder_->index() < index || decoder_->ended()) {
         const arhost_status status = decoder_->next();
-        tell(decoder_->damage(), damage_told_);
-        tell(decoder_->cut_short(), cut_short_told_);
+        warn_once(decoder_->damage(), damage_reported_);
+        warn_once(decoder_->truncation(), truncation_reported_);
         if (status != ARHOST_STATUS_OK)
             return status;
         check_size();
-        if (const auto now = std::chrono::steady_clock::now(); now - told > std::chrono::milliseconds(500)) {
-            told = now;
+        if (const auto now = std::chrono::steady_clock::now(); now - reported > std::chrono::milliseconds(500)) {
+            reported = now;
             host_.progress(static_cast<double>(decoder_->index() - from) / static_cast<double>(index - from),
                            ("decoding up to frame " + std::to_string(index)).c_str());
         }
@@ -258,19 +261,19 @@ arhost_status Video::go_to(std::uint64_t index) {
 void Video::check_size() const {
     const AVFrame &picture = decoder_->picture();
     if (picture.width != width_ || picture.height != height_)
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the size changes within the video " + quoted(file_) +
-                                                             ": frame " + std::to_string(decoder_->index()) + " is " +
-                                                             std::to_string(picture.width) + "×" +
-                                                             std::to_string(picture.height) + ", earlier ones " +
-                                                             std::to_string(width_) + "×" + std::to_string(height_));
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "the frame size changes within the video " + quoted(file_) + ": frame " +
+                          std::to_string(decoder_->index()) + " is " + std::to_string(picture.width) + "×" +
+                          std::to_string(picture.height) + ", but earlier frames are " + std::to_string(width_) +
+                          "×" + std::to_string(height_));
 }
 
-// Reports once: a loop reaches the same position repeatedly.
-void Video::tell(const std::string &fault, bool &told) const {
-    if (fault.empty() || told)
+// Warns once, although a loop reaches the same position repeatedly.
+void Video::warn_once(const std::string &fault, bool &warned) const {
+    if (fault.empty() || warned)
         return;
     host_.warn(fault);
-    told = true;
+    warned = true;
 }
 
 void Video::copy_to(const arhost_frame_buffer &buffer) {

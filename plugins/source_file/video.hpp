@@ -18,24 +18,24 @@ public:
     Decoder(const Decoder &) = delete; // libav stores its address
     Decoder &operator=(const Decoder &) = delete;
 
-    // Decodes the next picture: ARHOST_STATUS_OK, ARHOST_STATUS_END, ARHOST_STATUS_END_TRUNCATED or
+    // Decodes the next picture. Returns ARHOST_STATUS_OK, ARHOST_STATUS_END, ARHOST_STATUS_END_TRUNCATED or
     // ARHOST_STATUS_ERROR_CANCELLED.
     arhost_status next();
 
     const AVFrame &picture() const { return *frame_; }
-    std::uint64_t index() const { return count_ - 1; } // of the current picture, from 0
-    std::uint64_t count() const { return count_; }     // pictures so far
+    std::uint64_t index() const { return count_ - 1; } // index of the current picture, from 0
+    std::uint64_t count() const { return count_; }     // number of pictures decoded so far
     std::int64_t media_ns() const { return media_ns_; }
     std::int64_t end_ns() const { return media_ns_ + period_ns_; }
     bool ended() const { return ended_; }
 
     double fps() const { return fps_; }
-    std::uint64_t declared_count() const; // from the header; 0: unknown
+    std::uint64_t declared_count() const; // the frame count in the header; 0: unknown
     int quarter_turns() const;            // clockwise rotation to apply
 
-    // Messages about damaged data so far and about truncation; "" if there is none.
+    // Messages about damaged data found so far, and about truncation. Each is "" if there is no such fault.
     const std::string &damage() const { return damage_; }
-    const std::string &cut_short() const { return cut_short_; }
+    const std::string &truncation() const { return truncation_; }
 
 private:
     arhost_status feed();
@@ -54,12 +54,12 @@ private:
     std::int64_t period_ns_ = 0;
     std::uint64_t count_ = 0, packets_ = 0;
     std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
-    bool lost_data_ = false; // since the previous picture
+    bool lost_data_ = false; // data was lost or damaged since the previous picture
     bool ended_ = false;
     std::optional<bool> short_avi_;
-    int read_error_ = 0;                    // why reading ended, if not at the end of the file
-    std::string decoder_fault_, end_fault_; // libav's messages while decoding, and at the end
-    std::string damage_, cut_short_;
+    int read_error_ = 0;                    // the error that ended reading; 0: the end of the file
+    std::string decoder_fault_, end_fault_; // libav's last error while decoding, and at the end
+    std::string damage_, truncation_;
 };
 
 class Video final : public Reader {
@@ -74,17 +74,17 @@ public:
     void copy_to(const arhost_frame_buffer &buffer) override;
 
 private:
-    void open(); // at frame 0
+    void open(); // positions at frame 0
     void check_size() const;
-    void tell(const std::string &fault, bool &told) const;
+    void warn_once(const std::string &fault, bool &warned) const;
 
     std::filesystem::path file_;
     Host host_;
     LibavLog log_;
     std::optional<Decoder> decoder_;
     std::optional<PictureConverter> converter_;
-    int width_ = 0, height_ = 0; // of all pictures, before rotation
-    bool damage_told_ = false, cut_short_told_ = false;
+    int width_ = 0, height_ = 0; // size of all pictures, before rotation
+    bool damage_reported_ = false, truncation_reported_ = false;
 };
 
 } // namespace arhost

@@ -10,9 +10,9 @@
 #include <sstream>
 #include <vector>
 
-// The atlas: four square images, one below the other, each of twice the size of the one above on the desk. Nothing
-// of the middle half of the second to fourth is needed: there, the second holds the card's colour, the third the
-// card's coverage.
+// The texture atlas of the desk: four square images, one below the other. They have the same centre on the desk, and
+// each covers twice the width of the image above it, so its own middle is not needed. The middle holds other data
+// instead: in the second image the colour of the card, in the third image the coverage of the card.
 asm(".section .rodata\n"
     "desk_jpeg: .incbin \"" DESK_JPEG "\"\n"
     "desk_jpeg_end:\n"
@@ -22,7 +22,7 @@ extern "C" [[gnu::visibility("hidden")]] const unsigned char desk_jpeg[], desk_j
 namespace arhost::synthetic {
 namespace {
 
-constexpr float atlas_texel = 0.25f; // of the first image
+constexpr float atlas_texel = 0.25f; // texel size of the first image
 constexpr float card_texel = 0.5f;
 constexpr int ink_permille = 175; // of the paper, in sRGB codes
 
@@ -43,7 +43,7 @@ cv::Mat centre(const cv::Mat &image, int side) {
     return image(cv::Rect((image.cols - side) / 2, (image.rows - side) / 2, side, side));
 }
 
-// The fourth channel: varnished wood is what is redder than everything else on the desk.
+// Computes the fourth channel, the gloss of the varnish, from the colour: only varnished wood is that red.
 void add_gloss(cv::Mat &image) {
     std::vector<cv::Mat> rgba;
     cv::split(image, rgba);
@@ -55,9 +55,9 @@ void add_gloss(cv::Mat &image) {
 void print_caption(const MarkerSheet &sheet, cv::Mat &image) {
     constexpr double px_per_mm = 1 / atlas_texel;
     const auto print = [&](const std::string &text, double y_mm, double capital_mm, int pen_px) {
-        const cv::Point2d at(-60, y_mm); // y up, from the marker's centre
+        const cv::Point2d at(-60, y_mm); // relative to the marker's centre, y up
         const cv::Point px(image.cols / 2 + cvRound(at.x * px_per_mm), image.rows / 2 - cvRound(at.y * px_per_mm));
-        constexpr double capital_px = 21; // of the font at scale 1
+        constexpr double capital_px = 21; // height of a capital letter of the font at scale 1
         cv::putText(image, text, px, cv::FONT_HERSHEY_DUPLEX, capital_mm * px_per_mm / capital_px,
                     cv::Scalar(45, 44, 45), pen_px, cv::LINE_AA);
     };
@@ -67,7 +67,8 @@ void print_caption(const MarkerSheet &sheet, cv::Mat &image) {
     print(side.str(), 50.5, 2, 1);
 }
 
-// The marker in the middle of `image`: each texel is the exact mean of what the cells cover of it.
+// Draws the marker in the middle of `image`. Each texel is the exact mean of the cells that cover it, weighted by
+// area.
 void print_marker(const cv::Mat &cells, cv::Mat &image, float texel) {
     const int side = static_cast<int>(marker_side / texel), cell_px = side / cells.cols + 1;
     cv::Mat white, paper = centre(image, side);
@@ -84,7 +85,7 @@ void print_marker(const cv::Mat &cells, cv::Mat &image, float texel) {
         }
 }
 
-// The window: an upright rectangle in the wall, from the marker.
+// Position of the window relative to the marker. The window is an upright rectangle in a wall.
 constexpr Point window_at{-640, 702};
 constexpr Point into_window{-0.674f, 0.739f}, along_window{0.739f, 0.674f};
 constexpr float window_bottom = 240, window_top = 1180, window_half_width = 400;
@@ -107,7 +108,7 @@ DeskTextures make_desk(const MarkerSheet &sheet) {
     for (auto clip = clips.begin() + 1; clip != clips.end(); ++clip)
         add_gloss(*clip);
     print_caption(sheet, clips[1]);
-    // A finer level for the marker alone.
+    // An additional, finer level that covers only the marker and its surroundings.
     cv::resize(centre(clips[1], side / 2), clips[0], {side, side}, 0, 0, cv::INTER_CUBIC);
     print_marker(sheet.cells, clips[0], atlas_texel / 2);
     return {Pyramid(clips, atlas_texel / 2), Pyramid(std::span(&card_image, 1), card_texel)};
@@ -117,7 +118,7 @@ float reflected_light(Point at, Vec3 view) {
     const float cosine = std::max(-view.z, 0.0f), grazing = 1 - cosine;
     const float fresnel = 0.04f + 0.96f * grazing * grazing * grazing * grazing * grazing; // Schlick, n = 1.5
     const Point out{view.x, view.y}; // the reflected direction is (view.x, view.y, −view.z)
-    float light = 0.28f;             // from the room
+    float light = 0.28f;             // light that the room reflects
     if (const float approach = dot(out, into_window); approach > 1e-3f) {
         const float s = dot(window_at - at, into_window) / approach; // distance to the window's plane
         const float side = dot(at + out * s - window_at, along_window), height = -view.z * s;

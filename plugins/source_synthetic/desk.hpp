@@ -13,26 +13,26 @@
 
 namespace arhost::synthetic {
 
-// The desk's plane is measured in units of 1/80 of the marker's side: mm for the default marker.
+// Coordinates on the desk have units of 1/80 of the marker's side. For the default marker, these are mm.
 inline constexpr float marker_side = 80;
 
 struct MarkerSheet {
     cv::Mat_<uint8_t> cells; // from marker_cells()
     std::string family;
     int id;
-    double side_mm; // for the caption
+    double side_mm; // printed in the caption
 };
 
-// The fourth channel of the desk is the gloss of the varnish, that of the card its coverage of the desk, shadow
-// included.
+// The fourth channel of the desk is the gloss of the varnish. The fourth channel of the card is its coverage of the
+// desk, including its shadow.
 struct DeskTextures {
     Pyramid desk, card;
 };
 DeskTextures make_desk(const MarkerSheet &sheet);
 inline constexpr Point card_half{78, 56};
 
-// Light that a varnished board reflects at `at` in the direction of the camera, relative to white in full light.
-// `view`: unit vector from the camera.
+// Returns the light that a varnished board at `at` reflects towards the camera, relative to white in full light.
+// `view` is the unit vector from the camera to `at`.
 float reflected_light(Point at, Vec3 view);
 
 } // namespace arhost::synthetic

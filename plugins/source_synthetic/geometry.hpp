@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Points of the desk, in mm for a marker of 80 mm.
+// Points and vectors on the desk. The unit is 1/80 of the marker's side: mm for a marker of 80 mm.
 #pragma once
 
 #include <arhost/shading/vec3.hpp>
@@ -23,7 +23,7 @@ struct Point {
 inline float mix(float a, float b, float weight) {
     return a + (b - a) * weight;
 }
-// 0 at `from`, 1 at `to`; `from` may be the larger.
+// Returns 0 at `from`, 1 at `to`, and smooth values in between. `from` may be larger than `to`.
 inline float smoothstep(float from, float to, float x) {
     const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
     return t * t * (3 - 2 * t);

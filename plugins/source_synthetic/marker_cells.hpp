@@ -11,11 +11,11 @@
 
 namespace arhost::synthetic {
 
-// NULL-terminated option choices: "tag36h11", "DICT_6X6_250" …
+// Returns the choices of the option `family`, terminated by NULL: "tag36h11", "DICT_6X6_250" …
 std::span<const char *const> marker_families();
 
-// 0 where the cell is black; the first row is the print's top; without the quiet zone. Throws a Failure if the
-// family has no such id.
+// Returns the cells of a marker without its quiet zone; 0 is black, and the first row is the top of the print. Throws
+// Failure if the family has no marker `id`.
 cv::Mat_<uint8_t> marker_cells(const std::string &family, std::int64_t id);
 
 } // namespace arhost::synthetic

@@ -6,7 +6,8 @@
 
 namespace arhost::synthetic {
 
-// Calls work(first, last) on `threads` equal parts of [0, count), one of them on the caller's thread.
+// Divides [0, count) into `threads` parts of equal size and calls work(first, last) for all parts in parallel. One of
+// the calls runs on the caller's thread.
 template <class Work> void in_parallel(int count, int threads, const Work &work) {
     std::vector<std::jthread> others;
     const auto bound = [&](int part) { return static_cast<int>(static_cast<long long>(count) * part / threads); };

@@ -15,12 +15,12 @@ Vec3d normalized(Vec3d v) {
     return v * (1 / std::sqrt(dot(v, v)));
 }
 
-// A sine with a whole number of cycles per period, so that the path closes.
+// Returns a sine wave with a whole number of cycles per period, so the path is closed.
 double wave(double phase, int cycles, double offset) {
     return std::sin(2 * std::numbers::pi * cycles * phase + offset);
 }
 
-// Hand tremor, about −1 to 1: 1 to 4 Hz at the default period of 10 s.
+// Returns the tremor of a hand, about −1 to 1. Its frequencies are 1 to 4 Hz at the default period of 10 s.
 double tremor(double phase, double offset) {
     return 0.5 * wave(phase, 11, offset) + 0.3 * wave(phase, 19, 2.1 * offset + 1) +
            0.2 * wave(phase, 37, 3.7 * offset + 2);
@@ -57,7 +57,7 @@ Mt pose_on_path(PathKind kind, double phase, double distance_scale, double unit_
 
     const double a = azimuth * degree, t = tilt * degree;
     const Vec3d back{std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
-    // Looks slightly above the marker, where virtual objects will stand.
+    // The camera looks slightly above the marker, where virtual objects will stand.
     Vec3d target{6 * wave(phase, 1, 1.1), 6 * wave(phase, 2, 0.2), 16};
     if (kind == PathKind::still)
         target = {0, 0, 16};

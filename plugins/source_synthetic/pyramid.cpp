@@ -17,10 +17,11 @@ Pyramid::Pyramid(std::span<const cv::Mat> clips, float texel) {
         if (levels_.size() < clips.size())
             clips[levels_.size()].copyTo(image);
         if (!levels_.empty()) {
-            // Each texel is the mean of sixteen finer ones, weighted 1 3 3 1 in both directions: smoother than a box,
-            // which would show steps where the image is out of focus.
+            // Each texel is the mean of sixteen finer ones, with the weights 1 3 3 1 in both directions. This is
+            // smoother than a box filter, which would cause visible steps where the image is out of focus.
             const Level &finer = levels_.back();
-            cv::Mat smooth = finer.texels.colRange(0, finer.side).clone(); // else OpenCV reads the padding as well
+            cv::Mat smooth = finer.texels.colRange(0, finer.side)
+                                 .clone(); // a copy, because OpenCV would otherwise also read the padding
             cv::GaussianBlur(smooth, smooth, {3, 3}, 0, 0, cv::BORDER_REPLICATE); // weights 1 2 1
             const int half = finer.side / 2, margin = (side - half) / 2;
             cv::Mat middle = image(cv::Rect(margin, margin, half, half));
@@ -36,7 +37,7 @@ float Pyramid::finest_at(float r) const {
     float lod = 0;
     for (const Level &level : levels_) {
         if (level.half() >= levels_.back().half())
-            break; // covers everything
+            break; // this level covers the whole plane
         const float position = r / level.half();
         if (position < 0.7f)
             break;
@@ -58,7 +59,7 @@ float Pyramid::finest_at(float r) const {
         const float along = static_cast<float>(i);
         float s = (at.u[i] + (step_u + slope_u * along)) * scale + centre;
         float t = centre - (at.v[i] + (step_v + slope_v * along)) * scale;
-        s = s > 0 ? s : 0; // NaN too
+        s = s > 0 ? s : 0; // also maps NaN to 0
         t = t > 0 ? t : 0;
         s = s < end ? s : end;
         t = t < end ? t : end;
@@ -77,12 +78,12 @@ ARHOST_WIDE void Pyramid::sample(const Footprints &at, Texel16 (&out)[span_px]) 
     const float last = static_cast<float>(levels_.size() - 1);
     const float middle = std::clamp(0.5f * (at.lod[0] + at.lod[1]), 0.0f, last);
     const int k = std::min(static_cast<int>(middle), static_cast<int>(levels_.size()) - 2);
-    constexpr float whole = 32767.5f; // 65535/2: two samples a pixel
+    constexpr float whole = 32767.5f; // 65535/2, because each pixel has two samples
     float fine[span_px], coarse[span_px], fine_total = 0, coarse_total = 0;
     for (int i = 0; i < span_px; ++i) {
         const float along = static_cast<float>(i) / span_px;
         float share = at.lod[0] + (at.lod[1] - at.lod[0]) * along - static_cast<float>(k);
-        share = 2 * share - 0.5f; // so that most spans need only one of the two levels
+        share = 2 * share - 0.5f; // shortens the transition, so most spans need only one of the two levels
         share = share > 0 ? share : 0;
         share = share < 1 ? share : 1;
         coarse[i] = whole * share;
@@ -90,7 +91,7 @@ ARHOST_WIDE void Pyramid::sample(const Footprints &at, Texel16 (&out)[span_px]) 
         fine_total += fine[i];
         coarse_total += coarse[i];
     }
-    // Blends the two rows by wy, then weights the two columns by wx; their sum is left to store_folded().
+    // Blends the two rows with wy, then multiplies the two columns with wx. store_folded() adds the columns.
     const auto lookup = [](const Level &level, const Taps &taps, int i) {
         const Texel *upper = level.texels[0] + taps.index[i], *lower = upper + level.texels.cols;
         const U16x8 column = times(U16x8::load_bytes(upper), U16x8::low_of(taps.wy[i])) +

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// An image of a plane at many resolutions. As in a clipmap, finer levels cover less: the middle, where the camera
-// comes close, has the finest.
+// An image of a plane at many resolutions. As in a clipmap, finer levels cover a smaller area around the middle,
+// which the camera approaches most closely.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -13,16 +13,17 @@
 
 namespace arhost::synthetic {
 
-// Texels are red, green and blue as sRGB codes, where the largest code stands for `full_scale`, and a fourth channel.
-// Filtering is done on codes: on linear light, the edges of a black square on white would appear inside their true
-// place, because half the light is far more than half the code (docs/adr/0007).
+// A texel has red, green and blue as sRGB codes, whose largest value stands for `full_scale`, and a fourth channel.
+// Codes are filtered, not linear light. With linear light, the edges of a black square on white would appear inside
+// their true position, because half the light is far more than half the code (docs/adr/0007).
 using Texel = cv::Vec4b;
 using Texel16 = std::array<uint16_t, 4>; // code · 256
 inline constexpr float texel16_unit = 255 * 256;
 inline constexpr float full_scale = 1.6f; // white in full light is 1
 
-// The samples of sixteen pixels of a row. A pixel is sampled at two points, `step` before and after (u, v), which
-// share the longer side of its footprint. `step` and `lod` are given at the first pixel and at the next span's first.
+// Sample positions of a span: sixteen pixels of a row. A pixel is sampled at the two points (u, v) ± step, each of
+// which stands for one half of the longer side of its footprint. `step` and `lod` have two values, one at the first
+// pixel of this span and one at the first pixel of the next span, and are interpolated between them.
 inline constexpr int span_px = 16;
 struct Footprints {
     alignas(64) float u[span_px], v[span_px];
@@ -31,15 +32,16 @@ struct Footprints {
 
 class Pyramid {
 public:
-    // `clips`: RGBA images of equal size, a power of two, first row at the top. The texels of the first are `texel`
-    // long, those of each further one twice as long as before; what a finer one covers is ignored.
+    // `clips` are RGBA images of equal size, which is a power of two; the top row is first. A texel of the first clip
+    // has the side `texel`, and a texel of each following clip is twice as large as in the clip before. The area that
+    // a finer clip covers is ignored in coarser clips.
     Pyramid(std::span<const cv::Mat> clips, float texel);
 
-    // Trilinear, with two samples per pixel.
+    // Samples with trilinear filtering and two samples per pixel.
     void sample(const Footprints &at, Texel16 (&out)[span_px]) const;
 
-    // The finest level of detail that covers a point at distance `r` (the larger of |u| and |v|), with a soft
-    // transition to the next before the level's border.
+    // Returns the finest level of detail that covers a point at distance `r` (the larger of |u| and |v|). Near the
+    // border of a level, the result increases gradually towards the next level.
     float finest_at(float r) const;
     float texel() const { return levels_[0].texel; }
 
@@ -47,11 +49,12 @@ private:
     struct Level {
         float texel;
         int side;
-        // Rows are longer than `side`: with a power of two, a column of texels would share few cache lines.
+        // Rows are padded to more than `side` texels. If their length were a power of two, the texels of a column
+        // would compete for a few cache sets.
         cv::Mat_<Texel> texels;
         float half() const { return 0.5f * static_cast<float>(side) * texel; }
     };
-    struct Taps { // of bilinear lookups: the upper left texel, and the weights of columns and rows
+    struct Taps { // bilinear lookups: index of the upper left texel, and weights of the columns and rows
         alignas(64) std::int32_t index[span_px];
         alignas(64) std::uint32_t wx[span_px], wy[span_px];
     };

@@ -5,7 +5,7 @@
 
 namespace arhost::synthetic {
 
-// The finalizer of MurmurHash3 (64 bits), by Austin Appleby.
+// Hash function: the 64-bit finalizer of MurmurHash3, by Austin Appleby.
 inline std::uint64_t hashed(std::uint64_t x) {
     x ^= x >> 33;
     x *= 0xff51afd7ed558ccdULL;
@@ -14,7 +14,7 @@ inline std::uint64_t hashed(std::uint64_t x) {
     return x ^ x >> 33;
 }
 
-// 0 to 1, from a seed and two counters.
+// Returns a pseudo-random number from 0 to 1 that depends only on a seed and two counters.
 inline float random_unit(std::uint64_t seed, std::int64_t a, std::int64_t b) {
     const auto mixed = hashed(hashed(seed + static_cast<std::uint64_t>(a) * 0x9e3779b97f4a7c15ULL) +
                               static_cast<std::uint64_t>(b) * 0xc2b2ae3d27d4eb4fULL);

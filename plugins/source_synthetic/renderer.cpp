@@ -14,15 +14,16 @@
 namespace arhost::synthetic {
 namespace {
 
-constexpr int cell_px = span_px; // of the coarse grid
+constexpr int cell_px = span_px; // cell size of the coarse grid
 constexpr int srgb_table_size = 4096;
 constexpr int grain_side = 256;
-constexpr float grain_unit = 4096; // one sigma
-constexpr float min_slope = 0.02f; // rays flatter than this are clamped, so that they hit the desk
-constexpr float sharpness = 0.8f;  // texel size relative to the footprint: the pyramid is smooth already
-constexpr float aperture = 3.2f;   // diameter of the blur circle in px = aperture·focal_px·|1/depth − 1/focus|
+constexpr float grain_unit = 4096; // value of one sigma
+constexpr float min_slope = 0.02f; // flatter rays are clamped to this slope, so they hit the desk
+constexpr float sharpness = 0.8f; // texel size relative to the footprint; below 1, because the pyramid itself smooths
+constexpr float aperture = 3.2f; // diameter of the circle of confusion in px = aperture·focal_px·|1/depth − 1/focus|
 
-// Normally distributed noise (Irwin–Hall of 4), partly shared between channels and neighbours as after demosaicing.
+// Returns a tile of approximately normally distributed noise (Irwin–Hall with n = 4). Channels and neighbouring
+// pixels are partly correlated, as after demosaicing.
 std::vector<std::array<int16_t, 4>> make_grain(std::uint64_t seed) {
     constexpr int n = grain_side;
     const auto normal = [&](int x, int y, int channel) {
@@ -52,7 +53,7 @@ std::vector<std::array<int16_t, 4>> make_grain(std::uint64_t seed) {
     return grain;
 }
 
-// sRGB decoding: least-squares fit of a quartic, to 0.2 of 255 codes above code 10.
+// Decodes sRGB with a least-squares fit of a quartic. Above code 10 the error is less than 0.2 of 255 codes.
 inline float decoded(float code) {
     return 0.0011388f + code * (0.0265387f + code * (0.5694731f + code * (0.5121703f - code * 0.1099398f)));
 }
@@ -63,7 +64,7 @@ inline float decoded(float code) {
 struct Renderer::Frame {
     std::optional<Card> card;
     std::vector<Plane> planes;
-    std::vector<std::vector<Node>> nodes; // one grid per plane
+    std::vector<std::vector<Node>> nodes; // one coarse grid per plane
     std::uint64_t sequence;
 };
 
@@ -121,13 +122,14 @@ Renderer::Renderer(DeskTextures textures, const arhost_intrinsics &camera, const
 }
 
 Renderer::Plane Renderer::plane_of(const Mt &m) {
-    // The camera's axes in desk coordinates: the rows of the rotation, y and z flipped from GL to OpenCV.
+    // Returns a camera axis in desk coordinates: a row of the rotation. y and z are negated to convert from GL to
+    // OpenCV axes.
     const auto axis = [&](int row, double sign) {
         return shading::Vec3T<double>{sign * m[row], sign * m[4 + row], sign * m[8 + row]};
     };
     const std::array axes{axis(0, 1), axis(1, -1), axis(2, -1)};
     const auto eye = -(axes[0] * m[12] + axes[1] * -m[13] + axes[2] * -m[14]);
-    // The ray with the camera coordinates d has the direction D = Σ d_i axis_i and hits z = 0 at eye − D·eye.z/D.z.
+    // A ray d in camera coordinates has the direction D = Σ d_i axis_i and hits the plane z = 0 at eye − D·eye.z/D.z.
     Plane plane;
     for (int i = 0; i < 3; ++i) {
         plane.row[0][i] = static_cast<float>(eye.z * axes[i].x - eye.x * axes[i].z);
@@ -173,7 +175,7 @@ std::vector<Renderer::Node> Renderer::nodes_of(const Plane &plane) const {
             node.step_v = 0.25f * circle * dv;
             const float extent = std::max(std::abs(at.u), std::abs(at.v)) + 24 * wide;
             node.lod = std::max({0.0f, std::log2(std::max(footprint, 1e-6f) / desk.texel()), desk.finest_at(extent)});
-            // cos⁴ vignetting, about half of it corrected by the camera.
+            // cos⁴ vignetting, of which the camera corrects about half.
             const float length2 = dot(ray, ray), cos2 = ray.z > 0 ? ray.z * ray.z / length2 : 0;
             node.gain = length2 > 0 ? 0.45f + 0.55f * cos2 * cos2 : 0;
             Vec3 direction = plane.axes[0] * ray.x + plane.axes[1] * ray.y + plane.axes[2] * ray.z;
@@ -268,8 +270,9 @@ ARHOST_WIDE void Renderer::warp_span(int x, int y, const Frame &frame, Texel16 *
 
 // The buffers of one thread of develop_row().
 struct Renderer::Scratch {
-    std::vector<const Texel16 *> window; // the rows from `radius` above to `radius` below
-    std::vector<Texel16> down, across;   // blurred; `down` is padded by `radius` texels on both sides
+    std::vector<const Texel16 *> window; // the rows from `radius` above the current row to `radius` below it
+    std::vector<Texel16> down,
+        across; // rows after the vertical and the horizontal blur; `down` is padded by `radius` texels at both ends
 };
 
 ARHOST_WIDE void Renderer::develop_row(int y, const Frame &frame, Scratch &scratch, uint8_t *bgr) const {
@@ -298,14 +301,15 @@ ARHOST_WIDE void Renderer::develop_row(int y, const Frame &frame, Scratch &scrat
         }
         row = scratch.across.data();
     }
-    // Each frame and each band of rows gets its own offset into the noise tile, so that it does not repeat.
+    // Each frame and each band of rows uses its own offset into the noise tile, which hides the repetition of the
+    // tile.
     const std::uint64_t offset = hashed(seed_ * 0x9e3779b97f4a7c15ULL + frame.sequence * 512 + y / 64);
     const auto *grain = &grain_[static_cast<std::size_t>((offset >> 8) + y) % grain_side * grain_side];
     const float down = static_cast<float>(y % cell_px) / cell_px;
     const Node *above = &frame.nodes[frame.nodes.size() / 2][static_cast<std::size_t>(y / cell_px) * grid_width_];
     const Node *below = above + grid_width_;
     for (int left = 0; left < width_; left += cell_px, ++above, ++below) {
-        // Vignetting of the lens and reflection of the varnish.
+        // Apply the vignetting of the lens and add the reflection of the varnish.
         const float gain = mix(above[0].gain, below[0].gain, down);
         const float gain_step = (mix(above[1].gain, below[1].gain, down) - gain) / cell_px;
         const float reflection = mix(above[0].reflection, below[0].reflection, down);
@@ -340,8 +344,8 @@ void Renderer::render(const Shot &shot, uint8_t *bgr, std::size_t stride) const 
         frame.planes.push_back(plane_of(pose));
         frame.nodes.push_back(nodes_of(frame.planes.back()));
     }
-    // Spans are warped in blocks of rows, because vertical neighbours read the same texels. A ring keeps the rows
-    // that the blur of a block needs.
+    // Spans are warped in blocks of several rows, because vertical neighbours read the same texels. A ring buffer
+    // keeps the rows that the blur of a block needs.
     constexpr int block_rows = 16, block_columns = 8 * span_px;
     const int radius = static_cast<int>(kernel_.size()) - 1, rows_kept = block_rows + 2 * radius;
     in_parallel(height_, threads_, [&](int first, int last) {

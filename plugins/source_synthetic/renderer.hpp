@@ -15,8 +15,8 @@
 namespace arhost::synthetic {
 
 struct Sensor {
-    double blur_px; // sigma of the lens blur
-    double noise;   // 1: a small camera indoors
+    double blur_px; // sigma of the lens blur in px
+    double noise;   // 1: like a small camera indoors
     double exposure_ev;
     std::uint64_t seed;
 };
@@ -27,7 +27,8 @@ struct Card {
 };
 
 struct Shot {
-    std::span<const Mt> poses; // in the desk's units; with several, the frame is their mean (motion blur)
+    std::span<const Mt>
+        poses; // in desk units; if there are several, the frame is the mean of their images (motion blur)
     std::optional<Card> card;
     std::uint64_t sequence; // selects the noise
 };
@@ -36,19 +37,19 @@ class Renderer {
 public:
     Renderer(DeskTextures textures, const arhost_intrinsics &camera, const Sensor &sensor, int threads);
 
-    // BGR, rows of `stride` bytes.
+    // Renders a frame to `bgr`, whose rows are `stride` bytes apart.
     void render(const Shot &shot, uint8_t *bgr, std::size_t stride) const;
 
 private:
-    struct Node { // of the coarse grid: quantities that vary slowly over the image
+    struct Node { // a node of the coarse grid, for quantities that vary slowly over the image
         float step_u, step_v, lod;
         float gain;       // vignetting
-        float reflection; // light added where the gloss is 1
+        float reflection; // light to add where the gloss is 1
     };
-    struct Plane { // (u, v) = (row 0, row 1) · ray / (row 2 · ray)
+    struct Plane { // maps a ray to the desk: (u, v) = (row 0 · ray, row 1 · ray) / (row 2 · ray)
         std::array<std::array<float, 3>, 3> row;
         Vec3 eye;
-        std::array<Vec3, 3> axes; // of the camera (x right, y down, z forward) in desk coordinates
+        std::array<Vec3, 3> axes; // camera axes (x right, y down, z forward) in desk coordinates
     };
     struct Frame;
 
@@ -61,16 +62,17 @@ private:
     DeskTextures textures_;
     int width_, height_, threads_;
     int padded_; // width + 1, rounded up to whole spans
-    // Ray directions at every lens_px-th pixel, interpolated linearly; (0, 0, 0) where no light arrives.
+    // Ray directions at every lens_px-th pixel; they are interpolated linearly. (0, 0, 0) where no light arrives.
     static constexpr int lens_px = 4;
     int lens_columns_;
     std::vector<float> ray_[3];
     int grid_width_, grid_height_;
     double focal_px_;
-    // Blur weights per channel, repeated for two pixels: of the centre, then of each pair of neighbours.
+    // Blur weights: first of the centre, then of each pair of neighbours. Each entry has one weight per channel,
+    // repeated for two pixels.
     std::vector<std::array<uint16_t, 8>> kernel_;
-    // With light in units of full_scale:
-    std::vector<uint8_t> srgb_;                 // codes, indexed by the square root of light
+    // The following tables use light in units of full_scale.
+    std::vector<uint8_t> srgb_;                 // sRGB codes, indexed by the square root of light
     float shot_, read2_;                        // noise variance = shot_·light + read2_
     std::vector<std::array<int16_t, 4>> grain_; // tileable noise
     std::uint64_t seed_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Eight 16-bit numbers: two texels, or the two columns of a bilinear lookup. Results are identical with and without
-// SSE2.
+// Vectors of eight 16-bit numbers: two texels, or the two columns of a bilinear lookup. Results are identical with
+// and without SSE2.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 #include <emmintrin.h>
 #endif
 
-// Compiles a function for AVX2 as well and selects a version when the plugin is loaded. Both give the same results,
-// because neither fuses multiplications and additions (-ffp-contract=off).
+// Compiles a function twice, with and without AVX2, and selects a version when the plugin is loaded. Both give the
+// same results, because neither fuses multiplications and additions (-ffp-contract=off).
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ARHOST_WIDE [[gnu::target_clones("avx2", "default")]]
 #else
@@ -31,18 +31,19 @@ constexpr std::uint32_t pair_of(std::int32_t low, std::int32_t high) {
 struct U16x8 {
     __m128i lanes;
     static U16x8 load(const void *p) { return {_mm_loadu_si128(static_cast<const __m128i *>(p))}; }
-    static U16x8 load_bytes(const void *p) { // eight bytes, times 256
+    static U16x8 load_bytes(const void *p) { // loads eight bytes and multiplies them by 256
         return {_mm_unpacklo_epi8(_mm_setzero_si128(), _mm_loadl_epi64(static_cast<const __m128i *>(p)))};
     }
-    static U16x8 low_of(std::uint32_t pair) { // in all lanes
+    static U16x8 low_of(std::uint32_t pair) { // the low weight in all lanes
         return {_mm_shuffle_epi32(doubled(pair), 0x00)};
     }
     static U16x8 high_of(std::uint32_t pair) { return {_mm_shuffle_epi32(doubled(pair), 0x55)}; }
-    static U16x8 spread(std::uint32_t pair) { // low in the lower four lanes, high in the upper four
+    static U16x8
+    spread(std::uint32_t pair) { // the low weight in the lower four lanes, the high weight in the upper four
         return {_mm_shuffle_epi32(doubled(pair), 0x50)};
     }
     void store(void *p) const { _mm_storeu_si128(static_cast<__m128i *>(p), lanes); }
-    void store_folded(void *p) const { // lower four + upper four lanes
+    void store_folded(void *p) const { // stores the sums of the lower and the upper four lanes
         _mm_storel_epi64(static_cast<__m128i *>(p), _mm_add_epi16(lanes, _mm_srli_si128(lanes, 8)));
     }
     friend U16x8 operator+(U16x8 a, U16x8 b) { return {_mm_add_epi16(a.lanes, b.lanes)}; }

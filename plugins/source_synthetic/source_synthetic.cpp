@@ -44,7 +44,8 @@ arhost_intrinsics default_camera(std::int64_t width, std::int64_t height) {
     return camera;
 }
 
-// The camera's distance, relative to the default lens, at which the marker appears equally large.
+// Returns the camera distance at which the marker appears as large as with the default lens, relative to the distance
+// for the default lens.
 double distance_scale_of(const arhost_intrinsics &camera) {
     const auto half_view = [](double centre, double size, double focal) {
         const double px = std::max(0.5, std::min(centre + 0.5, size - 0.5 - centre));
@@ -79,8 +80,8 @@ public:
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "fps: must be greater than 0");
         if (occlude_from_ >= 0 && occlude_to_ <= occlude_from_)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "occlude_to: must be greater than occlude_from; it is the first frame in which the "
-                          "marker is no longer covered");
+                          "occlude_to: must be greater than occlude_from: it is the first frame in which the "
+                          "postcard no longer covers the marker");
         if (threads_ < 1)
             threads_ = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     }
@@ -144,7 +145,8 @@ private:
         return pose_on_path(path_, periods - std::floor(periods), distance_scale_, unit_mm);
     }
 
-    // Covers the marker from occlude_from to occlude_to, and slides in and out before and after.
+    // Returns the pose of the card, if it is visible. It covers the marker from frame occlude_from until before frame
+    // occlude_to, slides in before that and slides out after that.
     std::optional<Card> card_at(std::uint64_t sequence) const {
         if (occlude_from_ < 0)
             return {};
@@ -162,14 +164,15 @@ private:
 
     std::int64_t time_ns(std::uint64_t frame) const { return std::llround(static_cast<double>(frame) * 1e9 / fps_); }
 
-    // Waits until `frame` is due. If it is late by a frame or more, skips to the frame that is due now.
+    // Waits until `frame` is due. If it is late by a frame period or more, first advances `frame` to the frame that
+    // is due now.
     arhost_status wait_for(std::uint64_t &frame, arhost_frame_info &info) {
         if (!epoch_set_) {
             epoch_ns_ = now_ns() - time_ns(frame);
             epoch_set_ = true;
         }
         const std::int64_t late_ns = now_ns() - epoch_ns_ - time_ns(frame);
-        // After a pause of weeks the count may not fit; the next frame skips the remainder.
+        // After a pause of weeks, the number of skipped frames may exceed 32 bits. The next call then skips the rest.
         constexpr double max_skipped = std::numeric_limits<std::uint32_t>::max();
         info.skipped =
             static_cast<std::uint32_t>(std::clamp(static_cast<double>(late_ns) * fps_ / 1e9, 0.0, max_skipped));
@@ -205,26 +208,30 @@ const arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_REAL, "side_mm", "80",
            "Outer side of the black square in mm; the whole scene scales with it.", 0.001, 100'000),
     option(ARHOST_OPTION_TEXT, "path", "orbit",
-           "Camera path: orbit (once around the sheet), still, or approach (towards it and back).", 0, 0, paths),
-    option(ARHOST_OPTION_REAL, "period", "10", "Duration of the closed path in s.", 0.01, 100'000),
+           "Camera path: orbit (once around the sheet), still, or approach (towards the sheet and back).", 0, 0,
+           paths),
+    option(ARHOST_OPTION_REAL, "period", "10", "Duration of one round of the camera path in s.", 0.01, 100'000),
     option(ARHOST_OPTION_INTEGER, "frames", "150", "Number of frames; 0: endless.", 0, 2'147'483'647),
-    option(ARHOST_OPTION_REAL, "fps", "30", "Frames per second, if the configuration sets no rate.", 0.001, 1000),
+    option(ARHOST_OPTION_REAL, "fps", "30", "Frames per second, unless the configuration sets a rate.", 0.001, 1000),
     option(ARHOST_OPTION_INTEGER, "width", "1280",
            "Width in px of the default camera, which is used if the configuration names none.", 1,
            ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_INTEGER, "height", "720", "Height in px of the default camera.", 1, ARHOST_MAX_IMAGE_SIDE),
-    option(ARHOST_OPTION_REAL, "noise", "1", "Sensor noise; 1: a small camera indoors, 0: none.", 0, 20),
-    option(ARHOST_OPTION_REAL, "blur_px", "0.5", "Lens blur, sigma in px; 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "noise", "1", "Sensor noise; 1: like a small camera indoors, 0: none.", 0, 20),
+    option(ARHOST_OPTION_REAL, "blur_px", "0.5", "Lens blur: sigma in px; 0: none.", 0, 20),
     option(ARHOST_OPTION_REAL, "motion_blur", "0",
-           "Shutter time as a fraction of the frame period; any value but 0 takes five times as long.", 0, 1),
+           "Shutter time as a fraction of the frame period (motion blur). Any value above 0 makes rendering take "
+           "five times as "
+           "long.",
+           0, 1),
     option(ARHOST_OPTION_REAL, "exposure_ev", "0", "Exposure in stops; 1 is twice as bright.", -10, 10),
     option(ARHOST_OPTION_INTEGER, "occlude_from", "-1",
            "First frame in which a postcard covers the marker; -1: never.", -1, 2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "occlude_to", "-1", "First frame in which the postcard no longer covers it.", -1,
-           2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "seed", "1", "Selects the noise.", 0, 2'147'483'647),
-    option(ARHOST_OPTION_INTEGER, "threads", "1", "Rendering threads; the frames do not depend on it. 0: all cores.",
-           0, 256),
+    option(ARHOST_OPTION_INTEGER, "occlude_to", "-1",
+           "First frame in which the postcard no longer covers the marker.", -1, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "seed", "1", "Seed of the noise.", 0, 2'147'483'647),
+    option(ARHOST_OPTION_INTEGER, "threads", "1",
+           "Number of rendering threads; 0: one per core. The frames do not depend on it.", 0, 256),
 };
 
 const arhost_descriptor descriptor = {

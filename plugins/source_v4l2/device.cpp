@@ -20,7 +20,7 @@ namespace arhost {
 
 namespace {
 
-// "/dev/video0 (Integrated Camera), /dev/video2", for messages.
+// Lists the existing devices for a message: "/dev/video0 (Integrated Camera), /dev/video2".
 std::string existing_devices() {
     std::string list;
     glob_t found{};
@@ -40,9 +40,9 @@ std::string existing_devices() {
 std::string other_devices() {
     const std::string existing = existing_devices();
     if (existing.empty())
-        return "there is no /dev/video*; connect a camera, or use 'source_synthetic' or "
+        return "no /dev/video* exists; connect a camera, or use 'source_synthetic' or "
                "'source_file' instead";
-    return "there are " + existing + "; set 'device' to one of them (list them with 'v4l2-ctl --list-devices')";
+    return "available: " + existing + "; set 'device' to one of them (list them with 'v4l2-ctl --list-devices')";
 }
 
 double rate(const v4l2_fract &interval) {
@@ -138,7 +138,7 @@ CaptureDevice::CaptureDevice(const std::string &path)
                                   "-aG video $USER', then log in again)");
         if (error == EISDIR)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, not a camera; " + other_devices());
-        fail("open", error);
+        fail("opening it", error);
     }
     v4l2_capability capability{};
     if (const int error = control(VIDIOC_QUERYCAP, &capability); error == ENODEV)
@@ -174,9 +174,9 @@ void CaptureDevice::fail(const std::string &what, int error) const {
                                                   "' shows which); close it, or set 'device' to another camera");
     if (error == ENOSPC)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      start + "lacks bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "
+                      start + "gets too little bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "
                               "another port");
-    throw Failure(ARHOST_STATUS_ERROR_IO, start + "failed at " + what + ": " + std::strerror(error));
+    throw Failure(ARHOST_STATUS_ERROR_IO, start + "reported an error while " + what + ": " + std::strerror(error));
 }
 
 const CaptureFormat *CaptureDevice::find(std::uint32_t fourcc) const {
@@ -233,10 +233,10 @@ v4l2_format CaptureDevice::set_format(std::uint32_t fourcc, std::uint32_t width,
     format.fmt.pix.height = height;
     format.fmt.pix.pixelformat = fourcc;
     format.fmt.pix.field = V4L2_FIELD_NONE;
-    format.fmt.pix.bytesperline = 0; // chosen by the driver
+    format.fmt.pix.bytesperline = 0; // the driver chooses it
     format.fmt.pix.sizeimage = 0;
     if (const int error = control(VIDIOC_S_FMT, &format))
-        fail("setting " + fourcc_text(fourcc) + " " + size_text(width, height), error);
+        fail("setting the format " + fourcc_text(fourcc) + " " + size_text(width, height), error);
     return format;
 }
 
@@ -282,10 +282,10 @@ CaptureStream::CaptureStream(const CaptureDevice &device, std::uint32_t buffer_c
 }
 
 CaptureStream::~CaptureStream() {
-    // Both may fail after an unplug; closing the device then frees the buffers.
+    // Both calls may fail after the camera was unplugged. In that case, closing the device frees the buffers.
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     device_.control(VIDIOC_STREAMOFF, &type);
-    mappings_.clear(); // mapped buffers cannot be freed
+    mappings_.clear(); // must happen before freeing the buffers
     v4l2_requestbuffers none{};
     none.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     none.memory = V4L2_MEMORY_MMAP;
@@ -324,7 +324,7 @@ std::optional<v4l2_buffer> CaptureStream::dequeue() const {
     if (error != 0)
         device_.fail("capturing", error);
     if (buffer.index >= mappings_.size())
-        device_.fail("capturing: the driver returned an invalid buffer index", EPROTO);
+        device_.fail("capturing (the driver returned an invalid buffer index)", EPROTO);
     return buffer;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A V4L2 capture device: its formats and its stream of memory-mapped buffers. Errors are thrown as Failure with a
-// message for the user.
+// A V4L2 capture device: its formats and its stream of memory-mapped buffers. Functions that fail throw Failure with
+// a message for the user.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -37,14 +37,14 @@ struct CaptureSize {
     double max_fps = 0; // 0: unknown
 };
 
-// The sizes of one pixel format. A range is listed as its minimum and maximum.
+// The sizes that a camera offers in one pixel format. For a range of sizes, `sizes` has its minimum and maximum.
 struct CaptureFormat {
     std::uint32_t fourcc = 0;
     std::vector<CaptureSize> sizes;
-    bool any_size = false; // between minimum and maximum
+    bool any_size = false; // any size in the range is available
 };
 
-std::string fourcc_text(std::uint32_t fourcc); // "YUYV"
+std::string fourcc_text(std::uint32_t fourcc); // such as "YUYV"
 
 class CaptureDevice {
 public:
@@ -56,16 +56,16 @@ public:
     const std::vector<CaptureFormat> &formats() const { return formats_; }
     const CaptureFormat *find(std::uint32_t fourcc) const;
     double max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const; // 0: unknown
-    std::string describe_formats() const; // "YUYV (640×480 30 fps, …), MJPG (…)"
+    std::string describe_formats() const; // such as "YUYV (640×480 30 fps, …), MJPG (…)"
     std::string describe_sizes_near(const CaptureFormat &format, std::uint32_t width, std::uint32_t height) const;
 
     v4l2_format current_format() const;
     v4l2_format set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
-    double set_fps(double fps); // 0: unchanged. Returns the resulting rate; 0: unknown
+    double set_fps(double fps); // 0 keeps the current rate. Returns the resulting rate; 0: unknown
 
-    // ioctl, repeated on EINTR. Returns 0 or an errno.
+    // Calls ioctl and repeats it on EINTR. Returns 0 or an errno value.
     int control(unsigned long request, void *argument) const;
-    // Throws Failure for errno `error` of operation `what`.
+    // Throws Failure for the errno value `error`, which occurred while `what` ("querying its format").
     [[noreturn]] void fail(const std::string &what, int error) const;
     int fd() const { return fd_.get(); }
 
@@ -82,11 +82,11 @@ public:
     CaptureStream(const CaptureStream &) = delete;
     CaptureStream &operator=(const CaptureStream &) = delete;
 
-    // The oldest filled buffer; nullopt if there is none. The caller queues it again.
+    // Returns the oldest filled buffer, or std::nullopt if there is none. The caller must queue the buffer again.
     std::optional<v4l2_buffer> dequeue() const;
     void queue(std::uint32_t index) const;
-    std::span<const std::uint8_t> bytes(const v4l2_buffer &buffer) const; // as reported by the driver
-    // Waits for a frame; false on timeout.
+    std::span<const std::uint8_t> bytes(const v4l2_buffer &buffer) const; // as many bytes as the driver reported
+    // Waits for a frame. Returns false on timeout.
     bool wait(int timeout_ms) const;
 
 private:

@@ -10,8 +10,8 @@ namespace arhost {
 
 namespace {
 
-// Many cameras pad pictures before the end marker (0xd9). libjpeg reports this like damage, though the picture is
-// complete.
+// Returns whether a warning of libjpeg is harmless. Many cameras insert padding before the end marker (0xd9), about
+// which libjpeg warns as if the picture were damaged.
 bool is_harmless(const std::string &warning) {
     return warning.find("extraneous bytes before marker 0xd9") != std::string::npos;
 }
@@ -40,7 +40,7 @@ bool JpegDecoder::describe(std::span<const std::uint8_t> jpeg, arhost_frame_form
                               : ARHOST_PIXEL_FORMAT_BGR8;
     format.width = static_cast<std::uint32_t>(width);
     format.height = static_cast<std::uint32_t>(height);
-    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601; // defined by JFIF
+    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601; // JFIF defines this matrix
     format.yuv_range = ARHOST_YUV_RANGE_FULL;
     return true;
 }
@@ -57,7 +57,7 @@ bool JpegDecoder::decode(std::span<const std::uint8_t> jpeg, const arhost_frame_
         return false;
     }
     if (format.pixel_format != ARHOST_PIXEL_FORMAT_BGR8 && found.pixel_format != format.pixel_format) {
-        fault = "its chroma subsampling differs from the first picture's";
+        fault = "its chroma subsampling differs from that of the first picture";
         return false;
     }
     const auto width = static_cast<int>(format.width), height = static_cast<int>(format.height);

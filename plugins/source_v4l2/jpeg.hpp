@@ -15,12 +15,12 @@ class JpegDecoder {
 public:
     JpegDecoder();
 
-    // Sets pixel format, size and colour fields of `format` for pictures like this one: 4:2:0 of even size gives
-    // I420, grey gives GREY8, everything else BGR8. False if `bytes` are not a JPEG.
+    // Sets pixel format, size and colour fields of `format` for pictures like `jpeg`: I420 for 4:2:0 with an even
+    // size, GREY8 for grey, BGR8 for everything else. Returns false if `jpeg` is not a JPEG picture.
     bool describe(std::span<const std::uint8_t> jpeg, arhost_frame_format &format);
 
-    // Decodes into planes of that format. Returns false if the picture is damaged, truncated or of another size or
-    // format; `fault` then has the reason, and the planes may be partly written.
+    // Decodes a picture into planes of `format`. Returns false if the picture is damaged or truncated, or if its size
+    // or format differs. In that case `fault` has the reason, and the planes may be partly overwritten.
     bool decode(std::span<const std::uint8_t> jpeg, const arhost_frame_format &format, std::uint8_t *const *planes,
                 std::string &fault);
 

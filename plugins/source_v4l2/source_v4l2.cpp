@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// source_v4l2: frames from a Video4Linux camera (USB, built-in, capture cards).
+// source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
 #include "device.hpp"
 #include "jpeg.hpp"
 
@@ -23,7 +23,7 @@ using arhost::CaptureStream;
 using arhost::Failure;
 using Clock = std::chrono::steady_clock;
 
-// A camera that delivers no frame for this long counts as lost.
+// A camera that delivers no intact frame for this long is reported as lost.
 constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr int poll_slice_ms = 50;
 
@@ -52,11 +52,12 @@ std::int64_t clock_ns(clockid_t clock) {
 class V4l2Source {
 public:
     V4l2Source(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), path_(options.text("device")), asked_{static_cast<std::uint32_t>(options.integer("width")),
-                                                             static_cast<std::uint32_t>(options.integer("height"))},
+        : host_(host),
+          path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
+                                                          static_cast<std::uint32_t>(options.integer("height"))},
           format_option_(options.text("format")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
-        if ((asked_.width == 0) != (asked_.height == 0))
+        if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
     }
 
@@ -121,7 +122,7 @@ public:
 
 private:
     v4l2_pix_format set_format(const arhost_source_setup &setup) {
-        Size size = asked_;
+        Size size = configured_size_;
         std::string wanted_by = "set 'width' and 'height'";
         if (setup.intrinsics) {
             const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
@@ -144,8 +145,8 @@ private:
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
         if (set.pixelformat != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          camera + " does not deliver " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
-                              ", though it offers " + device_->describe_formats());
+                          camera + " refuses " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                              ", although it lists " + device_->describe_formats());
         if (demanded && size != Size{set.width, set.height})
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
@@ -158,7 +159,8 @@ private:
         return set;
     }
 
-    // YUYV, which needs no decoding, if the camera delivers it at the configured size and rate; else Motion-JPEG.
+    // Chooses YUYV, which needs no decoding, if the camera delivers it at the configured size and rate; otherwise
+    // Motion-JPEG.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
         std::vector<const CaptureFormat *> known;
         for (const std::uint32_t fourcc : {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG})
@@ -201,7 +203,7 @@ private:
         format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     }
 
-    // The chroma subsampling is known only from a picture.
+    // Waits for a picture and describes its format. Only a picture tells the chroma subsampling.
     void describe_first_picture(arhost_frame_format &format) {
         for (const auto give_up = Clock::now() + silence_limit;;) {
             host_.progress(-1, "waiting for the camera's first picture");
@@ -212,11 +214,12 @@ private:
             stream_->queue(captured->index);
             if (good)
                 return;
-            fault_ = "it is not a JPEG";
+            fault_ = "it is not a JPEG picture";
         }
     }
 
-    // An intact frame from the driver's queue: the newest in live mode, else the oldest. nullopt: cancelled.
+    // Returns a frame from the driver's queue that the driver does not mark as damaged: in live mode the newest one,
+    // otherwise the oldest one. Waits until `give_up`, then throws Failure. Returns std::nullopt if cancelled.
     std::optional<v4l2_buffer> next(Clock::time_point give_up) {
         for (;;) {
             if (host_.cancelled())
@@ -242,7 +245,7 @@ private:
                 throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
                               "the camera '" + path_ + "' (" + device_->card() +
                                   ") has delivered no intact picture for " + std::to_string(silence_limit.count()) +
-                                  " s" + (fault_.empty() ? "" : "; the last one: " + fault_));
+                                  " s" + (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
             stream_->wait(poll_slice_ms);
         }
     }
@@ -269,27 +272,27 @@ private:
                                       captured.timestamp.tv_usec * std::int64_t{1'000};
         if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
             return stamp_ns;
-        // Old drivers use the wall clock or an unknown clock.
+        // Old drivers use the wall clock or do not say which clock they use.
         const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC), age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
         const bool wall_clock = std::abs(age_ns) < 10'000'000'000;
-        if (!clock_told_)
+        if (!clock_reported_)
             host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +
                        std::string(wall_clock ? "its wall-clock time stamps are converted"
                                               : "arrival times are used instead"));
-        clock_told_ = true;
+        clock_reported_ = true;
         return wall_clock ? now_ns - age_ns : now_ns;
     }
 
-    // Frames lost since the last one delivered. The driver's sequence numbers include frames dropped here, unless the
-    // driver does not count.
+    // Returns the number of frames lost since the last delivered frame. The gap in the driver's sequence numbers
+    // includes the frames that were dropped here, unless the driver does not count frames.
     std::uint32_t skipped_before(std::uint32_t sequence) {
         std::uint32_t skipped = dropped_;
         if (last_sequence_) {
             const std::uint32_t gap = sequence - *last_sequence_ - 1;
-            if (gap < 1'000'000) // otherwise the counter was reset
+            if (gap < 1'000'000) // a larger gap means that the counter was reset
                 skipped = std::max(skipped, gap);
         } else {
-            skipped = 0; // nothing is lost before the first frame
+            skipped = 0; // frames before the first delivered one do not count
         }
         last_sequence_ = sequence;
         dropped_ = 0;
@@ -298,20 +301,20 @@ private:
 
     arhost::Host host_;
     std::string path_;
-    Size asked_; // 0×0: that of the calibration or the driver
+    Size configured_size_; // 0×0: use the size of the calibration or the driver
     std::string format_option_;
     std::uint32_t buffer_count_;
 
     std::optional<CaptureDevice> device_;
-    std::optional<CaptureStream> stream_; // declared after device_, so that it is destroyed first
+    std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
     arhost::JpegDecoder jpeg_;
     bool newest_only_ = false;
     std::uint32_t yuyv_stride_ = 0;
     std::optional<std::uint32_t> last_sequence_;
-    std::uint32_t dropped_ = 0; // frames since the last one delivered
+    std::uint32_t dropped_ = 0; // frames dropped since the last delivered frame
     std::int64_t last_ns_ = 0;
-    bool clock_told_ = false;
-    std::string fault_; // of the last damaged picture
+    bool clock_reported_ = false;
+    std::string fault_; // what was wrong with the last damaged picture
 };
 
 using arhost::option;
@@ -319,27 +322,30 @@ constexpr const char *formats[] = {"auto", "yuyv", "mjpeg", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "device", "/dev/video0", "Device node of the camera."),
     option(ARHOST_OPTION_INTEGER, "width", "0",
-           "Frame size in px; 0: that of the calibration, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+           "Frame size in px; 0: the size of the calibration if set, otherwise the driver's default.", 0,
+           ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_INTEGER, "height", "0",
-           "Frame size in px; 0: that of the calibration, or the driver's default.", 0, ARHOST_MAX_IMAGE_SIDE),
+           "Frame size in px; 0: the size of the calibration if set, otherwise the driver's default.", 0,
+           ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_TEXT, "format", "auto",
-           "Pixel format of the camera; auto: yuyv if it is fast enough, else mjpeg.", 0, 0, formats),
+           "Pixel format of the camera; auto: yuyv if it is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
 };
 constexpr const char *needs[] = {"video", nullptr};
 
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
-                                          ARHOST_KIND_SOURCE,
-                                          "source_v4l2",
-                                          "V4L2 camera",
-                                          "0.1.0",
-                                          "arhost",
-                                          "Apache-2.0",
-                                          "Captures from a Video4Linux camera, uncompressed or Motion-JPEG.",
-                                          ARHOST_CAPABILITY_LIVE,
-                                          std::size(options),
-                                          options,
-                                          needs};
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SOURCE,
+    "source_v4l2",
+    "V4L2 camera",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Captures frames from a Video4Linux camera, uncompressed or as Motion-JPEG.",
+    ARHOST_CAPABILITY_LIVE,
+    std::size(options),
+    options,
+    needs};
 
 } // namespace
 

@@ -34,26 +34,29 @@ constexpr const char *refinements[] = {"edges", "none", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Family of the tags.", 0, 0, family_names.data()),
-    arhost::option(ARHOST_OPTION_TEXT, "corner_refinement", "edges",
-                   "Corner refinement: edges (lines fitted by arhost), or none (the library's corners).", 0, 0,
-                   refinements),
-    arhost::option(ARHOST_OPTION_REAL, "quad_decimate", "1.5",
-                   "Detects tags in an image downscaled by this factor: 1, 1.5 or an integer. Larger is faster, but "
-                   "loses small tags.",
-                   1, 8),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "corner_refinement", "edges",
+        "Corner refinement: edges (arhost fits lines to the edges), or none (corners as the library reports them).",
+        0, 0, refinements),
+    arhost::option(
+        ARHOST_OPTION_REAL, "quad_decimate", "1.5",
+        "Tags are detected in an image downscaled by this factor: 1, 1.5 or an integer. A larger factor is "
+        "faster but misses small tags.",
+        1, 8),
     arhost::option(ARHOST_OPTION_REAL, "quad_sigma", "0",
                    "Standard deviation in px of a blur before detection (0.8 helps in noisy images); negative values "
                    "sharpen.",
                    -4, 4),
     arhost::option(ARHOST_OPTION_BOOL, "refine_edges", "true",
-                   "The library refines the edges before it decodes the bits."),
+                   "Whether the library refines the edges before it decodes the bits."),
     arhost::option(ARHOST_OPTION_REAL, "decode_sharpening", "0.25",
                    "Sharpening before the bits are decoded; helps small tags.", 0, 10),
     arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "2", "Maximum number of bit errors to correct.", 0, 2),
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
-                   "Ignores tags whose bit contrast, in grey levels from 0 to 255, is lower.", 0, 255),
-    arhost::option(ARHOST_OPTION_INTEGER, "threads", "1", "Threads of the detector; they do not affect the result.",
-                   1, 64),
+                   "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
+                   0, 255),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "1",
+                   "Number of detector threads; it does not affect the result.", 1, 64),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -74,15 +77,15 @@ constexpr arhost_descriptor descriptor = {
 using Detector = std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)>;
 using Detections = std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)>;
 
-// A family of only the listed tags: others are not reported, and the decoding table, which takes gigabytes for the
-// larger families, stays small. A detection's id is its index in `ids`.
+// A copy of a tag family that has only the listed tags. Other tags are not reported, and the decoding table, which
+// would take gigabytes for the larger families, stays small. The id of a detection is an index in `ids`.
 class ListedFamily {
 public:
     ListedFamily(const FamilyType &type, const std::vector<int> &ids)
         : destroy_(type.destroy), family_(type.create()), library_codes_(family_->codes) {
         for (int id : ids)
             codes_.push_back(library_codes_[id]);
-        family_->codes = codes_.data(); // the library's table is static and must not change
+        family_->codes = codes_.data(); // a copy, because the library's table is static and must not change
         family_->ncodes = static_cast<std::uint32_t>(codes_.size());
     }
     ~ListedFamily() {
@@ -115,9 +118,9 @@ public:
           refine_edges_(options.boolean("refine_edges")), sharpening_(options.real("decode_sharpening")),
           max_hamming_(static_cast<int>(options.integer("max_hamming"))),
           min_margin_(options.real("min_decision_margin")), threads_(static_cast<int>(options.integer("threads"))) {
-        // For other fractions, the library decimates by the integer part but scales back by the full factor.
+        // For other factors, the library would decimate by the integer part but scale the corners by the full factor.
         if (decimate_ != 1.5 && decimate_ != std::floor(decimate_))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate must be 1, 1.5 or an integer");
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate: must be 1, 1.5 or an integer");
     }
 
     void start(const arhost_tracker_setup &setup) {
@@ -132,8 +135,9 @@ public:
         detector_->decode_sharpening = sharpening_;
         detector_->nthreads = threads_;
         apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
-        // In older releases, new threads take tasks while the task list may still be reallocated
-        // (AprilRobotics/apriltag, pull request 339). After a first frame with few tasks they wait for a signal.
+        // In older releases of the library, new threads take tasks while the task list may still be reallocated
+        // (AprilRobotics/apriltag, pull request 339). Process a small frame with few tasks first: after it, the
+        // threads wait for a signal before they take tasks.
         if (threads_ > 1)
             detect(cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
     }
@@ -149,7 +153,7 @@ public:
             if (tag->decision_margin < min_margin_)
                 continue;
             Detection detection{static_cast<std::size_t>(tag->id), {}, tag->decision_margin - 256.0 * tag->hamming};
-            // AprilTag's corners start at the bottom left, counter-clockwise, with pixel centres at +0.5.
+            // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
                 detection.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
             const auto corners = fit_edges_
@@ -174,7 +178,7 @@ private:
         if (std::min(grey.cols, grey.rows) < min_image_side())
             return {nullptr, apriltag_detections_destroy};
         cv::Mat pixels = grey;
-        if (sigma_ != 0 && decimate_ == 1) // the library would blur in place, but the frame is read-only
+        if (sigma_ != 0 && decimate_ == 1) // make a copy: the library would blur in place, but the frame is read-only
             pixels = grey.clone();
         image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
         return {apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy};
@@ -191,7 +195,8 @@ private:
 
     std::optional<MarkerReport> report_;
     std::optional<ListedFamily> family_;
-    Detector detector_{nullptr, apriltag_detector_destroy}; // declared last: destroyed before the family it uses
+    Detector detector_{
+        nullptr, apriltag_detector_destroy}; // declared last, because it must be destroyed before the family it uses
 };
 
 } // namespace

@@ -38,14 +38,14 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "dictionary", "DICT_APRILTAG_36h11", "Predefined dictionary of the markers.",
                    0, 0, dictionary_names.data()),
     arhost::option(ARHOST_OPTION_INPUT_PATH, "dictionary_file", "",
-                   "Custom dictionary in OpenCV's YAML format, instead of `dictionary`."),
+                   "Path of a custom dictionary in OpenCV's YAML format; replaces `dictionary`."),
     arhost::option(
         ARHOST_OPTION_TEXT, "corner_refinement", "edges",
-        "Corner refinement: edges (lines fitted by arhost), or OpenCV's none, subpix, contour or apriltag, which "
-        "also detects squares with AprilTag's method.",
+        "Corner refinement: edges (arhost fits lines to the edges), or a method of OpenCV: none, subpix, contour, or "
+        "apriltag, which also detects squares in a different way.",
         0, 0, refinements),
     arhost::option(ARHOST_OPTION_INTEGER, "subpix_window_px", "5",
-                   "Half side in px of the window of subpix; smaller than a marker cell.", 1, 50),
+                   "Half the side of the search window of subpix in px; must be smaller than a marker cell.", 1, 50),
     arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_min_px", "3",
                    "Smallest window in px of the adaptive threshold (not with corner_refinement apriltag).", 3, 999),
     arhost::option(ARHOST_OPTION_INTEGER, "threshold_window_max_px", "23",
@@ -59,13 +59,15 @@ constexpr arhost_option_descriptor options[] = {
         4),
     arhost::option(
         ARHOST_OPTION_REAL, "min_distance_rate", "0.02",
-        "Of squares whose corners are closer than this times their perimeter, only the outer one is decoded; "
-        "OpenCV's 0.05 loses prints with a narrow white margin.",
+        "Minimum distance between the corners of two candidate squares, as a fraction of their perimeter; of closer "
+        "squares only the outer one is decoded. OpenCV's default of 0.05 misses prints with a narrow white margin.",
         0.001, 0.5),
-    arhost::option(ARHOST_OPTION_REAL, "error_correction_rate", "0.6",
-                   "Bit errors to correct, as a fraction of what the dictionary can correct.", 0, 1),
+    arhost::option(
+        ARHOST_OPTION_REAL, "error_correction_rate", "0.6",
+        "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct.", 0,
+        1),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
-    arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detect white-on-black markers."),
+    arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
 };
 
 constexpr arhost_descriptor descriptor = {
@@ -90,7 +92,8 @@ const DictionaryType &dictionary_type(const std::string &name) {
     throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary: unknown dictionary '" + name + "'");
 }
 
-// Checked here because OpenCV reads past the end of strings that are too short.
+// Returns whether `root` is a valid dictionary. OpenCV does not check this and reads past the end of strings that are
+// too short.
 bool is_dictionary(const cv::FileNode &root) {
     const cv::FileNode count = root["nmarkers"], size = root["markersize"];
     if (!count.isInt() || !size.isInt() || static_cast<int>(count) < 1 || static_cast<int>(size) < 1 ||
@@ -110,11 +113,10 @@ bool is_dictionary(const cv::FileNode &root) {
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {
     const auto invalid = [&](const std::string &reason) {
-        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                       "dictionary_file: " + file + " is not a dictionary: " + reason);
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary_file: '" + file + "' " + reason);
     };
     if (!std::ifstream(file))
-        throw invalid("cannot read the file");
+        throw invalid("cannot be read");
     try {
         const cv::FileStorage storage(file, cv::FileStorage::READ);
         cv::aruco::Dictionary dictionary;
@@ -123,10 +125,11 @@ cv::aruco::Dictionary read_dictionary(const std::string &file) {
             return dictionary;
         }
     } catch (const cv::Exception &) {
-        // OpenCV's message only names a line of its own source.
+        // OpenCV's message does not help the user: it only names a line of OpenCV's source code.
     }
-    throw invalid(
-        "it needs nmarkers, markersize, and marker_0, marker_1, …, each a string of markersize² bits 0 or 1");
+    throw invalid("is not a dictionary: it needs the keys nmarkers, markersize, and marker_0, marker_1, …; each "
+                  "marker must be a "
+                  "string of markersize² digits 0 or 1");
 }
 
 class ArucoTracker {
@@ -160,14 +163,14 @@ public:
         parameters_.detectInvertedMarker = options.boolean("inverted");
         if (parameters_.adaptiveThreshWinSizeMax < parameters_.adaptiveThreshWinSizeMin)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "threshold_window_max_px must not be less than threshold_window_min_px");
+                          "threshold_window_max_px: must not be less than threshold_window_min_px");
         if (refinement == "apriltag")
             centre_shift_px_ = 0.5;
     }
 
     void start(const arhost_tracker_setup &setup) {
         report_.emplace(setup, family_, static_cast<std::size_t>(dictionary_.bytesList.rows));
-        // Only the listed markers: faster, and fewer false positives.
+        // Use a dictionary of only the listed markers, which is faster and gives fewer false positives.
         cv::Mat listed;
         for (int id : report_->ids())
             listed.push_back(dictionary_.bytesList.row(id));
@@ -202,7 +205,7 @@ private:
     std::string family_;
     bool rotated_180_ = false, refine_edges_ = false;
     cv::aruco::DetectorParameters parameters_;
-    double centre_shift_px_ = 0; // CORNER_REFINE_APRILTAG places pixel centres at +0.5
+    double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
 
     std::optional<MarkerReport> report_;
     std::optional<arhost::aruco::Detector> detector_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs every input of the corpus once: the fuzzers' seeds, and all inputs that have revealed a bug. Then runs a fixed
-// number of deterministic mutations, which often finds regressions without libFuzzer.
+// Runs every input of the corpus once. The corpus has the seeds of the fuzzers and all inputs that have revealed a
+// bug. Then runs a fixed number of deterministic mutations, which often find regressions without libFuzzer.
 #include "mutator.hpp"
 #include "targets.hpp"
 
@@ -50,7 +50,7 @@ TEST_P(Corpus, MutationsPass) {
         corpus.push_back(content_of(file));
     constexpr std::uint32_t seed = 1;
     Mutator mutator(std::move(corpus), seed);
-    // Left behind if the input crashes the process.
+    // This file remains if the input crashes the process.
     const std::filesystem::path last = testing::TempDir() + "arhost-fuzz-" + std::string(GetParam().name) + "-" +
                                        std::to_string(::getpid()) + ".input";
     for (unsigned i = 0; i < GetParam().tries; ++i) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The whole host with simulated workers, driven by the fuzzer's bytes: they follow the protocol with or without
-// corruption, send arbitrary messages, overwrite their memory, and exit at any time. No process is started, and no
-// timing matters: all deadlines are an hour.
+// Runs the whole host with simulated workers. The fuzzer's bytes determine what the workers do: follow the protocol,
+// with or without corrupting it; send arbitrary messages; overwrite their memory; exit at any time. The target starts
+// no processes and does not depend on timing, because all deadlines are one hour.
 #include "../core/scene/scene_samples.hpp"
 #include "input.hpp"
 #include "targets.hpp"
@@ -62,7 +62,7 @@ base::UniqueFd arbitrary_descriptor(unsigned kind) {
         return scene_memory();
     case 1:
         return base::checked(::open("/dev/null", O_RDWR | O_CLOEXEC), "/dev/null");
-    case 2: // empty, and sealing not allowed
+    case 2: // an empty memfd that cannot be sealed
         return base::checked(::memfd_create("empty", MFD_CLOEXEC), "memfd_create");
     default:
         return base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
@@ -127,7 +127,7 @@ private:
             ring_doorbell(doorbell_.get());
     }
 
-    // The next step of a correct worker; its messages and results may be corrupted.
+    // Does the next step of a correct worker. Its messages and results may be corrupted.
     void step(Input &input) {
         if (finished_)
             return die(0);
@@ -246,7 +246,7 @@ private:
         send_text(encode(message).dump(), std::move(fd), input);
     }
 
-    // Sends `fd` and up to four further descriptors, the maximum of a message.
+    // Sends `fd` and up to four more descriptors, which is the maximum of one message.
     void send_text(std::string text, base::UniqueFd fd, Input &input) const {
         input.corrupt(std::as_writable_bytes(std::span(text)));
         const unsigned more = input.number() < 200 ? 0 : input.number();
@@ -290,7 +290,8 @@ public:
         if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
             base::throw_errno("pipe2");
         spawned.output.reset(pipe_ends[0]);
-        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd"); // not a real pidfd: rejects signals
+        // Not a real pidfd, so sending signals fails.
+        spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
         spawned.pid = next_pid_++;
         workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker),
                               base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"));
@@ -311,7 +312,7 @@ public:
         for (Worker &worker : workers_)
             if (!worker.dead)
                 living.push_back(&worker);
-        const unsigned index = input.number(); // 0: the next in turn
+        const unsigned index = input.number(); // 0 selects the next worker in turn
         if (!living.empty())
             living[(index ? index : turn_++) % living.size()]->act(input);
     }
@@ -334,11 +335,11 @@ void run_host(Bytes bytes) {
     Reactor reactor;
     host::Pipeline pipeline(configuration, {reactor, workers, "", [](arhost_severity, auto &, auto &) {}},
                             [](const host::Progress &) {});
-    // Always readable: one action per reactor iteration.
+    // This descriptor is always readable, so each iteration of the reactor does one action.
     const base::UniqueFd always = base::checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
     const auto acting = reactor.watch(always.get(), [&] {
         if (input.empty())
-            pipeline.interrupt(); // the second one stops immediately
+            pipeline.interrupt(); // the second interrupt stops the host immediately
         else
             workers.act(input);
     });

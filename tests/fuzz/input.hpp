@@ -11,7 +11,7 @@
 
 namespace arhost::fuzz {
 
-// The fuzzer's bytes, consumed from the front; zeros after the end.
+// The fuzzer's bytes, consumed from the front. After the end, all values are 0.
 class Input {
 public:
     explicit Input(std::span<const std::uint8_t> bytes) : remaining_(bytes) {}
@@ -34,7 +34,7 @@ public:
         return {bytes.begin(), bytes.end()};
     }
 
-    // Overwrites some ranges of valid data, so that the rest still passes validation. Nothing without input.
+    // Overwrites some ranges of valid data; the rest still passes validation. Does nothing if no input is left.
     void corrupt(std::span<std::byte> valid) {
         for (unsigned ranges = number(); ranges > 0 && !valid.empty() && !empty(); --ranges) {
             const std::size_t at = number<std::uint16_t>() % valid.size();

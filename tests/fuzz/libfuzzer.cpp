@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// libFuzzer entry point. The environment selects the target, because libFuzzer restarts itself with only its own
-// arguments.
+// libFuzzer entry point. An environment variable selects the target, because libFuzzer restarts itself and passes on
+// only its own arguments.
 #include "targets.hpp"
 
 #include <algorithm>

@@ -30,11 +30,13 @@ public:
     }
 
 private:
-    std::size_t below(std::size_t end) { return random_() % end; } // std distributions differ between libraries
+    std::size_t below(std::size_t end) {
+        return random_() % end;
+    } // not a std distribution: their results differ between standard libraries
     const Content &pick() { return corpus_[below(corpus_.size())]; }
 
     void change(Content &content) {
-        // A range, possibly empty.
+        // Choose a range, which may be empty.
         const auto at = static_cast<std::ptrdiff_t>(below(content.size() + 1));
         const auto begin = content.begin() + at;
         const auto length = static_cast<std::ptrdiff_t>(
@@ -51,14 +53,14 @@ private:
         case 2:
             content.erase(begin, begin + length);
             break;
-        case 3: // duplicate, in place or elsewhere
+        case 3: // copy the range to its own end or elsewhere
             content.insert(content.begin() + static_cast<std::ptrdiff_t>(below(content.size() + 1)), range.begin(),
                            range.end());
             break;
         case 4:
             std::fill_n(begin, length, static_cast<std::uint8_t>(random_()));
             break;
-        case 5: { // splice with the tail of another input
+        case 5: { // replace the tail with the tail of another input
             const Content &other = pick();
             content.erase(begin, content.end());
             content.insert(content.end(),
@@ -67,7 +69,7 @@ private:
                            other.end());
             break;
         }
-        case 6: { // a boundary value of some integer type
+        case 6: { // write a boundary value of an integer type
             const std::uint64_t power = std::uint64_t{1} << below(64);
             const std::uint64_t number = power - below(2);
             for (std::ptrdiff_t i = 0; i < std::min<std::ptrdiff_t>(length, 8); ++i)

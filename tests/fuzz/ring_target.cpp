@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reads the pages and slots that a worker writes like the host does. Each has its own allocation, so that
-// AddressSanitizer detects every out-of-bounds read.
+// Reads pages and slots in the same way as the host reads those that a worker writes. Each one has its own
+// allocation, so AddressSanitizer detects every out-of-bounds read.
 #include "input.hpp"
 #include "targets.hpp"
 
@@ -94,7 +94,7 @@ void run_ring(Bytes bytes) {
             answers.push(result);
             break;
         case 4:
-            // The peer does not write in the meantime, so at most the ring's capacity can be popped.
+            // The peer does not write during this loop, so the number of pops is limited by the capacity of the ring.
             for (std::uint32_t popped = 0; results.pop(result) == RingResult::done; ++popped) {
                 require(popped < ring_capacity, "more entries than the ring's capacity");
                 host::accept_frame_info(result.frame, record.capture_ns, 0, record);

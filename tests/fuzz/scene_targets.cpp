@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Inputs of the scene loader, and its output as read by the host.
+// Targets for the input of the scene loader, and for its output, which the host reads.
 #include "../core/scene/scene_samples.hpp"
 #include "input.hpp"
 #include "targets.hpp"
@@ -19,7 +19,7 @@ using namespace scene;
 
 constexpr std::size_t arena_size_limit = std::size_t(64) << 20;
 
-// A valid arena is used without further checks.
+// Uses an arena like a ray tracer: if `validate` accepts it, reads it without further checks.
 void use(std::span<const std::byte> arena) {
     const auto &header = *reinterpret_cast<const arhost_scene *>(arena.data());
     MotionEvaluator evaluator(header);
@@ -90,7 +90,7 @@ void run_scene(Bytes bytes) {
     }
 }
 
-// The first byte selects: raw bytes, or a valid arena with some ranges overwritten.
+// The first byte selects the mode: raw bytes, or a valid arena with some ranges overwritten.
 void run_arena(Bytes bytes) {
     Input input(bytes);
     if (input.number() == 0) {

@@ -36,7 +36,7 @@ public:
     fs::path path;
 
 private:
-    // Locks until this process ends, however it ends; -1: another process holds the lock.
+    // Takes a lock that is held until this process ends, for whatever reason. Returns -1 if another process holds it.
     static int lock(const fs::path &folder) {
         const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
         if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
@@ -44,7 +44,8 @@ private:
         ::close(fd);
         return -1;
     }
-    // Removes folders of crashed processes. Skips recent ones, which may not be locked yet.
+    // Removes the folders of crashed processes. Skips recent folders, because their owner may not have locked them
+    // yet.
     static void remove_abandoned(const fs::path &parent) {
         std::error_code ignored;
         for (const auto &entry : fs::directory_iterator(parent, ignored))

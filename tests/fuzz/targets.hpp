@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fuzz targets: all code that reads untrusted bytes. Each accepts any bytes and returns; throwing or crashing is a
-// bug. `tools/fuzz` runs them under libFuzzer, corpus_test.cpp on the corpus.
+// Fuzz targets for all code that reads untrusted bytes. Each target must accept any bytes and return; an exception or
+// a crash is a bug. `tools/fuzz` runs the targets under libFuzzer, and corpus_test.cpp runs them on the corpus.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,19 @@ using Bytes = std::span<const std::uint8_t>;
 struct Target {
     std::string_view name; // also the name of its folder in corpus/
     void (*run)(Bytes);
-    unsigned tries; // mutations in corpus_test.cpp; takes some seconds
+    unsigned tries; // number of mutations in corpus_test.cpp, which take some seconds
 };
 
-void run_configuration(Bytes); // YAML including plugin options
+void run_configuration(Bytes); // YAML, including plugin options
 void run_calibration(Bytes);
 void run_trajectory(Bytes);
-void run_pattern(Bytes); // pattern, NUL, file name
+void run_pattern(Bytes); // input: a pattern, a NUL, a file name
 void run_scene(Bytes);
 void run_obj(Bytes);
 void run_ply(Bytes);
 void run_gltf(Bytes);  // including .glb
-void run_arena(Bytes); // output of the scene loader process
-void run_ring(Bytes);  // shared memory written by a worker
+void run_arena(Bytes); // the output of the scene loader process
+void run_ring(Bytes);  // shared memory that a worker writes
 void run_host(Bytes);  // the whole host with misbehaving workers
 
 inline constexpr Target targets[] = {
@@ -45,7 +45,7 @@ inline constexpr Target targets[] = {
     {"host", run_host, 1000},
 };
 
-// A per-process scratch folder, in /dev/shm if available.
+// Returns the scratch folder of this process. It is in /dev/shm if available.
 const std::filesystem::path &scratch();
 std::filesystem::path write_scratch(const std::filesystem::path &name, Bytes content);
 

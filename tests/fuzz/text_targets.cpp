@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Files written by users or other programs: errors in them may only throw Error.
+// Targets for files written by users or other programs. For errors in them, only exceptions of type Error are
+// allowed.
 #include "input.hpp"
 #include "targets.hpp"
 
@@ -20,7 +21,7 @@ Bytes bytes_of(std::string_view text) {
     return {reinterpret_cast<const std::uint8_t *>(text.data()), text.size()};
 }
 
-// An option of every type.
+// One option of every type.
 ipc::PluginDescription plugin_of(arhost_kind kind) {
     ipc::PluginDescription plugin;
     plugin.kind = kind;

@@ -50,7 +50,7 @@ float *ball(Arena &a) {
     return elements<float>(a, geometries(a)[1].positions);
 }
 
-// All non-empty buffers of the small scene.
+// Returns all non-empty buffers of the small scene.
 std::vector<arhost_buffer *> buffers(Arena &a) {
     arhost_scene &scene = header(a);
     arhost_geometry *g = geometries(a);
@@ -198,12 +198,12 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Corruption{"Magic", [](Arena &a) { header(a).magic ^= 1; }, "magic number"},
         Corruption{"Version", [](Arena &a) { header(a).version = 1; }, "version is 1, not 2"},
-        Corruption{"StructSize", [](Arena &a) { header(a).struct_size += 8; }, "header has the wrong size"},
+        Corruption{"StructSize", [](Arena &a) { header(a).struct_size += 8; }, "the struct_size of its header is wrong"},
         Corruption{"ByteSizeTooLarge", [](Arena &a) { header(a).byte_size += 64; }, "bytes, but"},
         Corruption{"ByteSizeHuge", [](Arena &a) { header(a).byte_size = ~0ull; }, "bytes, but"},
         Corruption{"ByteSizeTooSmall", [](Arena &a) { header(a).byte_size = 8; }, "bytes, but"},
         Corruption{"ByteSizeCutsTheLastBuffer", [](Arena &a) { header(a).byte_size -= 64; }, "extends past the end"},
-        Corruption{"Axes", [](Arena &a) { header(a).axes = 0; }, "axes are unknown"},
+        Corruption{"Axes", [](Arena &a) { header(a).axes = 0; }, "its value of 'axes' is unknown"},
         Corruption{"MaxDepth", [](Arena &a) { header(a).max_depth = 101; }, "max_depth is 101, more than 100"},
         Corruption{"Ambient", [](Arena &a) { header(a).ambient[1] = nan_value; }, "the ambient light is nan"},
         Corruption{"Background", [](Arena &a) { header(a).background[2] = -1; }, "the background is -1"},
@@ -228,7 +228,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "the table of names overlaps the header"},
         Corruption{"NamesNotTerminated",
                    [](Arena &a) { elements<char>(a, header(a).names)[header(a).names.count - 1] = 'x'; },
-                   "the last name is not terminated"},
+                   "the last name has no terminating zero"},
         Corruption{"NameWithEscape", [](Arena &a) { elements<char>(a, header(a).names)[0] = '\033'; },
                    "control character"},
         Corruption{"AbsentBufferWithOffset",
@@ -239,18 +239,18 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"ObjectName", [](Arena &a) { objects(a)[1].name = header(a).names.count; },
                    "name of object 1 is outside"},
         Corruption{"ObjectGeometry", [](Arena &a) { objects(a)[0].geometry = 2; },
-                   "object 0 'square' has geometry 2, but there are 2"},
+                   "object 0 'square' refers to geometry 2, but the scene has only 2"},
         Corruption{"ObjectMaterial", [](Arena &a) { objects(a)[1].material = ARHOST_NONE; },
-                   "object 1 'ball' has material 4294967295, but there are 1"},
+                   "object 1 'ball' refers to material 4294967295, but the scene has only 1"},
         Corruption{"ObjectRole", [](Arena &a) { objects(a)[1].role = 4; },
                    "object 1 'ball' has an unknown role"},
         Corruption{"ObjectTransformNotFinite", [](Arena &a) { objects(a)[0].world_from_object[11] = nan_value; },
-                   "object 0 'square': a number of world_from_object is nan"},
+                   "object 0 'square': an element of world_from_object is nan"},
         Corruption{"ObjectTransformFlat", [](Arena &a) { objects(a)[0].world_from_object[4] = 0; },
                    "world_from_object cannot be inverted"},
         Corruption{"MaterialModel", [](Arena &a) { materials(a)[0].model = 7; },
                    "material 0: its model is unknown"},
-        Corruption{"MaterialTexture", [](Arena &a) { materials(a)[0].colour_texture = 0; }, "texture 0, but there are 0"},
+        Corruption{"MaterialTexture", [](Arena &a) { materials(a)[0].colour_texture = 0; }, "texture 0, but the scene has only 0"},
         Corruption{"MaterialIndex", [](Arena &a) { materials(a)[0].index = 0.5f; }, "index is 0.5, outside 1 to 4"},
         Corruption{"MaterialExtinction", [](Arena &a) { materials(a)[0].extinction[1] = -1; }, "extinction is -1"},
         Corruption{"MaterialFresnel", [](Arena &a) { materials(a)[0].fresnel_maximum = 0; }, "fresnel_maximum is 0"},
@@ -305,17 +305,17 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{
             "NoVertices",
             [](Arena &a) { geometries(a)[0].positions = geometries(a)[0].normals = geometries(a)[0].texcoords = {}; },
-            "triangle 0 has the vertex 2, but there are 0"},
+            "triangle 0 refers to vertex 2, but the mesh has only 0"},
         Corruption{"Index", [](Arena &a) { indices(a)[5] = 4; },
-                   "geometry 0 (object 0 'square'): triangle 1 has the vertex 4, but there are 4"},
+                   "geometry 0 (object 0 'square'): triangle 1 refers to vertex 4, but the mesh has only 4"},
         Corruption{"IndexHuge", [](Arena &a) { indices(a)[0] = ARHOST_NONE; },
-                   "triangle 0 has the vertex 4294967295"},
+                   "triangle 0 refers to vertex 4294967295"},
         Corruption{"PositionNotANumber", [](Arena &a) { positions(a)[10] = nan_value; },
-                   "vertex 3 has the coordinate nan"},
+                   "vertex 3 has the invalid coordinate nan"},
         Corruption{"PositionInfinite", [](Arena &a) { positions(a)[0] = -std::numeric_limits<float>::infinity(); },
-                   "vertex 0 has the coordinate -inf"},
+                   "vertex 0 has the invalid coordinate -inf"},
         Corruption{"PositionTooFar", [](Arena &a) { positions(a)[3] = 1.1e9f; },
-                   "vertex 1 has the coordinate 1.1e+09"},
+                   "vertex 1 has the invalid coordinate 1.1e+09"},
         Corruption{"NormalLength", [](Arena &a) { normals(a)[5] = 0.9f; }, "normal 1 is not of unit length"},
         Corruption{"NormalNotANumber", [](Arena &a) { normals(a)[11] = nan_value; },
                    "normal 3 is not of unit length"},
@@ -344,7 +344,7 @@ TEST(Validate, RequiresSixteenReadableBytesAfterTheLastBuffer) {
     EXPECT_THAT(validate(arena.bytes()), HasSubstr("the table of geometries extends past the end"));
 }
 
-TEST(Validate, AcceptsLargerMemoryThanTheScene) { // a memfd is mapped in whole pages
+TEST(Validate, AcceptsLargerMemoryThanTheScene) { // because a memfd is mapped in whole pages
     Arena small = small_scene().build();
     Arena large(small.bytes().size() + 4096);
     std::memcpy(large.bytes().data(), small.bytes().data(), small.bytes().size());
@@ -353,9 +353,9 @@ TEST(Validate, AcceptsLargerMemoryThanTheScene) { // a memfd is mapped in whole 
 
 TEST(Validate, RejectsMemoryThatIsTooShortOrMisaligned) {
     const Arena arena = small_scene().build();
-    EXPECT_THAT(validate({}), HasSubstr("too short for its header"));
-    EXPECT_THAT(validate(arena.bytes().first(sizeof(arhost_scene) - 1)), HasSubstr("too short for its header"));
-    EXPECT_THAT(validate(arena.bytes().subspan(8)), HasSubstr("not aligned to 64 bytes in memory"));
+    EXPECT_THAT(validate({}), HasSubstr("shorter than the header"));
+    EXPECT_THAT(validate(arena.bytes().first(sizeof(arhost_scene) - 1)), HasSubstr("shorter than the header"));
+    EXPECT_THAT(validate(arena.bytes().subspan(8)), HasSubstr("its memory is not aligned to 64 bytes"));
     for (std::size_t size = 0; size < arena.bytes().size(); ++size)
         EXPECT_NE(validate(arena.bytes().first(size)), "");
 }
@@ -399,21 +399,22 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"WrapV", [](Arena &a) { textures(a)[1].wrap_v = 4; }, "texture 1: its wrap mode"},
         Corruption{"Name", [](Arena &a) { textures(a)[1].name = header(a).names.count; },
                    "outside the table of names"},
-        Corruption{"Width", [](Arena &a) { textures(a)[0].width = 0; }, "has 0 x 3 texels, outside 1 to 16384"},
+        Corruption{"Width", [](Arena &a) { textures(a)[0].width = 0; },
+                   "has 0 x 3 texels; each side must have 1 to 16384"},
         Corruption{"Height", [](Arena &a) { textures(a)[0].height = 16385; }, "2 x 16385 texels"},
         Corruption{"TexelCount", [](Arena &a) { textures(a)[0].height = 2; }, "has 6 texels for 2 x 2"},
         Corruption{"TexelNotANumber", [](Arena &a) { floats(a, textures(a)[1].texels)[5] = nan_value; },
-                   "texture 1: texel 1 has the number nan"},
+                   "texture 1: texel 1 has the invalid value nan"},
         Corruption{"TexelBelowZero", [](Arena &a) { floats(a, textures(a)[1].texels)[15] = -1; },
-                   "texel 3 has the number -1"},
+                   "texel 3 has the invalid value -1"},
         Corruption{"TexelTooBright", [](Arena &a) { floats(a, textures(a)[1].texels)[0] = 1.1e6f; },
-                   "texel 0 has the number 1.1e+06"},
+                   "texel 0 has the invalid value 1.1e+06"},
         Corruption{"MaterialsTexture", [](Arena &a) { materials(a)[0].normal_texture = 2; },
-                   "material 0: it has texture 2, but there are 2"},
+                   "material 0: it refers to texture 2, but the scene has only 2"},
         Corruption{"TextureWithoutTexcoords", [](Arena &a) { objects(a)[1].material = 0; },
                    "object 1 'ball' has a textured material, but its geometry has no texcoords"},
         Corruption{"Environment", [](Arena &a) { header(a).environment.texture = 2; },
-                   "the environment has texture 2, but there are 2"},
+                   "the environment refers to texture 2, but the scene has only 2"},
         Corruption{"EnvironmentOfBytes", [](Arena &a) { header(a).environment.texture = 0; }, "is not RGBA32F"},
         Corruption{"EnvironmentMissing", [](Arena &a) { header(a).environment.texture = ARHOST_NONE; },
                    "there is no environment, but"},
@@ -443,16 +444,19 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"Duration", [](Arena &a) { header(a).duration_s = nan_value; }, "duration_s is nan"},
         Corruption{"NoDuration", [](Arena &a) { header(a).duration_s = 0; },
                    "object 1 'ball' moves or deforms, but the scene's duration_s is 0"},
-        Corruption{"ObjectNode", [](Arena &a) { objects(a)[1].node = 3; }, "has node 3, but there are 3"},
-        Corruption{"ObjectWithoutNode", [](Arena &a) { objects(a)[1].node = ARHOST_NONE; }, "has node 4294967295"},
+        Corruption{"ObjectNode", [](Arena &a) { objects(a)[1].node = 3; },
+                   "refers to node 3, but the scene has only 3"},
+        Corruption{"ObjectWithoutNode", [](Arena &a) { objects(a)[1].node = ARHOST_NONE; },
+                   "refers to node 4294967295"},
         Corruption{"ObjectSkin", [](Arena &a) { objects(a)[2].skin = 1; },
-                   "object 2 'bend' has skin 1, but there are 1"},
+                   "object 2 'bend' refers to skin 1, but the scene has only 1"},
         Corruption{"NodeOfStaticObject", [](Arena &a) { objects(a)[0].node = 0; }, "but neither moves nor deforms"},
         Corruption{"SkinnedMoves", [](Arena &a) { objects(a)[2].moves = 1; },
-                   "has a skin, so it must deform, not move"},
+                   "has a skin; it must therefore set deforms, not moves"},
         Corruption{"SkinnedWithTransform", [](Arena &a) { objects(a)[2].world_from_object[9] = 1; },
-                   "have the identity"},
-        Corruption{"SpheresDeform", [](Arena &a) { objects(a)[1].deforms = 1; }, "deforms, but has no triangles"},
+                   "world_from_object must be the identity"},
+        Corruption{"SpheresDeform", [](Arena &a) { objects(a)[1].deforms = 1; },
+                   "deforms, but its geometry is not a triangle mesh"},
         Corruption{"DeformingShared",
                    [](Arena &a) {
                        objects(a)[0].geometry = 2;
@@ -472,24 +476,24 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"JointCount", [](Arena &a) { geometries(a)[2].joints.count = 3; }, "3 joints and 4 weights"},
         Corruption{"WeightCount", [](Arena &a) { geometries(a)[2].weights.count = 3; }, "4 joints and 3 weights"},
         Corruption{"JointIndex", [](Arena &a) { elements<std::uint16_t>(a, geometries(a)[2].joints)[15] = 2; },
-                   "vertex 3 has a joint beyond the skin's 2"},
+                   "vertex 3 refers to joint 2, but the skin has only 2 joints"},
         Corruption{"WeightSum", [](Arena &a) { floats(a, geometries(a)[2].weights)[4] = 0.9f; },
-                   "vertex 1 has negative weights, or weights whose sum is not 1"},
+                   "vertex 1 has invalid joint weights; they must not be negative, and their sum must be 1"},
         Corruption{"WeightNotANumber", [](Arena &a) { floats(a, geometries(a)[2].weights)[3] = nan_value; },
-                   "vertex 0 has negative weights"},
+                   "vertex 0 has invalid joint weights"},
         Corruption{"WeightBelowZero",
                    [](Arena &a) {
                        floats(a, geometries(a)[2].weights)[0] = 1.5f;
                        floats(a, geometries(a)[2].weights)[1] = -0.5f;
                    },
-                   "vertex 0 has negative weights"},
+                   "vertex 0 has invalid joint weights"},
         Corruption{"MorphPositionCount", [](Arena &a) { geometries(a)[2].morph_positions.count = 3; },
                    "has 3 morph_positions for 1 targets and 4 vertices"},
         Corruption{"MorphNormalCount", [](Arena &a) { geometries(a)[2].morph_normals.count = 3; }, "3 morph_normals"},
         Corruption{"MorphPosition", [](Arena &a) { floats(a, geometries(a)[2].morph_positions)[4] = nan_value; },
-                   "morph position 1 has the coordinate nan"},
+                   "morph position 1 has the invalid coordinate nan"},
         Corruption{"MorphNormal", [](Arena &a) { floats(a, geometries(a)[2].morph_normals)[0] = 2e9f; },
-                   "morph normal 0 has the coordinate 2e+09"},
+                   "morph normal 0 has the invalid coordinate 2e+09"},
         Corruption{"NodeParent", [](Arena &a) { nodes(a)[1].parent = 1; }, "node 1: its parent 1 does not precede"},
         Corruption{"NodeTransform", [](Arena &a) { nodes(a)[1].parent_from_node[3] = nan_value; },
                    "parent_from_node is nan"},
@@ -500,7 +504,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"NodeScale", [](Arena &a) { nodes(a)[0].scale[2] = nan_value; }, "scale is nan"},
         Corruption{"NodeWeight", [](Arena &a) { floats(a, nodes(a)[2].morph_weights)[0] = nan_value; },
                    "a morph weight is nan"},
-        Corruption{"ChannelNode", [](Arena &a) { channels(a)[0].node = 3; }, "channel 0: it has node 3"},
+        Corruption{"ChannelNode", [](Arena &a) { channels(a)[0].node = 3; }, "channel 0: it refers to node 3"},
         Corruption{"ChannelNodeNotAnimated", [](Arena &a) { channels(a)[0].node = 1; }, "its node is not animated"},
         Corruption{"ChannelTarget", [](Arena &a) { channels(a)[0].target = 5; }, "its target is unknown"},
         Corruption{"ChannelInterpolation", [](Arena &a) { channels(a)[0].interpolation = 0; },
@@ -514,19 +518,19 @@ INSTANTIATE_TEST_SUITE_P(
                    "a time is nan"},
         Corruption{"ChannelTimeBelowZero", [](Arena &a) { floats(a, channels(a)[0].times)[0] = -1; }, "a time is -1"},
         Corruption{"ChannelValueCount", [](Arena &a) { channels(a)[0].values.count = 5; },
-                   "has 5 values for 2 keys of 3"},
+                   "has 5 values for 2 keys with 3 components each"},
         Corruption{"ChannelOfOtherWidth", [](Arena &a) { channels(a)[0].target = ARHOST_CHANNEL_ROTATION; },
-                   "has 6 values for 2 keys of 4"},
-        Corruption{"ChannelWithoutWeights", [](Arena &a) { channels(a)[3].node = 1; }, "keys of 0"},
+                   "has 6 values for 2 keys with 4 components each"},
+        Corruption{"ChannelWithoutWeights", [](Arena &a) { channels(a)[3].node = 1; }, "keys with 0 components each"},
         Corruption{"ChannelCubicTooShort",
                    [](Arena &a) { channels(a)[0].interpolation = ARHOST_INTERPOLATION_CUBIC; },
-                   "has 6 values for 2 keys of 3"},
+                   "has 6 values for 2 keys with 3 components each"},
         Corruption{"ChannelValue", [](Arena &a) { floats(a, channels(a)[3].values)[2] = nan_value; },
                    "a value is nan"},
         Corruption{"ChannelRotation", [](Arena &a) { floats(a, channels(a)[1].values)[7] = 1; },
                    "the rotation of key 1 is not of length 1"},
         Corruption{"SkinJoint", [](Arena &a) { elements<std::uint32_t>(a, skins(a)[0].joints)[1] = 3; },
-                   "skin 0: it has node 3, but there are 3"},
+                   "skin 0: it refers to node 3, but the scene has only 3"},
         Corruption{"SkinWithoutJoints", [](Arena &a) { skins(a)[0].joints = {}; }, "has 0 joints and 2 matrices"},
         Corruption{"SkinMatrixCount", [](Arena &a) { skins(a)[0].node_from_mesh.count = 1; },
                    "2 joints and 1 matrices"},
@@ -534,7 +538,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "node_from_mesh is nan"}),
     [](const auto &info) { return std::string(info.param.field); });
 
-// Otherwise, a small arena could keep the host busy for hours.
+// If buffers could be shared, checking a small arena could keep the host busy for hours.
 TEST(Validate, RejectsGeometriesThatShareABuffer) {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
@@ -583,7 +587,7 @@ TEST(Validate, ReadsBuffersOnlyWithinTheArena) {
                 }
 }
 
-// Any content yields a result without out-of-bounds reads (checked by the sanitizer builds).
+// For any content, validate() must return without reading out of bounds, which the sanitizer builds detect.
 TEST(Validate, SurvivesRandomBytes) {
     const Arena whole = full_scene().build();
     std::mt19937 random(1);
@@ -595,8 +599,8 @@ TEST(Validate, SurvivesRandomBytes) {
             arena.bytes()[random() % arena.bytes().size()] ^= std::byte(1 + random() % 255);
         const bool is_valid = validate(arena.bytes()).empty();
         rejected += !is_valid;
-        if (is_valid && arena.scene().duration_s > 0) // a valid arena must be safe to evaluate
+        if (is_valid && arena.scene().duration_s > 0) // evaluating a valid arena must be safe
             MotionEvaluator(arena.scene()).at(0.7);
     }
-    EXPECT_GT(rejected, 25000); // other flips hit spare bytes or keep the value valid
+    EXPECT_GT(rejected, 25000); // the remaining flips change spare bytes, or give another valid value
 }

@@ -32,10 +32,11 @@ std::string base64(const std::string &bytes) {
     return text;
 }
 
-// A glTF file with one buffer.
+// Builds a glTF file with one buffer.
 struct Gltf {
-    std::string bytes, views, accessors;                                   // JSON, without brackets
-    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0", more; // more: starts with a comma
+    std::string bytes, views, accessors; // content of the JSON lists, without brackets
+    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0",
+                        more; // more: further JSON members; starts with a comma
     int view_count = 0, accessor_count = 0;
 
     int view(const std::string &data, int stride = 0) {
@@ -79,7 +80,7 @@ struct Gltf {
     }
 };
 
-// A triangle (0,0,0), (1,0,0), (0,1,0) in accessor 0, texcoords in 1.
+// Returns a file with one triangle: (0,0,0), (1,0,0), (0,1,0) in accessor 0, texture coordinates in accessor 1.
 Gltf triangle() {
     Gltf gltf;
     gltf.floats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
@@ -88,13 +89,13 @@ Gltf triangle() {
     return gltf;
 }
 
-// The same with two joints: node 1 and its child node 2, 1 above it; vertex 2 is bound to the second. Animation
-// "wave": node 2 rotates by 90° about z within 1 s.
+// Returns the same triangle with a skin of two joints: node 1, and its child node 2 at y = 1. Vertex 2 is bound to
+// the second joint. In the animation "wave", node 2 rotates by 90° about z within 1 s.
 Gltf skinned() {
     Gltf gltf = triangle();
-    gltf.accessor(gltf.view(std::string("\0\0\0\0\0\0\0\0\1\0\0\0", 12)), 5121, 3, "VEC4"); // 2
+    gltf.accessor(gltf.view(std::string("\0\0\0\0\0\0\0\0\1\0\0\0", 12)), 5121, 3, "VEC4"); // accessor 2
     gltf.accessor(gltf.view(std::string("\xff\0\0\0\xff\0\0\0\xff\0\0\0", 12)), 5121, 3, "VEC4",
-                  R"(, "normalized": true)"); // 3
+                  R"(, "normalized": true)"); // accessor 3
     gltf.floats(
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, /**/ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
         "MAT4", 16);                                                      // 4
@@ -176,7 +177,7 @@ TEST(Gltf, TransformsStaticMeshesToWorldSpace) {
     EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("a.gltf: 1 triangles, 3 vertices, 2 x 2 x 0 mm")));
 }
 
-TEST(Gltf, IsUprightInZUpScenes) {
+TEST(Gltf, ConvertsItsUpAxisInZUpScenes) {
     const Loaded loaded = load(triangle().text(), "", "z-up");
     EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(near(0), near(0), near(1))) << "its y is up";
 }
@@ -230,7 +231,7 @@ TEST(Gltf, ReadsMaterialsAndTextures) {
     EXPECT_THAT(m.emission, ElementsAre(1, 0.5f, 0));
     EXPECT_EQ(m.metallic, 0.1f);
     EXPECT_EQ(m.roughness, 0.2f);
-    EXPECT_EQ(m.alpha_cutoff, 0.5f) << "applies to the texture alpha, which the factor halves";
+    EXPECT_EQ(m.alpha_cutoff, 0.5f) << "the cutoff applies to the texture alpha, which the factor halves";
     ASSERT_EQ(arena.scene().textures.count, 3u);
     const auto *textures = at<arhost_texture>(arena, arena.scene().textures);
     EXPECT_EQ(textures[m.colour_texture].format, ARHOST_TEXEL_SRGB8);
@@ -280,7 +281,7 @@ TEST(Gltf, ReportsHowItHandlesAlpha) {
     EXPECT_THAT(load(with(R"("alphaMode": "BLEND")")).info, Contains(HasSubstr("'leaf' is translucent; drawn")));
     EXPECT_THAT(
         load(with(R"("alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]})")).info,
-        Contains(HasSubstr("'leaf' is invisible by its alphaCutoff")));
+        Contains(HasSubstr("'leaf' is invisible, because its alpha factor is below its alphaCutoff")));
     EXPECT_THAT(load(with(R"("alphaMode": "MASK")")).info, Not(Contains(HasSubstr("'leaf'"))));
 }
 
@@ -294,7 +295,7 @@ TEST(Gltf, IsStaticWithoutAnAnimation) {
                 testing::Contains(HasSubstr("no animation selected; available for 'animation': 0 'wave'")));
 }
 
-TEST(Gltf, DeformsSkinsByTheirAnimation) {
+TEST(Gltf, DeformsSkinsAccordingToTheAnimation) {
     for (const std::string animation : {"wave", "0"}) {
         const Loaded loaded = load(skinned().text(), ", animation: " + animation +
                                                          ", transform: [{scale: 10}, {translate: [1, 2, 3]}]");
@@ -329,7 +330,7 @@ TEST(Gltf, MovesRigidNodesAndTheirDescendants) {
     EXPECT_THAT(motion.moved[0].world_from_object, ElementsAre(10, 0, 0, 0, 10, 0, 0, 0, 10, 70, 20, 0));
 }
 
-TEST(Gltf, MorphsByItsAnimation) {
+TEST(Gltf, MorphsAccordingToTheAnimation) {
     Gltf gltf = triangle();
     const int target = gltf.floats({0, 0, 0, 0, 0, 2, 0, 0, 0}, "VEC3", 3);
     const int times = gltf.floats({0, 1}, "SCALAR", 1), weights = gltf.floats({0, 1}, "SCALAR", 1);
@@ -355,12 +356,13 @@ TEST(Gltf, CombinesItsAnimationWithAMotion) {
 
 TEST(Gltf, ErrorsNameTheProblem) {
     EXPECT_THAT(error_of("{"), HasSubstr("s.yaml:5:12: objects[0].gltf: "));
-    EXPECT_THAT(error_of("{"), HasSubstr("is not a glTF 2.0 file that can be loaded: "));
-    EXPECT_THAT(error_of("glTF\2"), HasSubstr("is not a glTF 2.0 file that can be loaded: "));
+    EXPECT_THAT(error_of("{"), HasSubstr("cannot be loaded as glTF 2.0: "));
+    EXPECT_THAT(error_of("glTF\2"), HasSubstr("cannot be loaded as glTF 2.0: "));
     EXPECT_THAT(error_of(skinned().text(), ", animation: jump"), HasSubstr("objects[0].animation: "));
     EXPECT_THAT(error_of(skinned().text(), ", animation: jump"),
                 HasSubstr("has no animation 'jump'; available: 0 'wave'"));
-    EXPECT_THAT(error_of(triangle().text(), ", animation: 0"), HasSubstr("has no animation '0', nor any other"));
+    EXPECT_THAT(error_of(triangle().text(), ", animation: 0"),
+                HasSubstr("has no animation '0'; the file has no animations"));
     const auto error_after = [](const auto &corrupt) {
         Gltf gltf = skinned();
         corrupt(gltf);
@@ -370,11 +372,11 @@ TEST(Gltf, ErrorsNameTheProblem) {
         in.replace(in.find(what), what.size(), by);
     };
     EXPECT_THAT(error_after([](Gltf &g) { g.meshes = R"({"primitives": [{"attributes": {"POSITION": 99}}]})"; }),
-                HasSubstr("refers to accessor 99, but there are 7"));
+                HasSubstr("refers to accessor 99, but the file has only 7"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.accessors, "\"count\": 3", "\"count\": 300"); }),
                 HasSubstr("POSITION (accessor 0) extends past the end of its buffer"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.accessors, "VEC3", "VEC2"); }),
-                HasSubstr("POSITION (accessor 0) has the wrong element type"));
+                HasSubstr("POSITION (accessor 0) must have elements of the type VEC3"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.accessors, "5126", "5130"); }),
                 HasSubstr("double-precision components"));
     EXPECT_THAT(error_after([&](Gltf &g) {
@@ -390,31 +392,32 @@ TEST(Gltf, ErrorsNameTheProblem) {
                 HasSubstr("node 2 has more than one parent"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.nodes, "\"children\": [2]", "\"children\": [1]"); }),
                 HasSubstr("more than one parent"));
-    EXPECT_THAT(error_after([&](Gltf &g) { g.bytes[60] = 5; }), HasSubstr("refers to joint 5, but the skin has 2"));
+    EXPECT_THAT(error_after([&](Gltf &g) { g.bytes[60] = 5; }),
+                HasSubstr("refers to joint 5, but the skin has only 2 joints"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.more, "\"input\": 5", "\"input\": 6"); }),
-                HasSubstr("wrong element type"));
+                HasSubstr("must have elements of the type SCALAR"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.accessors, "5121", "5126"); }),
                 HasSubstr("JOINTS_0 (accessor 2) must have unsigned integer components"));
     EXPECT_THAT(error_after([&](Gltf &g) {
                     replace(g.more, "\"output\": 6", "\"output\": 6, \"interpolation\": \"BEZIER\"");
                 }),
-                HasSubstr("the interpolation 'BEZIER'; glTF defines LINEAR, STEP and CUBICSPLINE"));
+                HasSubstr("the unknown interpolation 'BEZIER'; glTF defines LINEAR, STEP and CUBICSPLINE"));
     std::string old = triangle().text();
     replace(old, "\"2.0\"", "\"1.0\"");
     EXPECT_THAT(error_of(old), HasSubstr("is not glTF 2: its asset.version must be"));
     EXPECT_THAT(error_after([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
                 HasSubstr("requires the unsupported extension 'KHR_draco_mesh_compression'"));
-    // Detected before tinygltf reads out of bounds or recurses without limit.
+    // The loader must detect these errors before tinygltf reads out of bounds or recurses without limit.
     EXPECT_THAT(
         error_after([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 18446744073709551615"); }),
         HasSubstr("buffer view 0 extends past the end of its buffer"));
     EXPECT_THAT(error_after([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": -4"); }),
-                HasSubstr("has a byteOffset that is not an unsigned integer"));
+                HasSubstr("a value of 'byteOffset' is not an unsigned integer"));
     std::string deep;
     for (int i = 0; i < 20000; ++i)
         deep += "{\"a\":";
     EXPECT_THAT(error_after([&](Gltf &g) { g.more += ", \"extras\": " + deep + "1" + std::string(20000, '}'); }),
-                HasSubstr("is nested more than 64 deep"));
+                HasSubstr("its JSON is nested more than 64 levels deep"));
     EXPECT_THAT(error_of(std::string("glTF\2\0\0\0\x1c\0\0\0\xff\0\0\0JSON{}      ", 28)),
                 HasSubstr("a chunk extends past the end of the file"));
     Gltf points = triangle();
@@ -454,7 +457,7 @@ TEST(YamlMotion, ErrorsNameTheProblem) {
         return "no error";
     };
     EXPECT_EQ(error("[{at_s: 0, scale: 1}]"), "s.yaml:5:55: objects[0].motion.keys: needs at least two keys");
-    EXPECT_THAT(error("[{at_s: 0}, {at_s: 1}]"), HasSubstr("set none of translate, rotate and scale"));
+    EXPECT_THAT(error("[{at_s: 0}, {at_s: 1}]"), HasSubstr("must set at least one of translate, rotate and scale"));
     EXPECT_THAT(error("[{at_s: 1, scale: 1}, {at_s: 1, scale: 2}]"),
                 HasSubstr("keys[1].at_s: must be later than the previous key"));
     EXPECT_THAT(error("[{at_s: 0, scale: 0}, {at_s: 1}]"),
@@ -462,7 +465,8 @@ TEST(YamlMotion, ErrorsNameTheProblem) {
     EXPECT_THAT(error("[{at_s: 0, scale: [1, 1, 2]}, {at_s: 1}]"), HasSubstr("scales a sphere non-uniformly"));
     EXPECT_THAT(error("[{at_s: 0, spin: 3}, {at_s: 1}]"), HasSubstr("keys[0].spin: unknown key"));
     EXPECT_THAT(error("[{at_s: 0}, {at_s: 1, rotate: {axis: [0, 0, 1], degrees: 180}}]"),
-                HasSubstr("keys[1].rotate: rotates by 180 degrees since the previous key; the limit is below 180"));
+                HasSubstr("keys[1].rotate: the object rotates by 180 degrees between this key and the previous one; "
+                          "it must be less than 180"));
     EXPECT_THAT(error("[{at_s: 0, rotate: {axis: [1, 0, 0], degrees: -270}}, {at_s: 1}]"),
                 HasSubstr("rotates by 270"));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Encoders for small test images. Top row first.
+// Encoders for small test images. Samples begin with the top row.
 #pragma once
 
 #include <zlib.h>
@@ -17,7 +17,7 @@ inline std::string big_endian(std::uint32_t value) {
             static_cast<char>(value)};
 }
 
-// `channels` 1 to 4, `depth` 8 or 16 bits; `samples` as stored in the file.
+// `channels` is 1 to 4, `depth` is 8 or 16 bits. `samples` are the bytes as stored in the file before compression.
 inline std::string png(std::uint32_t width, std::uint32_t height, int channels, const std::string &samples,
                        int depth = 8) {
     const auto chunk = [](const std::string &type, const std::string &data) {
@@ -41,7 +41,7 @@ inline std::string png(std::uint32_t width, std::uint32_t height, int channels, 
     return "\x89PNG\r\n\x1a\n" + chunk("IHDR", header) + chunk("IDAT", packed) + chunk("IEND", "");
 }
 
-// Grey, 8 × 8, 128.
+// A grey JPEG of 8 × 8 px; all have the value 128.
 inline std::string jpeg() {
     static const char hex[] =
         "ffd8ffe000104a46494600010200000100010000fffe00104c61766335392e33372e31303000ffdb00430008040404040405"
@@ -55,13 +55,13 @@ inline std::string jpeg() {
     return bytes;
 }
 
-// Radiance's shared exponent: a texel is (r, g, b) · 2^(e − 136).
+// Radiance HDR with a shared exponent: the bytes r, g, b, e stand for the texel (r, g, b) · 2^(e − 136).
 inline std::string hdr(int width, int height, const std::string &rgbe) {
     return "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y " + std::to_string(height) + " +X " + std::to_string(width) +
            "\n" + rgbe;
 }
 
-// One row of floats, uncompressed; the channels in the file's order: B, G, R.
+// OpenEXR with one row of uncompressed floats. The file stores the channels in the order B, G, R.
 inline std::string exr(const std::vector<float> &b, const std::vector<float> &g, const std::vector<float> &r) {
     const auto raw = [](auto value) { return std::string(reinterpret_cast<const char *>(&value), sizeof value); };
     const auto number = [&](int value) { return raw(std::int32_t(value)); };

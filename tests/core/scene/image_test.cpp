@@ -22,7 +22,7 @@ namespace {
 const std::string start = "version: 1\naxes: z-up\n";
 const std::string plane = "objects:\n  - {plane: {size: 1}, material: a}\n";
 
-// Loads a scene in a folder with one image.
+// A folder with a scene and one image.
 class Scene {
 public:
     Scene(const std::string &image_name, const std::string &image) { write_file(folder_.path() / image_name, image); }
@@ -35,7 +35,7 @@ public:
     Arena load_texture(const std::string &texture, const LoadCallbacks &callbacks = {}) {
         return load("materials: {a: {model: diffuse, texture: " + texture + "}}\n" + plane, callbacks);
     }
-    // The error message without the folder.
+    // Returns the error message without the folder.
     std::string error_of(const std::string &text) {
         try {
             load(text);
@@ -73,7 +73,7 @@ std::vector<float> floats(const Arena &a, std::size_t i = 0) {
 
 } // namespace
 
-TEST(Textures, OfPngHaveTheTopRowFirstAndStraightAlpha) {
+TEST(Textures, FromPngHaveTheTopRowFirstAndStraightAlpha) {
     const Arena arena = Scene("a.png", png(1, 2, 4, {10, 20, 30, 40, 50, 60, 70, 80})).load_texture("a.png");
     ASSERT_EQ(arena.scene().textures.count, 1u);
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_SRGB8);
@@ -85,7 +85,7 @@ TEST(Textures, OfPngHaveTheTopRowFirstAndStraightAlpha) {
     EXPECT_THAT(material(arena).diffuse, testing::Each(1.0f)) << "default with a texture";
 }
 
-TEST(Textures, GetMissingChannels) {
+TEST(Textures, AreExpandedToRgba) {
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 1, {7})).load_texture("a.png")), ElementsAre(7, 7, 7, 255));
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 2, {7, 9})).load_texture("a.png")), ElementsAre(7, 7, 7, 9));
     EXPECT_THAT(bytes(Scene("a.png", png(1, 1, 3, {1, 2, 3})).load_texture("a.png")), ElementsAre(1, 2, 3, 255));
@@ -98,7 +98,7 @@ TEST(Textures, GetMissingChannels) {
     EXPECT_EQ(grey_jpeg[255], 255);
 }
 
-TEST(Textures, OfFloatsAreLinearAndClamped) {
+TEST(Textures, WithFloatsAreLinearAndClamped) {
     const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
     EXPECT_EQ(texture(radiance).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_EQ(texture(radiance).height, 2u);
@@ -125,7 +125,7 @@ TEST(Textures, HaveWrapModeAndEncoding) {
     EXPECT_EQ(texture(arena).wrap_v, ARHOST_WRAP_MIRROR);
 }
 
-TEST(Textures, OfTheSameFileAreStoredOnce) {
+TEST(Textures, FromTheSameFileAreStoredOnce) {
     const Arena arena =
         Scene("a.png", png(1, 1, 1, {7}))
             .load("materials:\n  a: {model: metallic-roughness, texture: a.png, emission_texture: ./a.png, "
@@ -147,9 +147,8 @@ TEST(Textures, ErrorsNameFileAndKey) {
         return Scene(name, content)
             .error_of("materials:\n  a: {model: diffuse, texture: " + name + "}\nobjects: []\n");
     };
-    EXPECT_EQ(error("a.png", "GIF89a"),
-              "s.yaml:4:32: materials.a.texture: a.png: its content is not PNG, JPEG, PPM, HDR or "
-              "EXR; convert it to one of them");
+    EXPECT_EQ(error("a.png", "GIF89a"), "s.yaml:4:32: materials.a.texture: a.png: is not a PNG, JPEG, PPM, HDR or "
+                                        "EXR image; convert it to one of these formats");
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
     EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: cannot be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: cannot be loaded: "));
@@ -183,7 +182,7 @@ TEST(Textures, CanBeCancelledWhileLoading) {
     EXPECT_THROW(Scene("a.png", png(64, 64, 1, "")).load_texture("a.png", callbacks), Cancelled);
 }
 
-// u = ½ + atan2(x, −z)/2π: the image's centre is at −z, u = ¾ at +x.
+// With u = ½ + atan2(x, −z)/2π, the direction −z is at the centre of the image (u = ½), and +x is at u = ¾.
 TEST(Environments, AreOrientedByTheScenesUpAxis) {
     const auto environment_direction = [](const std::string &axes, double degrees, glm::vec3 d) {
         ScratchFolder folder;
@@ -202,13 +201,13 @@ TEST(Environments, AreOrientedByTheScenesUpAxis) {
     EXPECT_THAT(environment_direction("z-up", 0, {0, 0, 1}), ElementsAre(0, 1, 0)) << "up";
     EXPECT_THAT(environment_direction("z-up", 0, {0, 1, 0}), ElementsAre(0, 0, -1)) << "away: the image's centre";
     EXPECT_THAT(environment_direction("z-up", 0, {1, 0, 0}), ElementsAre(1, 0, 0));
-    // Rotated left by 90° seen from above, the centre is at the left.
+    // The environment is rotated left by 90° seen from above, so the centre of the image is on the left.
     EXPECT_THAT(environment_direction("z-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
     EXPECT_THAT(environment_direction("y-up", 90, {-1, 0, 0}), ElementsAre(0, 0, -1));
 }
 
 TEST(Environments, HaveCumulativeSums) {
-    // White left, black right; the lower row black.
+    // The upper row is white on the left and black on the right; the lower row is black.
     const Arena arena = Scene("a.png", png(2, 2, 1, {'\xff', 0, 0, 0}))
                             .load("environment: {image: a.png, intensity: 3}\nmaterials: {}\nobjects: []\n");
     const arhost_environment &environment = arena.scene().environment;

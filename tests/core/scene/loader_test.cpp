@@ -21,7 +21,8 @@ using testing::HasSubstr;
 
 namespace {
 
-const std::string start = "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n"; // 4 lines
+// Four lines, to which the tests append objects.
+const std::string start = "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n";
 
 Arena load(const std::string &text) {
     Arena arena = load_scene(Node::parse(text, "s.yaml")).build();
@@ -63,7 +64,7 @@ const char *name(const Arena &a, std::size_t i = 0) {
     return at<char>(a, a.scene().names) + object(a, i).name;
 }
 
-// A triangle's geometric normal.
+// Returns the geometric normal of a triangle.
 glm::vec3 facing(const Arena &a, std::size_t triangle) {
     const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
     return glm::normalize(glm::cross(position(a, t.y) - position(a, t.x), position(a, t.z) - position(a, t.x)));
@@ -82,7 +83,7 @@ void expect_near(const glm::vec3 &found, const glm::vec3 &expected) {
                                                      << expected.x << ' ' << expected.y << ' ' << expected.z;
 }
 
-// Loads "scene.yaml" in a folder with "mesh.obj".
+// Loads "scene.yaml" from a folder that also has "mesh.obj".
 Arena load_with_mesh(const std::string &obj, const std::string &more, const LoadCallbacks &callbacks = {}) {
     const ScratchFolder folder;
     write_file(folder.path() / "mesh.obj", obj);
@@ -106,7 +107,7 @@ TEST(SceneFile, HasDefaults) {
     EXPECT_EQ(arena.scene().shadow_alpha_translucent, 0.3f);
 }
 
-TEST(SceneFile, SetsTheScene) {
+TEST(SceneFile, SetsTheSceneSettings) {
     const Arena arena = load("version: 1\naxes: y-up\nmax_depth: 9\nambient: [0.1, 0.2, 0.3]\nbackground: '#ff0000'\n"
                              "shadow_alpha: {opaque: 0.5, translucent: 0}\nmaterials: {}\nobjects: []\n");
     EXPECT_EQ(arena.scene().axes, ARHOST_AXES_Y_UP);
@@ -129,7 +130,8 @@ TEST(SceneFile, AcceptsLinearAndSrgbColours) {
     EXPECT_THAT(material(arena, 1).diffuse, ElementsAre(1, FloatNear(0.2158605f, 1e-7f), 0));
     EXPECT_THAT(material(arena, 2).diffuse, ElementsAre(FloatNear(0.0003035f, 1e-7f), FloatNear(0.0030353f, 1e-7f),
                                                         FloatNear(0.0033465f, 1e-7f)));
-    EXPECT_THAT(material(arena, 1).ambient, ElementsAre(1, FloatNear(0.2158605f, 1e-7f), 0)); // as diffuse
+    EXPECT_THAT(material(arena, 1).ambient,
+                ElementsAre(1, FloatNear(0.2158605f, 1e-7f), 0)); // the default is `diffuse`
 }
 
 TEST(SceneFile, DescribesMaterials) {
@@ -165,7 +167,7 @@ TEST(SceneFile, DescribesGlass) {
     EXPECT_THAT(plain.extinction, testing::Each(0.0f));
     EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
     EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
-    // exp(−extinction · 110 mm) gives the colour.
+    // exp(−extinction · 110 mm) must equal the colour.
     EXPECT_THAT(dragon.extinction, ElementsAre(FloatNear(0.00202858f, 1e-7f), FloatNear(0.00105940f, 1e-7f), 0));
     EXPECT_THAT(dragon.shadow_attenuation, ElementsAre(0.4f, 0.7f, 0.4f));
     EXPECT_EQ(dragon.reflection_depth, 50u);
@@ -265,7 +267,7 @@ TEST(Shapes, PlanesFaceAlongTheirNormal) {
     EXPECT_THAT(floor.scene().bounds_min, ElementsAre(-2, -1, 5));
     EXPECT_THAT(floor.scene().bounds_max, ElementsAre(2, 1, 5));
 
-    const Arena wall = load_object("plane: {size: [4, 2], normal: [0, -3, 0]}"); // 4 wide, 2 high
+    const Arena wall = load_object("plane: {size: [4, 2], normal: [0, -3, 0]}"); // 4 mm wide, 2 mm high
     expect_near(facing(wall, 0), {0, -1, 0});
     EXPECT_THAT(wall.scene().bounds_min, ElementsAre(-2, 0, -1));
     const Arena side = load_object("plane: {size: [4, 2], normal: [1, 0, 0]}");
@@ -291,7 +293,7 @@ TEST(Shapes, FacesShowTheWholeTextureUpright) {
         const auto *texcoords = at<glm::vec2>(arena, geometry(arena).texcoords);
         for (std::size_t i = 0; i < 12; ++i) {
             const glm::uvec3 t = at<glm::uvec3>(arena, geometry(arena).indices)[i];
-            // p = u · across + v · down, of the triangle's sides
+            // p = u · across + v · down, where `across` and `down` are derived from the sides of the triangle
             const glm::vec3 a = position(arena, t.y) - position(arena, t.x),
                             b = position(arena, t.z) - position(arena, t.x);
             const glm::vec2 ta = texcoords[t.y] - texcoords[t.x], tb = texcoords[t.z] - texcoords[t.x];
@@ -331,7 +333,7 @@ TEST(Transforms, RotateRightHanded) {
 }
 
 TEST(Transforms, TransformNormalsByTheInverseTranspose) {
-    // A 45° slope scaled to twice the height: the normal (0, 1, 1) becomes (0, 1/1, 1/2).
+    // A 45° slope is scaled to twice the height, so its normal (0, 1, 1) becomes (0, 1/1, 1/2).
     const Arena arena = load_with_mesh("v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n",
                                        ", transform: [{scale: [1, 1, 2]}]");
     const glm::vec3 normal = *at<glm::vec3>(arena, geometry(arena).normals);
@@ -339,7 +341,7 @@ TEST(Transforms, TransformNormalsByTheInverseTranspose) {
     expect_near(facing(arena, 0), normal);
 }
 
-TEST(Transforms, ThatMirrorKeepFrontFaces) {
+TEST(Transforms, KeepFrontFacesIfTheyMirror) {
     const std::string slope = "v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n";
     for (const std::string scale : {"[-1, 1, 1]", "[1, -1, 1]", "[1, 1, -1]", "-2", "[-1, -1, 1]"}) {
         const Arena arena = load_with_mesh(slope, ", transform: [{scale: " + scale + "}]");
@@ -368,7 +370,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
               "s.yaml:6:10: objects: duplicate key; keep one of them");
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
-              "s.yaml:5:9: materials.grey: duplicate material; keep one of them");
+              "s.yaml:5:9: materials.grey: another material has the same name; rename or remove one of them");
     EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
               "s.yaml:5:16: materials.red.model: 'difuse' is not one of diffuse, specular, mirror, metal, glass, "
               "metallic-roughness; did you mean "
@@ -394,7 +396,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     EXPECT_EQ(error_of(start + "objects:\n  - {material: grey}\n"),
               "s.yaml:6:5: objects[0]: needs one of mesh, gltf, sphere, cuboid and plane");
     EXPECT_EQ(error_of(ball + ", cuboid: {size: 1}}\n"),
-              "s.yaml:6:51: objects[0].cuboid: the object has a sphere already; split it into two objects");
+              "s.yaml:6:51: objects[0].cuboid: the object already has a sphere; split it into two objects");
     EXPECT_EQ(error_of(ball + "y}\n"),
               "s.yaml:6:37: objects[0].material: 'greyy' is not one of grey; did you mean 'grey'?");
     EXPECT_EQ(error_of(ball + ", smooth: true}\n"), "s.yaml:6:51: objects[0].smooth: is only allowed with 'mesh'");
@@ -419,9 +421,9 @@ TEST(SceneErrors, NameTheStepOfATransform) {
               "1e9; negative factors mirror");
     EXPECT_EQ(with("      - rotate: {axis: [0, 0, 0], degrees: 1}\n"),
               "s.yaml:9:24: objects[0].transform[0].rotate.axis: must have a length between 1e-9 and 1e9");
-    EXPECT_EQ(
-        with("      - {scale: 1, translate: [0, 0, 0]}\n"),
-        "s.yaml:9:9: objects[0].transform[0]: each step of a transform must be one of translate, scale and rotate");
+    EXPECT_EQ(with("      - {scale: 1, translate: [0, 0, 0]}\n"),
+              "s.yaml:9:9: objects[0].transform[0]: each step of a transform must have exactly one of the keys "
+              "translate, scale and rotate");
     EXPECT_EQ(with("      - scale: 1\n      - skale: 1\n"),
               "s.yaml:10:16: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
     EXPECT_EQ(with("      - scale: [1, 1, 2]\n"),
@@ -481,17 +483,17 @@ TEST(SceneLoading, CanBeCancelled) {
     EXPECT_THROW(load_with_mesh(triangle_with_normals, "", callbacks), Cancelled);
 }
 
-TEST(SceneLoading, SmoothComputesNormals) {
+TEST(SceneLoading, ComputesNormalsIfSmoothIsTrue) {
     const std::string flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     EXPECT_EQ(geometry(load_with_mesh(flat, "")).normals.count, 0u);
     EXPECT_EQ(geometry(load_with_mesh(flat, ", smooth: true")).normals.count, 3u);
     EXPECT_EQ(geometry(load_with_mesh(triangle_with_normals, ", smooth: false")).normals.count, 0u);
 }
 
-// A missing mesh; append the keys of the stand-in.
+// Beginning of a scene with a missing mesh file. The tests append the keys of the stand-in.
 const std::string absent = start + "objects:\n  - mesh: absent.ply\n    material: grey\n    stand_in: ";
 
-TEST(SceneLoading, ReplacesAMissingMeshByAStandIn) {
+TEST(SceneLoading, ReplacesAMissingMeshWithAStandIn) {
     std::vector<std::string> info, warnings;
     LoadCallbacks callbacks;
     callbacks.info = [&](const std::string &text) { info.push_back(text); };

@@ -42,7 +42,7 @@ std::string gzipped(const std::string &content) {
     return packed;
 }
 
-// `info`: the messages of the loader, each followed by "; ".
+// `info` has the messages of the loader, each followed by "; ".
 struct Loaded {
     TriangleMesh mesh;
     std::string info;
@@ -60,7 +60,7 @@ Loaded load_text(const std::string &name, const std::string &content, const Mesh
     return loaded;
 }
 
-// The error message without the folder.
+// Returns the error message without the folder.
 std::string error_of(const std::string &name, const std::string &content, const MeshOptions &options = {}) {
     const ScratchFolder folder;
     write_file(folder.path() / name, content);
@@ -72,7 +72,7 @@ std::string error_of(const std::string &name, const std::string &content, const 
     return "no error";
 }
 
-// The validator's result for a scene with this mesh.
+// Returns the result of `validate` for a scene with this mesh.
 std::string validated(TriangleMesh mesh) {
     ArenaBuilder builder;
     builder.add_object("mesh", builder.add_triangles(std::move(mesh)), builder.add_material(grey()));
@@ -150,7 +150,7 @@ TEST(Obj, KeepsTexcoordsAndUsesZeroForCornersWithoutThem) {
     const TriangleMesh mesh =
         load_text("a.obj", three_vertices + "vt 0.25 0.5\nvt 1\nf 1 2 3\nf 1/1 2/2 3/-1\n").mesh;
     ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
-    // v starts at the texture's top in the arena, at its bottom in OBJ files.
+    // v = 0 is the top of the texture in the arena, but the bottom in OBJ files.
     EXPECT_EQ(mesh.texcoords[mesh.triangles[0].y], glm::vec2(0, 1));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].x], glm::vec2(0.25f, 0.5f));
     EXPECT_EQ(mesh.texcoords[mesh.triangles[1].z], glm::vec2(1, 1));
@@ -159,18 +159,18 @@ TEST(Obj, KeepsTexcoordsAndUsesZeroForCornersWithoutThem) {
 TEST(Obj, IgnoresNormalsIfOnlySomeFacesHaveThem) {
     const Loaded loaded = load_text("a.obj", three_vertices + "vn 0 0 1\nf 1 2 3\nf 1//1 2//1 3//1\n");
     EXPECT_TRUE(loaded.mesh.normals.empty());
-    EXPECT_EQ(loaded.info, "a.obj: only some faces have normals; ignores all of them; ");
+    EXPECT_EQ(loaded.info, "a.obj: only some faces have normals; all normals are ignored; ");
 }
 
 TEST(Obj, ReportsIgnoredMaterials) {
     EXPECT_EQ(load_text("a.obj", "mtllib a.mtl\n" + three_vertices + "f 1 2 3").info,
-              "a.obj: ignores its MTL materials; the scene file defines the materials; ");
+              "a.obj: the MTL materials are ignored; the scene file defines the materials; ");
 }
 
 TEST(Obj, ReadsSyntaxVariants) {
     for (const std::string &text :
-         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows, no final line end
-          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // classic Mac OS
+         {std::string("\xef\xbb\xbfv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3"), // Windows line ends
+          std::string("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"),                 // classic Mac OS line ends
           std::string("v 0 \\\n0 0\nv 1 0 0 # last\nv 0 1 0 1.0\nf 1 \\\n 2 3 # f 9 9 9\n"),
           std::string("\t v\t+0 0. .0 0.5 0.5 0.5\nvp 1\nv 1e0 0E5 -0\nv 1e-60 +1.0e+0 0\ng a\ns off\nf 1 2 3\\")}) {
         const TriangleMesh mesh = load_text("a.obj", text).mesh;
@@ -180,36 +180,38 @@ TEST(Obj, ReadsSyntaxVariants) {
 }
 
 TEST(Obj, ErrorsNameFileAndLine) {
-    EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, has 2");
+    EXPECT_EQ(error_of("a.obj", "v 0 0\n"), "a.obj:1: a vertex needs 3 numbers, but has 2");
     EXPECT_EQ(error_of("a.obj", "\n\nv 0 x 0\n"), "a.obj:3: 'x' is not a number");
     EXPECT_EQ(error_of("a.obj", "v 0 1,5 0\n"), "a.obj:1: '1,5' is not a number");
-    EXPECT_EQ(error_of("a.obj", "v 0 nan 0\n"), "a.obj:1: a vertex has the number 'nan'");
-    EXPECT_EQ(error_of("a.obj", "v 0 0 1e99\n"), "a.obj:1: a vertex has the number '1e99'");
-    EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the number '-inf'");
-    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"), "a.obj:4: a face needs three corners, has 2");
+    EXPECT_EQ(error_of("a.obj", "v 0 nan 0\n"), "a.obj:1: a vertex has the invalid number 'nan'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 1e99\n"), "a.obj:1: a vertex has the invalid number '1e99'");
+    EXPECT_EQ(error_of("a.obj", "v 0 0 0\nvn 0 -inf 1\n"), "a.obj:2: a normal has the invalid number '-inf'");
+    EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2\n"),
+              "a.obj:4: a face needs at least three corners, but this one has 2");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 4\n"),
-              "a.obj:4: a face refers to vertex 4, but 3 are defined above");
+              "a.obj:4: a face refers to vertex 4, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 -4\n"),
-              "a.obj:4: a face refers to vertex -4, but 3 are defined above");
+              "a.obj:4: a face refers to vertex -4, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 0 1 2\n"),
-              "a.obj:4: a face refers to vertex 0, but 3 are defined above");
+              "a.obj:4: a face refers to vertex 0, but only 3 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1/1 2/1 3/1\n"),
-              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
+              "a.obj:4: a face refers to texcoord 1, but only 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "vn 0 0 1\nf 1//1 2//2 3//1\n"),
-              "a.obj:5: a face refers to normal 2, but 1 are defined above");
+              "a.obj:5: a face refers to normal 2, but only 1 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 x\n"), "a.obj:4: 'x' is not a corner of a face");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 3/1/1/1\n"),
-              "a.obj:4: a face refers to texcoord 1, but 0 are defined above");
+              "a.obj:4: a face refers to texcoord 1, but only 0 are defined above");
     EXPECT_EQ(error_of("a.obj", three_vertices + "f 1 2 99999999999999999999\n"),
               "a.obj:4: '99999999999999999999' is not a corner of a face");
     EXPECT_EQ(error_of("a.obj", three_vertices), "a.obj: contains no triangles");
     EXPECT_EQ(error_of("a.obj", three_vertices + "l 1 2\n"),
               "a.obj: contains no triangles, only points, lines or curves");
-    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: contains no triangles, nor vertices");
+    EXPECT_EQ(error_of("a.obj", "hello\n"), "a.obj: contains no triangles, and no vertices");
 }
 
 TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
-    // A square; a concave arrow head; a U, whose gap a fan would cover; and the U with opposite winding.
+    // The polygons are a square, a concave arrow head, a U (a triangle fan would cover its gap), and a U with the
+    // opposite winding.
     EXPECT_FLOAT_EQ(area_of(load_text("a.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n").mesh), 4);
     const TriangleMesh arrow = load_text("a.obj", "v 0 0 0\nv 4 0 2\nv 0 0 4\nv 1 0 2\nf 1 2 3 4\n").mesh;
     EXPECT_FLOAT_EQ(area_of(arrow), 6);
@@ -226,7 +228,7 @@ TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
     }
 }
 
-TEST(Polygons, ThatSelfIntersectAreStillTriangulated) {
+TEST(Polygons, AreTriangulatedEvenIfTheyIntersectThemselves) {
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 2 0\nf 1 2 3 4\n").mesh.triangles.size(), 2u);
     EXPECT_EQ(load_text("a.obj", "v 0 0 0\nv 1 1 1\nf 1 2 1 2 1 2\n").mesh.triangles.size(), 4u);
 }
@@ -275,15 +277,16 @@ TEST(Ply, ReadsCarriageReturnLineEndings) {
 }
 
 TEST(Ply, HeaderErrorsNameFileAndLine) {
-    EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: a PLY file begins with a line 'ply', this one does not");
-    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header lacks end_header");
-    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header lacks a format");
+    EXPECT_EQ(error_of("a.ply", "plx\n"), "a.ply:1: the first line must be 'ply'");
+    EXPECT_EQ(error_of("a.ply", "ply\n"), "a.ply:1: the header has no line 'end_header'");
+    EXPECT_EQ(error_of("a.ply", "ply\nend_header\n"), "a.ply:1: the header has no line 'format'");
     EXPECT_EQ(error_of("a.ply", "ply\nformat utf8 1.0\nend_header\n"),
               "a.ply:2: the format 'utf8' is not ascii, binary_little_endian or binary_big_endian");
     EXPECT_EQ(error_of("a.ply", "ply\nformat ascii 2.0\n"), "a.ply:2: the format version is '2.0', not 1.0");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex -1\n"),
-              "a.ply:3: the element 'vertex' has the count '-1'");
-    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"), "a.ply:3: a property precedes the first element");
+              "a.ply:3: the element 'vertex' has the invalid count '-1'");
+    EXPECT_EQ(error_of("a.ply", ply_start + "property float x\n"),
+              "a.ply:3: the header has a property before the first element");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty half x\n"),
               "a.ply:4: the property type 'half' is unknown");
     EXPECT_EQ(error_of("a.ply", ply_start + "element face 1\nproperty list float int vertex_indices\n"),
@@ -292,21 +295,21 @@ TEST(Ply, HeaderErrorsNameFileAndLine) {
               "a.ply: contains no triangles: the header has no element 'face' with a list 'vertex_indices'");
     EXPECT_EQ(error_of("a.ply", ply_start + "element vertex 1\nproperty float x\nelement face 1\n"
                                             "property list uchar int vertex_index\nend_header\n1\n3 0 0 0\n"),
-              "a.ply: the vertices lack x, y or z");
+              "a.ply: each vertex must have the properties x, y and z");
 }
 
 TEST(Ply, DataErrorsNameFileAndLine) {
-    const std::string header = ply_start + ply_triangle_header; // lines 1 to 9
+    const std::string header = ply_start + ply_triangle_header; // these are lines 1 to 9
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: vertex 1 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n"),
-              "a.ply:11: vertex 1 has more values than properties");
+              "a.ply:11: vertex 1 has more values than the header declares properties");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: 'zero' is not a number");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"),
               "a.ply:11: vertex 1: 'y' is not finite");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-              "a.ply:13: face 0 refers to vertex 3, but 3 are defined above");
+              "a.ply:13: face 0 refers to vertex 3, but only 3 are defined");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 -1 2\n"),
-              "a.ply:13: face 0 refers to vertex -1, but 3 are defined above");
+              "a.ply:13: face 0 refers to vertex -1, but only 3 are defined");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n"), "a.ply:13: '1.5' is not an integer");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:13: face 0 is truncated");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n\n\n"),
@@ -314,7 +317,7 @@ TEST(Ply, DataErrorsNameFileAndLine) {
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n4000000 0 1 2\n"),
               "a.ply:13: face 0: the list 'vertex_indices' has the length 4000000");
     EXPECT_EQ(error_of("a.ply", header + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
-              "a.ply: contains no triangles: its faces have fewer than three corners");
+              "a.ply: contains no triangles: all faces have fewer than three corners");
 }
 
 TEST(Ply, BinaryDataErrorsNameTheByteOffset) {
@@ -323,11 +326,11 @@ TEST(Ply, BinaryDataErrorsNameTheByteOffset) {
     EXPECT_EQ(error_of("a.ply", whole.substr(0, whole.size() - 1)),
               "a.ply: byte " + std::to_string(whole.size() - 2) + ": face 0: the list 'unused' has the length 2");
     EXPECT_EQ(error_of("a.ply", whole.substr(0, header + 10)),
-              "a.ply: the header declares 3 elements 'vertex', but only 10 bytes are left for them");
+              "a.ply: the header declares 3 elements 'vertex', but the file has only 10 bytes for them");
     std::string wrong = whole;
     wrong[header + 3 * 15 + 1] = 77;
     EXPECT_EQ(error_of("a.ply", wrong), "a.ply: byte " + std::to_string(header + 3 * 15 + 3) +
-                                            ": face 0 refers to vertex 77, but 3 are defined above");
+                                            ": face 0 refers to vertex 77, but only 3 are defined");
 }
 
 TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
@@ -336,18 +339,19 @@ TEST(Ply, RejectsCountsBeyondTheFileSizeBeforeReservingMemory) {
             const std::string text = "ply\nformat " + format + " 1.0\nelement vertex " + count +
                                      "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
                                      "property list uchar int vertex_indices\nend_header\n0 0 0\n";
-            EXPECT_THAT(error_of("a.ply", text),
-                        HasSubstr("a.ply: the header declares " + count + " elements 'vertex', but only"));
+            EXPECT_THAT(error_of("a.ply", text), HasSubstr("a.ply: the header declares " + count +
+                                                           " elements 'vertex', but the file has only"));
         }
 }
 
-TEST(MeshFile, IsUncompressedFromGzip) {
+TEST(MeshFile, IsDecompressedIfItIsGzip) {
     const std::string text = three_vertices + "f 1 2 3\n";
     EXPECT_EQ(load_text("a.obj.gz", gzipped(text)).mesh.triangles.size(), 1u);
     EXPECT_EQ(load_text("A.OBJ.GZ", gzipped(text)).mesh.triangles.size(), 1u);
-    EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(), 1u); // by its content
+    EXPECT_EQ(load_text("a.obj", gzipped(text)).mesh.triangles.size(),
+              1u); // gzip is recognised by content, not by extension
     EXPECT_EQ(load_text("a.ply.gz", gzipped(binary_triangle(true))).mesh.triangles.size(), 1u);
-    // Two members followed by zero padding, as on tapes (RFC 1952, 2.2).
+    // Two gzip members followed by zero padding, as on tapes (RFC 1952, 2.2).
     const std::string parts = gzipped(text.substr(0, 9)) + gzipped(text.substr(9)) + std::string(5, '\0');
     EXPECT_EQ(load_text("a.obj.gz", parts).mesh.triangles.size(), 1u);
 }
@@ -367,7 +371,7 @@ TEST(MeshFile, GzipErrorsNameTheByteOffset) {
     damaged = packed;
     damaged[packed.size() - 6] ^= 1; // the checksum
     EXPECT_THAT(error_of("a.obj.gz", damaged), HasSubstr("incorrect data check"));
-    EXPECT_THAT(error_of("a.obj.gz", packed + "unused"), HasSubstr("not a gzip member"));
+    EXPECT_THAT(error_of("a.obj.gz", packed + "unused"), HasSubstr("a gzip header is expected here"));
     EXPECT_EQ(error_of("a.obj.gz", gzipped("")), "a.obj.gz: is empty");
 }
 
@@ -375,16 +379,17 @@ TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
     const std::string bomb = gzipped(std::string(20 << 20, '#'));
     MeshOptions options;
     options.byte_limit = 4 << 20;
-    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: uncompresses to more than the limit of 4 MiB");
+    EXPECT_EQ(error_of("a.obj.gz", bomb, options), "a.obj.gz: its decompressed content exceeds the limit of 4 MiB");
     EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options), "a.obj: is 5 MiB large; the limit is 4 MiB");
 }
 
-TEST(MeshFile, OfAnUnsupportedFormatIsRejected) {
-    EXPECT_EQ(error_of("a.stl", "solid x\n"),
-              "a.stl: mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)");
-    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: a mesh file without extension cannot be loaded"));
-    EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is text in UTF-16; save it as UTF-8 or ASCII");
-    EXPECT_EQ(error_of("a.obj", ply_start), "a.obj: is a PLY file by its content; name it .ply");
+TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
+    EXPECT_EQ(error_of("a.stl", "solid x\n"), "a.stl: the format '.stl' is unsupported; convert the mesh to .obj or "
+                                              ".ply (optionally compressed: .obj.gz, .ply.gz)");
+    EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr("mesh: the file name has no extension"));
+    EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), "a.obj: is UTF-16 text; save it as UTF-8 or ASCII");
+    EXPECT_EQ(error_of("a.obj", ply_start),
+              "a.obj: has the extension .obj but contains a PLY mesh; rename it to .ply");
     EXPECT_EQ(error_of("a.obj", ""), "a.obj: is empty");
 }
 
@@ -414,7 +419,7 @@ TEST(MeshFile, LoadingCanBeCancelled) {
 }
 
 TEST(Normals, AreComputedIfSmoothIsTrue) {
-    // Two triangles of a ridge; the edge's normals are weighted by area, 1 to 3.
+    // Two triangles meet at a ridge. At their common edge, the normals are weighted by area, in the ratio 1 : 3.
     const std::string ridge = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 0 0 -3\nf 1 3 2\nf 1 2 4\n";
     EXPECT_TRUE(load_text("a.obj", ridge).mesh.normals.empty());
     const TriangleMesh mesh = load_text("a.obj", ridge, {true}).mesh;
@@ -433,24 +438,24 @@ TEST(Normals, AreSharedAcrossTextureSeams) {
     EXPECT_EQ(mesh.normals[mesh.triangles[0].x], mesh.normals[mesh.triangles[1].x]);
 }
 
-TEST(Normals, OfTheFileAreDroppedIfSmoothIsFalse) {
+TEST(Normals, InTheFileAreDroppedIfSmoothIsFalse) {
     const std::string text = three_vertices + "vn 0 0 1\nf 1//1 2//1 3//1\n";
     EXPECT_EQ(load_text("a.obj", text).mesh.normals.size(), 3u);
     EXPECT_EQ(load_text("a.obj", text, {true}).mesh.normals.size(), 3u);
     EXPECT_TRUE(load_text("a.obj", text, {false}).mesh.normals.empty());
 }
 
-TEST(Normals, OfLengthZeroAreComputed) {
+TEST(Normals, WithLengthZeroAreComputed) {
     const TriangleMesh mesh =
         load_text("a.obj",
                   three_vertices + "v 9 9 9\nv 9 9 9\nvn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//1\nf 4//1 5//1 4//1\n")
             .mesh;
     EXPECT_EQ(mesh.normals[0], glm::vec3(0, 0, 1));
     EXPECT_EQ(mesh.normals[1], glm::vec3(1, 0, 0));
-    EXPECT_EQ(validated(mesh), ""); // including the degenerate triangle
+    EXPECT_EQ(validated(mesh), ""); // the mesh includes a degenerate triangle
 }
 
-TEST(Normals, OfATinyMeshAreCorrect) { // squared lengths underflow in floats
+TEST(Normals, AreCorrectInATinyMesh) { // where squared lengths underflow in floats
     TriangleMesh mesh = square();
     for (glm::vec3 &p : mesh.positions)
         p *= 1e-24f;
@@ -486,7 +491,7 @@ INSTANTIATE_TEST_SUITE_P(Real, SharedMeshes,
 struct LoaderCase {
     const char *file;
     std::size_t triangles, vertices;
-    const char *message = nullptr; // error instead of a mesh
+    const char *message = nullptr; // expected error; null if a mesh is expected
 };
 
 class LoaderCases : public testing::TestWithParam<LoaderCase> {};
@@ -508,9 +513,9 @@ TEST_P(LoaderCases, YieldAMeshOrAClearError) {
 
 namespace {
 constexpr char no_stl[] =
-    ": mesh files '*.stl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": the format '.stl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
 constexpr char no_mtl[] =
-    ": mesh files '*.mtl' cannot be loaded; convert it to .obj or .ply (each may be packed as .gz)";
+    ": the format '.mtl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
 constexpr char no_faces[] = ": contains no triangles: the header has no element 'face' with a list 'vertex_indices'";
 constexpr char only_lines[] = ": contains no triangles, only points, lines or curves";
 } // namespace
@@ -520,7 +525,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         LoaderCase{"Spider_ascii.stl", 0, 0, no_stl}, LoaderCase{"Spider_binary.stl", 0, 0, no_stl},
         LoaderCase{"Wuson.ply", 3732, 11184}, LoaderCase{"WusonOBJ.obj", 3732, 2117}, LoaderCase{"box.obj", 12, 8},
-        LoaderCase{"box_UTF16BE.obj", 0, 0, ": is text in UTF-16; save it as UTF-8 or ASCII"},
+        LoaderCase{"box_UTF16BE.obj", 0, 0, ": is UTF-16 text; save it as UTF-8 or ASCII"},
         LoaderCase{"box_longline.obj", 944, 8}, LoaderCase{"box_mat_with_spaces.obj", 12, 8},
         LoaderCase{"box_spaces.mtl", 0, 0, no_mtl}, LoaderCase{"box_without_lineending.obj", 12, 8},
         LoaderCase{"concave_polygon.mtl", 0, 0, no_mtl}, LoaderCase{"concave_polygon.obj", 64, 64},
@@ -548,7 +553,8 @@ TEST(LoaderCaseTable, CoversEveryFileInTheFolder) {
     EXPECT_EQ(std::distance(begin(files), end(files)), 43);
 }
 
-// Corrupt files yield a mesh that the validator accepts, or a MeshError; no other exception, no sanitizer finding.
+// For a corrupt file, the loader must return a mesh that the validator accepts or throw a MeshError. Any other
+// exception or a sanitizer finding is a bug.
 TEST(MeshMutations, YieldAMeshOrAnError) {
     std::vector<std::pair<std::string, std::string>> seeds = {
         {"a.obj",
@@ -558,7 +564,7 @@ TEST(MeshMutations, YieldAMeshOrAnError) {
         {"c.ply", binary_triangle(true)},
         {"a.obj.gz", gzipped(three_vertices + "f 1 2 3\n")}};
     std::mt19937 random(7);
-    // In memory, so that writing thousands of files is fast.
+    // The folder is in memory, which makes writing thousands of files fast.
     const int memory = memfd_create("mesh", 0);
     ASSERT_GE(memory, 0);
     const ScratchFolder folder;
@@ -588,7 +594,7 @@ TEST(MeshMutations, YieldAMeshOrAnError) {
         ASSERT_EQ(pwrite(memory, content.data(), content.size(), 0), static_cast<ssize_t>(content.size()));
         try {
             TriangleMesh mesh = load_mesh(folder.path() / name, {random() % 2 == 0});
-            const bool in_limits = // checked by the scene loader
+            const bool in_limits = // the scene loader checks these limits
                 std::ranges::all_of(mesh.positions, [](const glm::vec3 &p) { return glm::length(p) < 1e9f; }) &&
                 std::ranges::all_of(mesh.texcoords, [](const glm::vec2 &p) { return glm::length(p) < 1e9f; });
             if (in_limits) {

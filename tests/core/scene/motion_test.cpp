@@ -16,7 +16,7 @@ using testing::FloatNear;
 
 namespace {
 
-constexpr float half_root = 0.70710678f; // of 2: sine and cosine of 45°
+constexpr float half_root = 0.70710678f; // √2/2, the sine and cosine of 45°
 
 // A ball at the origin whose node has one channel.
 Arena ball_with(Channel channel, float duration_s = 2) {
@@ -38,7 +38,7 @@ float x_at(const Arena &arena, double time_s) {
     return evaluator.at(time_s).moved[0].world_from_object[9];
 }
 
-// The bending square: its skin has two joints; the second is a child of the first, 10 to the right.
+// The bending square. Its skin has two joints; the second is a child of the first, 10 mm to the right of it.
 Arena bend(const std::vector<Channel> &channels, const glm::mat4x3 &root = glm::mat4x3(1), bool morphs = false) {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
@@ -94,7 +94,7 @@ TEST(Motion, HoldsStepKeyframes) {
     EXPECT_EQ(x_at(arena, 1), 5);
 }
 
-// glTF 2.0, appendix C.5, with t_d = 2: at the middle 1/2 v0 + 2/8 b0 + 1/2 v1 − 2/8 a1.
+// By glTF 2.0, appendix C.5, with t_d = 2, the value in the middle is 1/2 v0 + 2/8 b0 + 1/2 v1 − 2/8 a1.
 TEST(Motion, InterpolatesCubicSplines) {
     const Arena arena = ball_with({0,
                                    ARHOST_CHANNEL_TRANSLATION,
@@ -109,7 +109,8 @@ TEST(Motion, InterpolatesCubicSplines) {
 }
 
 TEST(Motion, RotatesAlongTheShortestPath) {
-    // 90° about z with the opposite quaternion sign: the path is still 90°, not 270°.
+    // The second keyframe is a rotation by 90° about z, with the opposite sign of the quaternion. The object must
+    // still rotate by 90°, not by 270°.
     const Arena arena = ball_with({0,
                                    ARHOST_CHANNEL_ROTATION,
                                    ARHOST_INTERPOLATION_LINEAR,
@@ -138,7 +139,8 @@ TEST(Motion, MovesChildJoints) {
     EXPECT_EQ(motion.moved_count, 0u);
     EXPECT_EQ(motion.deformed[0].vertex_count, 4u);
     const auto near = [](float value) { return FloatNear(value, 1e-4f); };
-    // (−10, −10, 5) of joint 0 → (10, −10, 5); (10, −10, 5) of joint 1 is (0, −10, 5) there → (12, −10) → (10, 12)
+    // A vertex of joint 0: (−10, −10, 5) → (10, −10, 5). A vertex of joint 1: (10, −10, 5) is (0, −10, 5) in the
+    // space of joint 1; (12, −10, 5) in the space of joint 0 after the move; and (10, 12, 5) after the rotation.
     EXPECT_THAT(triple(motion.deformed[0].positions, 0), ElementsAre(near(10), near(-10), near(5)));
     EXPECT_THAT(triple(motion.deformed[0].positions, 1), ElementsAre(near(10), near(12), near(5)));
     EXPECT_THAT(triple(motion.deformed[0].normals, 1), ElementsAre(near(0), near(0), near(1)));
@@ -185,7 +187,7 @@ TEST(Motion, BlendsJointsByWeight) {
 }
 
 TEST(Motion, TransformsNormalsByTheInverseTranspose) {
-    // Sheared (z becomes z + x): the normal of z = 5 tilts back. Mirrored: the normal keeps its side.
+    // Shearing (z becomes z + x) tilts the normal of the plane z = 5 back. Mirroring keeps the normal on its side.
     const glm::mat4x3 sheared(glm::vec3(1, 0, 1), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(0));
     const auto near = [](float value) { return FloatNear(value, 1e-6f); };
     {
@@ -205,7 +207,7 @@ TEST(Motion, AppliesMorphTargetsBeforeTheSkin) {
     const Arena arena =
         bend({{3, ARHOST_CHANNEL_MORPH_WEIGHTS, ARHOST_INTERPOLATION_LINEAR, {0, 2}, {0, 3}}}, glm::mat4x3(2), true);
     MotionEvaluator evaluator(arena.scene());
-    // At 1 s the weight is 1.5: z = (5 + 1.5) · 2
+    // At 1 s the morph weight is 1.5, so z = (5 + 1.5) · 2.
     EXPECT_THAT(triple(evaluator.at(1).deformed[0].positions, 3), ElementsAre(-20, 20, 13));
     EXPECT_THAT(triple(evaluator.at(0).deformed[0].positions, 3), ElementsAre(-20, 20, 10));
 }
@@ -233,8 +235,8 @@ TEST(Motion, MorphsUnskinnedObjectsInObjectSpace) {
                 ElementsAre(FloatNear(half_root, 1e-6f), 0, FloatNear(half_root, 1e-6f)));
 }
 
-// Reports the time without a limit, which a slow machine could exceed.
-TEST(Motion, SkinsAHundredThousandVertices) {
+// Reports the time but does not limit it, because a slow machine could exceed any limit.
+TEST(Motion, EvaluatesASkinOfAHundredThousandVertices) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;
     Skin skin;

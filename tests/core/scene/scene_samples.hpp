@@ -23,7 +23,7 @@ inline arhost_light lamp() {
     return light;
 }
 
-// A square of two triangles with normals and texcoords.
+// Returns a square of two triangles with normals and texture coordinates.
 inline TriangleMesh square() {
     return {{{-10, -10, 5}, {10, -10, 5}, {10, 10, 5}, {-10, 10, 5}},
             std::vector<glm::vec3>(4, glm::vec3(0, 0, 1)),
@@ -31,7 +31,7 @@ inline TriangleMesh square() {
             {{0, 1, 2}, {0, 2, 3}}};
 }
 
-// Geometry 0: the square, geometry 1: a ball; a material, two objects, a light.
+// Returns a scene with two geometries (0: the square, 1: a ball), one material, two objects and one light.
 inline ArenaBuilder small_scene() {
     ArenaBuilder builder;
     const std::uint32_t material = builder.add_material(grey());
@@ -41,7 +41,7 @@ inline ArenaBuilder small_scene() {
     return builder;
 }
 
-// A texture with a uniform colour.
+// Returns a texture with a uniform colour.
 inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, std::uint32_t height) {
     Texture texture{format, width, height, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, {}};
     if (format == ARHOST_TEXEL_RGBA32F) {
@@ -54,8 +54,8 @@ inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, st
     return texture;
 }
 
-// The square with its left side bound to joint 0, the right side to joint 1, and a morph target that raises it
-// by 1.
+// Returns the square with its left side bound to joint 0, its right side bound to joint 1, and a morph target that
+// raises the square by 1 mm.
 inline TriangleMesh bending_square() {
     TriangleMesh mesh = square();
     mesh.joints = {{0, 0, 0, 0}, {1, 0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0}};
@@ -66,8 +66,8 @@ inline TriangleMesh bending_square() {
 }
 
 // Uses every feature of an arena. Objects: 0 'square', textured; 1 'ball', moves with node 0; 2 'bend',
-// deforms by skin 0 of the nodes 0 and 1. Textures: 0 bytes, 1 floats, of the environment. Channels: a
-// translation, a rotation and a scale of node 0, weights of node 2.
+// deformed by skin 0, whose joints are nodes 0 and 1. Textures: 0 has bytes; 1 has floats and is the environment.
+// Channels: translation, rotation and scale of node 0, and morph weights of node 2.
 inline ArenaBuilder full_scene() {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
@@ -99,7 +99,7 @@ inline ArenaBuilder full_scene() {
     return builder;
 }
 
-// The mutable elements of a buffer.
+// Returns the elements of a buffer, writable.
 template <class T> T *elements(Arena &arena, const arhost_buffer &buffer) {
     return reinterpret_cast<T *>(arena.bytes().data() + buffer.offset);
 }

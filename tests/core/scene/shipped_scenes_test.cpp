@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Loads every scene in config/scenes: with stand-ins, as after a fresh checkout, and with the meshes of
-// tools/get-models if present.
+// Loads every scene in config/scenes twice: with stand-ins, as after a fresh checkout, and with the meshes that
+// tools/get-models downloads, if present.
 #include "plugin_under_test.hpp"
 #include "scene/loader.hpp"
 #include "scene/mesh_loader.hpp"
@@ -22,8 +22,8 @@ namespace {
 
 const fs::path folder = fs::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes";
 
-// Scenes of the dissertation (tables 3 and 4, figures 14 to 20) and our own, with the mesh's triangle count from
-// table 1, or 0.
+// Scenes of the dissertation (tables 3 and 4, figures 14 to 20) and additional ones. The number is the triangle count
+// of the mesh according to table 1 of the dissertation, or 0 if the table does not have it.
 const std::map<std::string, std::size_t> faces = {
     {"demo", 0},
     {"moving", 0},
@@ -56,7 +56,7 @@ std::vector<std::string> scene_names() {
     return names;
 }
 
-// Loads and validates; returns the triangle count of the largest mesh.
+// Loads and validates a scene. Returns the triangle count of the largest mesh.
 std::size_t load_and_check(const fs::path &file, std::size_t *warnings) {
     LoadCallbacks callbacks;
     callbacks.warning = [&](const std::string &) { ++*warnings; };
@@ -86,8 +86,8 @@ TEST(ShippedScenes, AreTheDocumentedOnes) {
 
 class ShippedScene : public testing::TestWithParam<std::string> {};
 
-TEST_P(ShippedScene, LoadsWithAStandInOfTheDissertationsFaces) {
-    const arhost::test::ScratchFolder scratch; // has no models/
+TEST_P(ShippedScene, LoadsWithAStandInOfTheDocumentedTriangleCount) {
+    const arhost::test::ScratchFolder scratch; // this folder has no models/
     fs::create_directories(scratch.path() / "config/scenes");
     const fs::path file = scratch.path() / "config/scenes" / (GetParam() + ".yaml");
     fs::copy_file(folder / file.filename(), file);
@@ -102,7 +102,7 @@ TEST_P(ShippedScene, LoadsWithAStandInOfTheDissertationsFaces) {
     }
 }
 
-TEST_P(ShippedScene, LoadsAsItIs) {
+TEST_P(ShippedScene, LoadsFromItsFolder) {
     std::size_t warnings = 0;
     load_and_check(folder / (GetParam() + ".yaml"), &warnings);
 }
@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(Config, ShippedScene, testing::ValuesIn(scene_names()),
 TEST(MovingScene, LoopsWithoutAJump) {
     const Arena arena = load_scene(folder / "moving.yaml").build();
     MotionEvaluator evaluator(arena.scene());
-    const auto coordinates_at = [&](double time_s) { // of all objects and vertices
+    const auto coordinates_at = [&](double time_s) { // the coordinates of all objects and vertices
         const arhost_motion motion = evaluator.at(time_s);
         std::vector<float> coordinates;
         for (std::uint32_t i = 0; i < motion.moved_count; ++i)
@@ -139,11 +139,11 @@ TEST(MovingScene, LoopsWithoutAJump) {
     EXPECT_EQ(evaluator.at(0).deformed_count, 1u);
     EXPECT_GT(max_displacement(0, loop_s / 2), 50);
     EXPECT_LT(max_displacement(loop_s - step_s, 0), 0.2);
-    for (double t = 0; t < loop_s; t += loop_s / 24) // no jump within the loop either
+    for (double t = 0; t < loop_s; t += loop_s / 24) // no jump within the period either
         EXPECT_LT(max_displacement(t, t + step_s), 0.2) << t;
 }
 
-// From a local folder; needs no network.
+// Downloads from a local folder, so the test needs no network.
 TEST(GetModels, WritesNormalizedMeshes) {
     ARHOST_REQUIRE_SHARED_DATA("meshes");
     const arhost::test::ScratchFolder scratch;

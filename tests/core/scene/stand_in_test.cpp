@@ -12,7 +12,7 @@ using namespace arhost::scene;
 
 namespace {
 
-// 6 times the enclosed volume; positive if the triangles are counter-clockwise seen from outside.
+// Returns six times the enclosed volume. It is positive if the triangles are counter-clockwise seen from outside.
 double signed_volume(const TriangleMesh &mesh) {
     double sum = 0;
     for (const glm::uvec3 &t : mesh.triangles)
@@ -21,7 +21,7 @@ double signed_volume(const TriangleMesh &mesh) {
     return sum;
 }
 
-// Number of edges without exactly one opposite edge.
+// Returns the number of directed edges that do not have exactly one opposite edge. It is 0 for a closed mesh.
 int open_edges(const TriangleMesh &mesh) {
     std::map<std::pair<unsigned, unsigned>, int> edges;
     for (const glm::uvec3 &t : mesh.triangles)
@@ -37,7 +37,7 @@ int open_edges(const TriangleMesh &mesh) {
 
 } // namespace
 
-// The last five counts: the dissertation's table 1.
+// The last five triangle counts are those of table 1 of the dissertation.
 class StandIns : public testing::TestWithParam<unsigned> {};
 
 TEST_P(StandIns, HaveTheExactTriangleCountAndFillTheirBox) {
@@ -62,6 +62,6 @@ INSTANTIATE_TEST_SUITE_P(Counts, StandIns,
 TEST(StandInMeshes, AreClosedForEvenCounts) {
     for (const unsigned faces : {100, 998, 4968})
         EXPECT_EQ(open_edges(stand_in(faces, glm::dvec3(1))), 0) << faces;
-    // Odd count: the split edge and its two halves.
+    // If the count is odd, the open edges are the split edge and its two halves.
     EXPECT_EQ(open_edges(stand_in(999, glm::dvec3(1))), 3);
 }

@@ -54,7 +54,7 @@ TEST(MarkerReport, RejectsInvalidLists) {
     EXPECT_EQ(rejection({{3}, {3}}), "marker id 3 is listed twice");
     EXPECT_THAT(rejection({{3, 0}}), testing::HasSubstr("side_mm"));
     EXPECT_THAT(rejection({{3, -5}}), testing::HasSubstr("side_mm"));
-    EXPECT_EQ(rejection({}), "0 markers are listed; list 1 to 64");
+    EXPECT_EQ(rejection({}), "0 markers are listed under 'markers'; list 1 to 64");
     EXPECT_THAT(rejection(std::vector<Listed>(65)), testing::StartsWith("65 markers are listed"));
 }
 

@@ -367,7 +367,7 @@ TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(names(), IsEmpty());
-    EXPECT_THAT(s.log(), HasSubstr("3 there was no frame: '" + path().string() + "' was not written"));
+    EXPECT_THAT(s.log(), HasSubstr("3 '" + path().string() + "' was not written, because there were no frames"));
 }
 
 // Errors

@@ -322,7 +322,7 @@ TEST(Refusal, NamesTheFirstNumberedFileAndListsTheFolder) {
                    {"has 3 entries", "image_1.png", "notes.txt"});
     write_images(folder.path(), {3, 4});
     expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"image_0000.png' first", "2 from number 3 to 4", "'start'"});
+                   {"image_0000.png' first", "2 matching files, with numbers from 3 to 4", "'start'"});
     expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                    {"/nowhere/image_0.png", "cannot be listed"});
 }
@@ -712,7 +712,7 @@ TEST(Video, RefusesAChangedSize) {
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(small.options()), ARHOST_STATUS_OK) << source.log();
     EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, earlier ones 96×64"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, but earlier frames are 96×64"));
 }
 
 TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {

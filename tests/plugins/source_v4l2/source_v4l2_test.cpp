@@ -107,7 +107,7 @@ TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
         EXPECT_THAT(text, HasSubstr("/dev/video0"));
         EXPECT_THAT(text, HasSubstr("v4l2-ctl --list-devices"));
     } else {
-        EXPECT_THAT(text, HasSubstr("there is no /dev/video*"));
+        EXPECT_THAT(text, HasSubstr("no /dev/video* exists"));
         EXPECT_THAT(text, HasSubstr("source_synthetic"));
     }
 }

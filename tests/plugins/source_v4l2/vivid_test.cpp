@@ -376,13 +376,13 @@ TEST_F(Vivid, ReportsAFatalDriverError) {
 TEST_F(Vivid, ReportsDriverErrorsAtStart) {
     set(inject_reqbufs_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at reserving 4 buffers"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while reserving 4 buffers"));
     set(inject_qbuf_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at queueing a buffer"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while queueing a buffer"));
     set(inject_streamon_error, 1);
     EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("failed at starting the stream"));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while starting the stream"));
     EXPECT_EQ(device_mappings(), 0u);
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);

@@ -49,7 +49,7 @@ TEST_P(AprilTagFamily, NamesTheValidIdRange) {
 TEST(AprilTagTracker, RejectsADecimationThatTheLibraryMishandles) {
     Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate must be 1, 1.5 or an integer"));
+    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate: must be 1, 1.5 or an integer"));
 }
 
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {

@@ -109,7 +109,7 @@ TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
         std::ofstream(file) << text;
         Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
         EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << text;
-        EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: " + file.string() + " is not a dictionary")) << text;
+        EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: '" + file.string() + "' is not a dictionary")) << text;
     };
     expect_rejected("");
     expect_rejected("not yaml at all {");
@@ -123,13 +123,13 @@ TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
 
     Tracker absent("tracker_aruco", {{"dictionary_file", (scratch.path() / "absent.yml").string()}});
     EXPECT_EQ(absent.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(absent.log(), HasSubstr("absent.yml is not a dictionary: cannot read the file"));
+    EXPECT_THAT(absent.log(), HasSubstr("absent.yml' cannot be read"));
 }
 
 TEST(ArucoTracker, RejectsContradictoryThresholdWindows) {
     Tracker tracker("tracker_aruco", {{"threshold_window_min_px", "31"}, {"threshold_window_max_px", "23"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(tracker.log(), HasSubstr("threshold_window_max_px must not be less than threshold_window_min_px"));
+    EXPECT_THAT(tracker.log(), HasSubstr("threshold_window_max_px: must not be less than threshold_window_min_px"));
 }
 
 TEST(ArucoTracker, FindsInvertedMarkersOnlyIfEnabled) {
