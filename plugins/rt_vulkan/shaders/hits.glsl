@@ -79,8 +79,8 @@ bool is_hole(uint object, uint primitive, vec2 uv) {
     return sample_texture(materials[material].colour_texture, texcoord).a < materials[material].alpha_cutoff;
 }
 
-// Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. Returns true and
-// updates `hit` if the hit is not farther away than hit.t.
+// Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. Returns true
+// and updates `hit` if the hit is not farther away than hit.t.
 bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
     vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
     vec3 to_corner = primitives[primitive].corner - origin;
@@ -123,8 +123,8 @@ vec3 facet_of(uint primitive) {
     return ordered_cross(primitives[primitive].edge_2, primitives[primitive].edge_1);
 }
 
-// Returns a · b + c with a single rounding (T. J. Dekker, A Floating-Point Technique for Extending the Available Precision, 1971;
-// for the sum: D. E. Knuth, The Art of Computer Programming 2, 4.2.2). GLSL's fma() may round twice.
+// Returns a · b + c with a single rounding (T. J. Dekker, A Floating-Point Technique for Extending the Available
+// Precision, 1971; for the sum: D. E. Knuth, The Art of Computer Programming 2, 4.2.2). GLSL's fma() may round twice.
 vec3 fused(float a, vec3 b, vec3 c) {
     const float half_of_the_bits = 4097.0;
     precise float a_wide = a * half_of_the_bits, a_high = a_wide - (a_wide - a), a_low = a - a_high;

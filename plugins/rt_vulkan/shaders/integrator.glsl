@@ -5,8 +5,8 @@
 
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
-// Renders a sample; returns its linear radiance and alpha. Catchers do not hide the virtual objects behind them, so primary
-// rays ignore catchers. Occluders hide everything behind them.
+// Renders a sample; returns its linear radiance and alpha. Catchers do not hide the virtual objects behind them, so
+// primary rays ignore catchers. Occluders hide everything behind them.
 vec4 trace_sample(vec3 direction, Random random) {
     vec3 light = vec3(0.0);
     float alpha = 0.0;
@@ -56,14 +56,14 @@ vec4 trace_sample(vec3 direction, Random random) {
     return vec4(light, alpha);
 }
 
-// Reads a ray direction in camera axes, or one of its derivatives, from `rays`. `z`: the z component if only x and y are
-// stored.
+// Reads a ray direction in camera axes, or one of its derivatives, from `rays`. `z`: the z component if only x and y
+// are stored.
 vec3 stored_ray(uint first, float z) {
     return vec3(rays[first], rays[first + 1u], ray_dimensions == 3u ? rays[first + 2u] : z);
 }
 
-// Computes the ray direction, in world space, at the offset `within` from a pixel's centre. Returns false if the pixel is
-// outside the field of view of the lens.
+// Computes the ray direction, in world space, at the offset `within` from a pixel's centre. Returns false if the
+// pixel is outside the field of view of the lens.
 bool direction_of(uint pixel, vec2 within, out vec3 direction) {
     uint first = pixel * ray_dimensions * (has_slopes ? 3u : 1u);
     direction = stored_ray(first, 1.0);

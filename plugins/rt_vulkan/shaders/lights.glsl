@@ -51,9 +51,9 @@ struct Visibility {
     vec3 tint;          // transmittance of the glass in between
 };
 
-// Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already shows
-// their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to the next. A
-// single loop traces all of them, because trace() is inlined and its code is long.
+// Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already
+// shows their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to
+// the next. A single loop traces all of them, because trace() is inlined and its code is long.
 Visibility visibility(Incidence arriving, Surface s) {
     const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     vec3 start = s.position + s.geometric_normal * s.offset, to_light = arriving.to_light;

@@ -17,7 +17,8 @@ uint hash(uint x) {
     return x ^ (x >> 16);
 }
 
-// Returns pair `index` of the `count` pairs that a sample needs for `purpose`, in [0, 1) (R2 sequence: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
+// Returns pair `index` of the `count` pairs that a sample needs for `purpose`, in [0, 1) (R2 sequence: M. Roberts,
+// The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 vec2 pair(Random random, uint purpose, uint index, uint count) {
     uint offset = hash(random.pixel ^ random.seed);
     uint i = random.number * count + index;

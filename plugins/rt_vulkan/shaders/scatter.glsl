@@ -31,9 +31,9 @@ void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
         push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput);
 }
 
-// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray that
-// exceeds the depth limit or falls below the importance cutoff is not traced: the function returns the cutoff colour that
-// it contributes instead.
+// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray
+// that exceeds the depth limit or falls below the importance cutoff is not traced: the function returns the cutoff
+// colour that it contributes instead.
 vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec3 throughput = path.throughput;
     if (s.is_back_face)

@@ -78,8 +78,8 @@ struct Texture {
     int width, height, unused, unused_2;
 };
 
-// A node of a BVH. Inner nodes have count 0; their children are the nodes `first` and first + 1. A leaf contains `count`
-// primitives starting at `first`; a leaf of the top-level BVH contains one object.
+// A node of a BVH. Inner nodes have count 0; their children are the nodes `first` and first + 1. A leaf contains
+// `count` primitives starting at `first`; a leaf of the top-level BVH contains one object.
 struct Node {
     vec3 low;
     uint first;

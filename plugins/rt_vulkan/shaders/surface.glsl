@@ -34,8 +34,8 @@ vec3 texture_colour(Hit hit, uint number) {
     return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.uv)).rgb;
 }
 
-// Returns `normal`, perturbed by the normal texture. `facet` is the geometric normal. The tangents are constant over each
-// triangle.
+// Returns `normal`, perturbed by the normal texture. `facet` is the geometric normal. The tangents are constant over
+// each triangle.
 vec3 normal_mapped(Hit hit, vec3 facet, vec3 normal) {
     uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
     vec2 texcoords[3];

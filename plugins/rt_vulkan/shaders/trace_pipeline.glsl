@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Implements trace() with VK_KHR_ray_tracing_pipeline. The device traverses its acceleration structures and calls pipeline.rint for
-// spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or pipeline.rmiss. These
-// shaders do not trace further rays; only the integrator's loop does.
+// Implements trace() with VK_KHR_ray_tracing_pipeline. The device traverses its acceleration structures and calls
+// pipeline.rint for spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or
+// pipeline.rmiss. These shaders do not trace further rays; only the integrator's loop does.
 
 layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
 layout(location = 0) rayPayloadEXT Payload payload;

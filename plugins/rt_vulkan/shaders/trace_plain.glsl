@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Implements trace() with software traversal of the BVHs (bvh.hpp). The leaves of the top-level BVH are objects, each of
-// which has a BVH in object space.
+// Implements trace() with software traversal of the BVHs (bvh.hpp). The leaves of the top-level BVH are objects, each
+// of which has a BVH in object space.
 
 const int trace_stack_size = 64; // exceeds the sum of the depth limits in bvh.hpp
 
@@ -11,8 +11,8 @@ vec3 safe_reciprocal(vec3 d) {
     return 1.0 / mix(d, mix(vec3(minimum), vec3(-minimum), lessThan(d, vec3(0.0))), lessThan(abs(d), vec3(minimum)));
 }
 
-// Returns the t at which the ray enters the box, or INFINITY if it misses the box. The factor 1.000001 allows for rounding
-// errors.
+// Returns the t at which the ray enters the box, or INFINITY if it misses the box. The factor 1.000001 allows for
+// rounding errors.
 float box_entry(vec3 low, vec3 high, vec3 origin, vec3 reciprocal, float t_max) {
     vec3 a = (low - origin) * reciprocal, b = (high - origin) * reciprocal;
     vec3 enters = min(a, b), leaves = max(a, b);
