@@ -339,10 +339,9 @@ void Instance::create(bool validate) {
     if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders also return this code for damaged manifests
         throw Failure(
             ARHOST_STATUS_ERROR_UNSUPPORTED,
-            "Vulkan cannot be started (VK_ERROR_OUT_OF_HOST_MEMORY): either memory is exhausted, or the manifest of "
-            "a "
-            "driver or layer is damaged; check the folders /usr/share/vulkan, /etc/vulkan and VK_LAYER_PATH, or use "
-            "rt_embree" +
+            "Vulkan cannot be started (VK_ERROR_OUT_OF_HOST_MEMORY): either memory is exhausted, or a driver's or "
+            "layer's manifest is damaged; check /usr/share/vulkan, /etc/vulkan and the folders in VK_LAYER_PATH, or "
+            "use rt_embree" +
                 driver_variable_hint());
     check(result, "creating a Vulkan instance");
 }
@@ -374,8 +373,8 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     };
     std::string uuid = lower(wanted);
     std::erase(uuid, '-');
-    std::vector<const PhysicalDevice *> exact,
-        partial; // `exact`: matches by number, UUID or whole name; `partial`: by part of the name
+    // `exact`: matches by number, UUID or whole name; `partial`: matches by a part of the name.
+    std::vector<const PhysicalDevice *> exact, partial;
     for (std::size_t i = 0; i < devices.size(); ++i) {
         const std::string name = lower(devices[i].name);
         if (wanted == std::to_string(i) || devices[i].uuid == uuid || name == lower(wanted))
