@@ -21,7 +21,7 @@ void exec_child(const char *program, char *const argv[], std::span<const int> fd
     ::setrlimit(RLIMIT_CORE, &no_core);
     // First above the target numbers, then into place, so that none is overwritten; dup2 clears close-on-exec.
     constexpr int first_free = 10, max_fds = 8;
-    int high[max_fds];
+    int high[max_fds] = {};
     if (fds.size() > max_fds)
         return;
     for (std::size_t i = 0; i < fds.size(); ++i)
@@ -30,8 +30,8 @@ void exec_child(const char *program, char *const argv[], std::span<const int> fd
     for (std::size_t i = 0; i < fds.size(); ++i)
         if (::dup2(high[i], static_cast<int>(i)) < 0)
             return;
-    ::syscall(SYS_close_range, static_cast<unsigned>(fds.size()), ~0u, 0u);
-    ::execv(program, argv);
+    if (::syscall(SYS_close_range, static_cast<unsigned>(fds.size()), ~0u, 0u) == 0)
+        ::execv(program, argv);
 }
 
 } // namespace arhost::base
