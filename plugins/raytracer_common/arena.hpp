@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Access to a scene's arena (arhost/scene.h).
+// Functions to read a scene's arena (arhost/scene.h) and transforms.
 #pragma once
 
 #include <arhost/scene.h>
@@ -17,16 +17,17 @@ inline const std::byte *bytes(const arhost_scene &arena) {
     return reinterpret_cast<const std::byte *>(&arena);
 }
 
-// A buffer of T.
+// Returns the elements of a buffer of the arena, which must have type T and no padding between elements.
 template <class T> std::span<const T> elements(const arhost_scene &arena, const arhost_buffer &buffer) {
     return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
 }
 
-// `world_from_object`: a 3×4 transform, column by column, here and below.
+// Here and below, `world_from_object` is a 3×4 matrix, column-major.
 bool is_identity(const float *world_from_object);
 
-// The largest distance of an object's points from its origin, along each world axis, in mm; `low` and `high` are its
-// box in object space. Excludes the translation, which offset_from_surface() counts as part of the ray.
+// Writes to `to` how far an object's points are at most from the object's origin along each world axis, in mm. `low`
+// and `high` are the object's bounding box in object space. The translation is not included:
+// offset_from_surface() accounts for it with the hit position.
 template <class Number>
 void object_extent(const Number (&low)[3], const Number (&high)[3], const float *world_from_object, float (&to)[3]) {
     for (int row = 0; row < 3; ++row) {
@@ -37,15 +38,16 @@ void object_extent(const Number (&low)[3], const Number (&high)[3], const float 
     }
 }
 
-// The cofactors of a transform's 3×3 part, for its inverse and normal transform. The inverse is
-// cofactor[row][column] / determinant, transposed.
+// The cofactors of the 3×3 part of a transform. The inverse of the 3×3 part is the transpose of the matrix
+// cofactor[row][column] / determinant.
 struct Cofactors {
-    double values[9]; // column by column
+    double values[9]; // column-major
     double determinant;
 
     explicit Cofactors(const float *world_from_object);
-    // The inverse transpose, scaled so that its largest element is 1 (normals are normalized later). The
-    // determinant's sign keeps a mirrored object's normals pointing outwards. Column by column.
+    // Writes the matrix that transforms normals, column-major: the inverse transpose, scaled so that its largest
+    // element is 1, because normals are normalized later. The sign of the determinant is retained, so the normals of
+    // a mirrored object still point outwards.
     void write_normal_transform(float *to) const;
 };
 

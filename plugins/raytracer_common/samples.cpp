@@ -35,7 +35,7 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
     std::vector<Sample> samples;
     samples.reserve(count);
     for (std::uint32_t i = first; i != first + count; ++i) {
-        const auto offset = [i](std::uint32_t step) { // i · step / 2³² mod 1, centred at 0
+        const auto offset = [i](std::uint32_t step) { // i · step / 2³² modulo 1, in the range −½ to ½
             return static_cast<float>(static_cast<std::int32_t>(i * step)) * 0x1p-32f;
         };
         samples.push_back({offset(3242174889u), offset(2447445414u)});

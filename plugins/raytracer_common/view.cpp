@@ -27,19 +27,29 @@ void check_setup(const arhost_raytracer_setup &setup) {
         setup.height > ARHOST_MAX_IMAGE_SIDE)
         refuse("the image's width and height must be 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px");
     if (in.width != setup.width || in.height != setup.height)
-        refuse("the intrinsics are for another image size");
-    if (!all_finite({&in.fx, 4}) || !(in.fx > 0) || !(in.fy > 0))
-        refuse("the intrinsics' focal lengths must be finite and above 0");
+        refuse("the intrinsics are for images of " + std::to_string(in.width) + "x" + std::to_string(in.height) +
+               " px, but the image to render has " + std::to_string(setup.width) + "x" +
+               std::to_string(setup.height) + " px");
+    if (!all_finite({&in.fx, 4}))
+        refuse("the intrinsics' focal lengths and principal point must be finite");
+    if (!(in.fx > 0) || !(in.fy > 0))
+        refuse("the intrinsics' focal lengths must be above 0");
     const std::uint32_t count = in.coefficient_count;
     const bool fits = in.distortion == ARHOST_DISTORTION_NONE ? count == 0
                       : in.distortion == ARHOST_DISTORTION_BROWN
                           ? count == 4 || count == 5 || count == 8 || count == 12
                       : in.distortion == ARHOST_DISTORTION_FISHEYE ? count == 4
                                                                    : false;
-    if (!fits || !all_finite({in.coefficients, count}))
-        refuse("the distortion model, or the number or values of its coefficients, is invalid");
-    if (setup.scene->magic != ARHOST_SCENE_MAGIC || setup.scene->version != ARHOST_SCENE_VERSION)
-        refuse("the scene must be an arena of version " + std::to_string(ARHOST_SCENE_VERSION));
+    if (!fits)
+        refuse("distortion model " + std::to_string(in.distortion) + " with " + std::to_string(count) +
+               " coefficients is not supported (arhost/camera.h)");
+    if (!all_finite({in.coefficients, count}))
+        refuse("the distortion coefficients must be finite");
+    if (setup.scene->magic != ARHOST_SCENE_MAGIC)
+        refuse("the scene is not an arena: its magic number is wrong (arhost/scene.h)");
+    if (setup.scene->version != ARHOST_SCENE_VERSION)
+        refuse("the scene's arena has version " + std::to_string(setup.scene->version) + ", but version " +
+               std::to_string(ARHOST_SCENE_VERSION) + " is required");
 }
 
 bool same_view(const arhost_camera &a, const arhost_camera &b) {
@@ -57,16 +67,16 @@ bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
 
 Pose::Pose(const arhost_camera &camera) {
     if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
-        refuse("the camera's eye, look_at or up is not finite");
-    constexpr double limit_mm = 1e12; // farther rays exceed the range of float, or of Embree
+        refuse("the camera's eye, look_at and up must be finite");
+    constexpr double limit_mm = 1e12; // farther away, numbers exceed the range of float or of Embree
     if (std::any_of(camera.eye, camera.eye + 3, [](double number) { return std::abs(number) > limit_mm; }))
-        refuse("the camera's eye is beyond 1e12 mm");
+        refuse("the camera's eye must be within 1e12 mm of the world origin along each axis");
     eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
     const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
     const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};
     const Vec3d u = cross(up, w);
     if (!(length(w) > 0))
-        refuse("the camera's look_at equals its eye");
+        refuse("the camera's look_at must differ from its eye");
     if (!(length(u) > 1e-9 * length(up) * length(w)))
         refuse("the camera's up is parallel to its view direction");
     forward = w * (-1 / length(w));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Validation of setups and cameras, and the camera's axes in the world. Invalid input throws arhost::Failure with
-// ARHOST_STATUS_ERROR_INVALID_ARGUMENT.
+// Validates setups and cameras, and computes the camera's axes in world space. Functions throw arhost::Failure with
+// ARHOST_STATUS_ERROR_INVALID_ARGUMENT if their input is invalid.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -12,9 +12,9 @@ namespace arhost::raytracer_common {
 void check_setup(const arhost_raytracer_setup &setup);
 
 bool same(const arhost_intrinsics &a, const arhost_intrinsics &b);
-bool same_view(const arhost_camera &a, const arhost_camera &b); // eye, look_at and up
+bool same_view(const arhost_camera &a, const arhost_camera &b); // compares eye, look_at and up only
 
-// The camera's axes in the world, as unit vectors: x right, y down, z forward; the eye in mm.
+// The camera's eye in mm, and its axes as unit vectors: x right, y down, z forward. All are in world space.
 struct Pose {
     shading::Vec3T<double> eye, right, down, forward;
 

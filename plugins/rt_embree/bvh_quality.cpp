@@ -8,7 +8,7 @@
 namespace rt_embree {
 namespace {
 
-constexpr std::size_t group_size = 16, max_samples = 1024; // triangles
+constexpr std::size_t group_size = 16, max_samples = 1024; // numbers of triangles
 
 struct Bounds {
     float low[3], high[3];
@@ -45,7 +45,7 @@ Bounds bounds_of(const MeshView &mesh, std::uint32_t triangle) {
     return bounds;
 }
 
-// Inserts two zeros after each of ten bits.
+// Inserts two zeros after each of the ten bits.
 std::uint32_t spread(std::uint32_t bits) {
     bits = (bits | bits << 16) & 0x030000ff;
     bits = (bits | bits << 8) & 0x0300f00f;
@@ -53,7 +53,7 @@ std::uint32_t spread(std::uint32_t bits) {
     return (bits | bits << 2) & 0x09249249;
 }
 
-// A sample of the triangles, ordered along a Morton curve.
+// Returns the indices of sampled triangles, ordered along a Morton curve.
 std::vector<std::uint32_t> morton_order(const MeshView &mesh) {
     const auto stride =
         std::max<std::uint32_t>(1, static_cast<std::uint32_t>((mesh.triangle_count + max_samples - 1) / max_samples));
@@ -81,6 +81,7 @@ std::vector<std::uint32_t> morton_order(const MeshView &mesh) {
     return order;
 }
 
+// Returns half the total area of the bounding boxes of groups of `group_size` consecutive triangles in `order`.
 double area_of_groups(const MeshView &mesh, const std::vector<std::uint32_t> &order) {
     double sum = 0;
     for (std::size_t first = 0; first < order.size(); first += group_size) {

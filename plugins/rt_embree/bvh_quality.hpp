@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Estimates how much a deforming mesh's BVH has degraded: a refit keeps its topology and only updates its boxes.
+// Estimates how much the BVH of a deforming mesh has degraded. A refit updates the BVH's boxes but keeps its
+// topology, so the BVH gets worse as triangles move apart.
 #pragma once
 
 #include <cstddef>
@@ -9,25 +10,26 @@
 
 namespace rt_embree {
 
-// Strides are in bytes.
+// The triangles of a mesh. Strides are in bytes.
 struct MeshView {
     const std::byte *positions, *triangles;
     std::uint32_t position_stride, triangle_stride, triangle_count;
 };
 
 // The traversal cost of a BVH is proportional to the area of its boxes (SAH; MacDonald and Booth, Heuristics for Ray
-// Tracing Using Space Subdivision, 1990). Embree's boxes are not accessible, so this compares bounding boxes of
-// groups of triangles that were neighbours at the last build with those of triangles that are neighbours now, as a
-// new BVH would group them. It samples about a thousand triangles, so that the cost does not depend on the mesh size.
+// Tracing Using Space Subdivision, 1990). Embree does not expose its boxes. Therefore this class groups neighbouring
+// triangles itself, once at each build and once for the current positions, and compares the areas of the groups'
+// bounding boxes. It uses a sample of about a thousand triangles, so its run time does not depend on the mesh size.
 class BvhQuality {
 public:
-    // Records the current neighbourhood of triangles as that of a new BVH.
+    // Call when the BVH is built: groups the triangles by their current positions.
     void record_build(const MeshView &mesh);
-    // Box area of the recorded groups relative to that of new groups: about 1 if nothing has changed.
+    // Returns the total box area of the groups recorded at the last build, divided by that of newly formed groups.
+    // The result is about 1 if the mesh has not changed.
     double degradation(const MeshView &mesh) const;
 
 private:
-    std::vector<std::uint32_t> order_; // sampled triangles along a Morton curve at the last build
+    std::vector<std::uint32_t> order_; // the sampled triangles, in their order along a Morton curve at the last build
 };
 
 } // namespace rt_embree

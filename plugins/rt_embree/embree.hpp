@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Differences between Embree 3 (Debian 12) and Embree 4.
+// Hides the differences between the interfaces of Embree 3 (in Debian 12) and Embree 4.
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>) && !defined(ARHOST_EMBREE_3)
@@ -12,12 +12,13 @@
 #include <cstddef>
 #include <type_traits>
 
-// Always inline: the kernels are compiled for several instruction sets and must not share code.
+// These functions must always be inlined: the kernel is compiled once per instruction set, and the copies must not
+// share code.
 #define RT_EMBREE_INLINE inline __attribute__((always_inline))
 
 namespace rt_embree {
 
-// Per-call context, passed through to the geometries' callbacks.
+// The context of one call of Embree, which passes it to the geometries' filter callbacks.
 struct Query {
 #if RTC_VERSION_MAJOR >= 4
     RTCRayQueryContext context;
@@ -48,8 +49,8 @@ RT_EMBREE_INLINE const Query &query_of(const RTCFilterFunctionNArguments &argume
     return *reinterpret_cast<const Query *>(arguments.context);
 }
 
-// Embree's packet width on this processor. It splits wider packets into single rays (Embree 4), or into streams that
-// trace the invalid rays as well (Embree 3).
+// Returns the number of rays in Embree's native packets on this processor. Wider packets are slow: Embree 4 splits
+// them into single rays, and Embree 3 into streams that also trace the inactive rays.
 inline int native_packet_width(RTCDevice device) {
     return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
            : rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
@@ -58,7 +59,7 @@ inline int native_packet_width(RTCDevice device) {
 
 namespace detail {
 
-// Calls rtcIntersect<n> or rtcOccluded<n>.
+// Calls `function`, which is an rtcIntersect<n> or rtcOccluded<n>.
 template <auto function, class Rays>
 RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays &rays) {
 #if RTC_VERSION_MAJOR >= 4
@@ -78,9 +79,10 @@ RT_EMBREE_INLINE void trace(const int *valid, RTCScene scene, Query &query, Rays
 #endif
 }
 
-// The same for 16 rays in narrower packets. Packets are rows of 4-byte values, one per ray; only the rows that Embree
-// reads (the ray, and the hit from geomID on) or writes (tfar, the hit) are copied. A row is copied as one register:
-// the processor does not forward two stores to one load.
+// Traces a packet of 16 rays in narrower packets of type Part. A packet consists of rows of 4-byte values, with one
+// value per ray. Only the rows that Embree reads (the ray, and the hit from geomID on) are copied to the narrow
+// packet, and only the rows that it writes (tfar and the hit) are copied back. Each row is copied as one register,
+// because the processor cannot forward two stores to one load.
 template <auto function, class Part, class Rays>
 RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &query, Rays &rays) {
     constexpr int parts = sizeof(Rays) / sizeof(Part), width = 16 / parts;
@@ -115,7 +117,8 @@ RT_EMBREE_INLINE void trace_in_parts(const int *valid, RTCScene scene, Query &qu
 
 } // namespace detail
 
-// `valid`: 16 ints, −1 for active rays; 64-byte aligned, like `rays`.
+// Finds the closest hits of 16 rays. `valid`: 16 ints, −1 for active rays and 0 for others. Both `valid` and `rays`
+// must be aligned to 64 bytes.
 RT_EMBREE_INLINE void intersect16(const int *valid, RTCScene scene, int packet_width, Query &query,
                                   RTCRayHit16 &rays) {
     if (packet_width == 16)
@@ -126,6 +129,7 @@ RT_EMBREE_INLINE void intersect16(const int *valid, RTCScene scene, int packet_w
         detail::trace_in_parts<rtcIntersect4, RTCRayHit4>(valid, scene, query, rays);
 }
 
+// Sets `tfar` of the active rays that hit anything to −∞.
 RT_EMBREE_INLINE void occluded16(const int *valid, RTCScene scene, int packet_width, Query &query, RTCRay16 &rays) {
     if (packet_width == 16)
         detail::trace<rtcOccluded16>(valid, scene, query, rays);

@@ -60,7 +60,8 @@ Box empty_box() {
     return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
 }
 
-// Bounding box of points `stride` bytes apart; spheres have their radius as 4th component.
+// Returns the bounding box of `count` points that are `stride` bytes apart. If `spheres`, the fourth component of
+// each point is the radius of a sphere around it.
 Box box_of(const std::byte *points, std::uint32_t count, std::uint32_t stride, bool spheres) {
     Box box = empty_box();
     for (std::uint32_t i = 0; i < count; ++i, points += stride) {
@@ -80,7 +81,7 @@ Box local_box(const arhost_scene &arena, const arhost_object &object) {
                   geometry.type == ARHOST_GEOMETRY_SPHERES);
 }
 
-// Bounding box of the transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
+// Returns the bounding box of a transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
 Box transformed(const Box &local, const float *m) {
     if (local.min[0] > local.max[0])
         return local;
@@ -100,8 +101,8 @@ bool is_instance(const arhost_object &object) {
     return object.deforms || object.moves || !is_identity(object.world_from_object);
 }
 
-// A separate BVH keeps catcher rays from traversing all other triangles, but a scanned room should not be built
-// twice.
+// Whether catchers get an additional BVH of their own. It spares the rays that search for catchers the traversal of
+// all other triangles. It is not worth building if catchers, such as a scanned room, make up most of the scene.
 bool needs_catcher_bvh(const arhost_scene &arena) {
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     std::uint64_t catcher_triangles = 0, all_triangles = 0;
@@ -119,7 +120,7 @@ bool needs_catcher_bvh(const arhost_scene &arena) {
     return any_catcher && 8 * catcher_triangles <= all_triangles;
 }
 
-// Rounded to an 8-bit code, so that the mean over several samples rounds to the same code.
+// Rounds `alpha` to a multiple of 1/255, so that the mean over several samples yields the same 8-bit code.
 float quantized_alpha(float alpha) {
     return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
@@ -146,13 +147,13 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
           RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, RTC_DEVICE_PROPERTY_POINT_GEOMETRY_SUPPORTED})
         if (!rtcGetDeviceProperty(device_.get(), property))
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                          "this build of Embree lacks ray masks, filter functions, triangles "
-                          "or points; install one built with default options");
+                          "this build of Embree lacks one of ray masks, filter functions, "
+                          "triangles and points; install one built with default options");
 
     const auto from = elements<arhost_object>(arena, arena.objects);
     const bool anything_moves =
         std::any_of(from.begin(), from.end(), [](const arhost_object &o) { return o.moves || o.deforms; });
-    // Static objects get their own scene, which is not rebuilt when others move.
+    // If any object moves, static objects get their own scene, which is not rebuilt for each frame.
     root_ = new_scene(anything_moves ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE);
     if (anything_moves)
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
@@ -242,7 +243,8 @@ void EmbreeScene::move(const arhost_motion &motion) {
 }
 
 void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
-    // Above this, tracing a few frames through the refitted BVH costs more than a rebuild (rt-embree-refit).
+    // If the BVH has degraded more than this, tracing a few frames through a refitted BVH costs more than rebuilding
+    // it (measured with rt-embree-refit).
     constexpr double max_degradation = 1.3;
     Object &object = objects_[deformed.object];
     object.positions = deformed.positions;
@@ -268,7 +270,7 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
         ++rebuilds_;
     }
     const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
-    rtcCommitGeometry(instance); // its bounds have changed
+    rtcCommitGeometry(instance); // makes Embree notice that the instance's bounds have changed
     placements_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
     update_bounds(deformed.object);
 }
@@ -315,7 +317,8 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     Deforming &state = deforming_[number];
     state.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
-    // Only at low quality does Embree give the geometry its own BVH, which can be refitted.
+    // At low build quality, Embree gives each geometry its own BVH, which can be refitted; at higher quality it does
+    // not.
     rtcSetSceneBuildQuality(state.scene.get(), RTC_BUILD_QUALITY_LOW);
     state.geometry = new_geometry(number);
     rtcSetGeometryMask(state.geometry.get(), all_masks);
@@ -363,9 +366,9 @@ RTCScene EmbreeScene::instanced_scene(std::uint32_t number) {
 }
 
 void EmbreeScene::commit(RTCScene scene) const {
-    const auto stop_if_cancelled = [&] { // Embree builds small scenes without calling the progress monitor
+    const auto stop_if_cancelled = [&] { // needed because Embree does not call the progress monitor for small scenes
         if (host_.cancelled())
-            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while building the acceleration structure");
     };
     stop_if_cancelled();
     rtcSetSceneProgressMonitorFunction(scene, report_build, const_cast<arhost::Host *>(&host_));
@@ -375,7 +378,7 @@ void EmbreeScene::commit(RTCScene scene) const {
     check();
 }
 
-// Throws the thread's first Embree error since the last call.
+// Throws if an Embree function that this thread called since the last check() has failed. Reports the first error.
 void EmbreeScene::check() const {
     switch (const RTCError error = rtcGetDeviceError(device_.get())) {
     case RTC_ERROR_NONE:
@@ -383,11 +386,11 @@ void EmbreeScene::check() const {
     case RTC_ERROR_OUT_OF_MEMORY:
         throw std::bad_alloc();
     case RTC_ERROR_CANCELLED:
-        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while the acceleration structure was built");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while building the acceleration structure");
     case RTC_ERROR_UNSUPPORTED_CPU:
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "Embree does not support this processor");
     default:
-        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Embree reports error " + std::to_string(error));
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Embree reports error code " + std::to_string(error));
     }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Embree scenes of an arena. Embree's buffers lie in the arena; nothing is copied.
+// Builds Embree scenes from a scene's arena (arhost/scene.h). Embree's buffers point into the arena; no vertex data
+// is copied.
 #pragma once
 
 #include "bvh_quality.hpp"
@@ -31,19 +32,21 @@ struct Box {
 
 class EmbreeScene {
 public:
-    // Builds the acceleration structures. `arena` outlives this.
+    // Builds the acceleration structures. `arena` must outlive this object.
     EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host);
 
     const Scene &view() const { return view_; }
-    // World bounding boxes, by object. Empty for occluders, which never give a pixel alpha.
+    // Bounding boxes in world space, one per object. The boxes of occluders are empty: their pixels always have alpha
+    // 0.
     const std::vector<Box> &visible_boxes() const { return visible_boxes_; }
 
-    // Updates transforms and deformed meshes. `motion` must stay valid until the next call or the end of tracing.
+    // Updates the transforms of moved objects and the deformed meshes. `motion` must stay valid until the next call
+    // or until this object is no longer used.
     void move(const arhost_motion &motion);
-    std::uint64_t rebuilds() const { return rebuilds_; } // full BVH rebuilds of deforming objects
+    std::uint64_t rebuilds() const { return rebuilds_; } // number of full rebuilds of deforming objects' BVHs so far
 
 private:
-    // A deforming object, in its own scene.
+    // A deforming object. It has its own Embree scene, which the root scene instances.
     struct Deforming {
         SceneHandle scene;
         GeometryHandle geometry;
@@ -62,17 +65,18 @@ private:
     const arhost_scene &arena_;
     arhost::Host host_;
     bool robust_;
-    std::vector<std::unique_ptr<HitFilter>> hit_filters_; // Embree holds their addresses
+    std::vector<std::unique_ptr<HitFilter>> hit_filters_; // on the heap: Embree holds their addresses
     DeviceHandle device_;
+    // The Embree scene of a transformed object; shared by objects with the same geometry and filter.
     struct Instanced {
         std::uint32_t geometry;
         HitFilter filter;
         SceneHandle scene;
     };
     std::vector<Instanced> instanced_;
-    std::map<std::uint32_t, Deforming> deforming_; // by object
-    SceneHandle static_, root_;                    // static_ only if something moves
-    SceneHandle catchers_;                         // only if needs_catcher_bvh()
+    std::map<std::uint32_t, Deforming> deforming_; // key: object index
+    SceneHandle static_, root_;                    // static_ is NULL unless an object moves or deforms
+    SceneHandle catchers_;                         // NULL unless needs_catcher_bvh()
     struct Placement {
         Box local;
         std::array<float, 12> world_from_object;

@@ -22,13 +22,14 @@ float alpha_of_texel(const Texture &texture, std::int32_t x, std::int32_t y) {
                : static_cast<float>(static_cast<const std::uint8_t *>(texture.texels)[at]) / 255;
 }
 
-// Texture coordinate in texels, range-reduced so that the texel index fits an int.
+// Converts a texture coordinate to texels. First reduces it to an equivalent one near 0, so that the texel index fits
+// an int.
 float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
     const float reduced = wrap == ARHOST_WRAP_CLAMP ? std::clamp(t, -1.0f, 2.0f) : t - 2 * std::floor(t / 2);
     return reduced * static_cast<float>(size) - 0.5f;
 }
 
-// Bilinear, as the kernel's sample_texture.
+// Samples the texture's alpha with bilinear filtering, like sample_texture() in kernel/texture.inl.
 float sampled_alpha(const Texture &texture, float u, float v) {
     const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
     const float left = std::floor(x), top = std::floor(y);

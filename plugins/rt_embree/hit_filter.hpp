@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Embree filter callback. Rejects hits where the colour texture's alpha is below the material's cutoff, and primary
-// rays' hits on the back faces of catchers.
+// The filter callback that Embree calls for each hit. It rejects hits where the alpha of the colour texture is below
+// the material's cutoff, and hits on back faces of catchers if the query culls them (Query::cull_catcher_back_faces).
 #pragma once
 
 #include "kernel.hpp"
 
 namespace rt_embree {
 
-// User data of a geometry. The pointers must outlive the geometry.
+// The callback's data for one geometry. The pointers must stay valid as long as the geometry exists.
 struct HitFilter {
     bool is_catcher = false;
-    float alpha_cutoff = 0; // 0: no alpha test; the pointers below are NULL
+    float alpha_cutoff = 0; // 0: no alpha test, and the pointers below are NULL
     const Texture *colour = nullptr;
     const int *indices = nullptr;
     const float *texcoords = nullptr;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Input of the kernel. Plain data, since the kernel is compiled for several instruction sets (kernel/packet.hpp).
+// The kernel's input. It consists of plain data only: the kernel is compiled once per instruction set, and must not
+// share inline functions with other code (kernel/packet.hpp).
 #pragma once
 
 #include "embree.hpp"
@@ -14,7 +15,7 @@
 
 namespace rt_embree {
 
-// Bits of Embree's ray masks: which objects a ray can hit.
+// Bits of Embree's ray and geometry masks. A ray can hit an object only if their masks have a common bit.
 enum RoleMask : unsigned {
     opaque_mask = 1, // virtual objects except glass
     glass_mask = 2,  // virtual objects of glass
@@ -24,41 +25,42 @@ enum RoleMask : unsigned {
     all_masks = 15
 };
 
-// Indexed by Embree's geometry or instance ID.
+// An object of the scene. `Scene::objects` is indexed by Embree's geometry or instance ID.
 struct Object {
     const arhost_material *material;
     arhost_role role;
     bool has_transform;
-    // Column-major, object to world: for directions, and for normals (inverse transpose).
+    // 3×3 matrices from object to world space, column-major. `transform` is for directions; `normal_transform`, its
+    // inverse transpose, is for normals.
     float transform[9], normal_transform[9];
-    float reach[3];         // raytracer_common/arena.hpp
-    const int *indices;     // of triangles
-    const float *positions; // of vertices
+    float reach[3];         // result of object_extent() (raytracer_common/arena.hpp)
+    const int *indices;     // three vertex indices per triangle
+    const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
     const float *texcoords; // NULL if absent
     std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
 };
 
 struct Texture {
-    const void *texels; // RGBA8, sRGB or linear, or four floats
+    const void *texels; // per texel: RGBA with 8 bits per channel (sRGB or linear), or four floats
     std::int32_t width, height;
     arhost_texel_format format;
     arhost_wrap wrap_u, wrap_v;
 };
 
 struct Environment {
-    const Texture *image; // NULL: no environment
+    const Texture *image; // NULL if the scene has no environment
     float intensity;
     float environment_from_world[9];
-    const float *rows, *columns; // arhost/scene.h
+    const float *rows, *columns; // cumulative sums for importance sampling (arhost/scene.h)
 };
 
 struct Scene {
     RTCScene root;
-    RTCScene catchers;         // only the catchers, or the same as `root`
-    std::int32_t packet_width; // native to Embree on this processor
-    // The instance of all static objects, or −2 if none. Static objects are numbered by geometry ID, others by
-    // instance ID.
+    RTCScene catchers;         // contains only the catchers; may be the same as `root`
+    std::int32_t packet_width; // number of rays in Embree's native packets on this processor
+    // Instance ID of the scene that contains all static objects, or −2 if there is no such scene. A static object's
+    // index in `objects` is its geometry ID; a moving object's index is its instance ID.
     std::int32_t static_instance;
     const Object *objects;
     const Texture *textures;
@@ -72,13 +74,13 @@ struct Scene {
     bool has_catchers, has_occluders, has_glass;
     bool has_instances;
     const arhost::shading::Srgb8Table *srgb8;
-    const float *linear_of_srgb8; // 256
+    const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };
 
-// Directions in camera axes (x right, y down, z forward), in the kernel's order: by tile, then by block of 4×4
-// pixels. A block is 16 floats each of x, y and, unless it is always 1, z; with several samples per pixel, followed
-// by the same of the derivatives along image rows and along columns, per px. x is NaN for pixels that no direction
-// maps to.
+// Ray directions in camera axes (x right, y down, z forward), stored tile by tile, and within a tile in blocks of 4×4
+// pixels. A block has an array of 16 x values, one of 16 y values and, with `dimensions` 3, one of 16 z values; with
+// `dimensions` 2, z is 1. If `has_derivatives`, two more sets of such arrays follow: the derivatives along image
+// rows, then along image columns, per px. x is NaN for pixels to which the lens maps no direction.
 struct Rays {
     const float *blocks;
     std::int32_t dimensions; // 2 or 3
@@ -97,9 +99,9 @@ struct Frame {
     Camera camera;
     const arhost::raytracer_common::Sample *samples;
     std::int32_t sample_count;
-    std::uint32_t first_sample; // samples accumulated before this frame: offset into the random sequences
-    float *history[4];          // NULL, or their sums for the pixels of all tiles (as Scratch::sum)
-    std::int32_t light_samples; // shadow rays per area light
+    std::uint32_t first_sample; // number of samples accumulated before this frame; offset into the random sequences
+    float *history[4];          // sums of accumulated samples, as Scratch::sum but for all tiles; NULL: off
+    std::int32_t light_samples; // shadow rays per shaded point to each area light
     bool single_path;           // glass spawns one random ray instead of two
     std::uint8_t *rgba;
     std::uint32_t stride;
@@ -111,27 +113,28 @@ struct Rectangle {
 
 struct Tile {
     Rectangle pixels;
-    std::size_t first_block; // in Rays::blocks
+    std::size_t first_block; // index of the tile's first block in Rays::blocks
 };
 
 inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_side; // px
 
-// Secondary rays of one depth, in `rows` arrays of `capacity` values.
+// Secondary rays that wait to be traced, all of the same depth. `values` consists of `rows` arrays, each with room
+// for `capacity` rays.
 struct RayQueue {
-    static constexpr int rows = 10; // origin, direction, throughput (floats), pixel index (bits of an int)
+    static constexpr int rows = 10; // origin, direction, throughput (three floats each), pixel index (an int's bits)
     float *values;
     std::int32_t count, capacity;
 };
 
-// A thread's working memory for one tile. Pixels are in block order.
+// A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
-    float *radiance[3], *alpha; // of one sample: linear, straight alpha
-    float *sum[4];              // of all samples: sRGB-encoded, premultiplied; alpha
-    RayQueue *queues;           // by depth, the scene's max_depth + 1 of them
+    float *radiance[3], *alpha; // of the current sample: linear radiance, straight alpha
+    float *sum[4];              // over all samples: sRGB-encoded, premultiplied colour; alpha
+    RayQueue *queues;           // one queue per depth, from 0 to Scene::max_depth
 };
 
-// Renders a tile. Returns the bounding rectangle of its non-zero alphas, rounded out to blocks of 4×4 pixels; empty:
-// x1 <= x0.
+// Renders a tile. Returns the bounding rectangle of the pixels with non-zero alpha, enlarged to whole blocks of 4×4
+// pixels. If there are no such pixels, the rectangle has x1 <= x0.
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
 struct Kernel {

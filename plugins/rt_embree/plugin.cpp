@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The plugin: options in, images out.
+// The plugin's entry points and options.
 #include "renderer.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -20,7 +20,7 @@ public:
         settings_.accumulate = options.boolean("accumulate");
         settings_.single_path = options.text("glass") == "path";
         settings_.instruction_set = options.text("instruction_set");
-        choose_kernel(settings_.instruction_set); // fail early if unsupported
+        choose_kernel(settings_.instruction_set); // throws now rather than in start() if unsupported
     }
 
     void start(const arhost_raytracer_setup &setup) {
@@ -54,18 +54,23 @@ constexpr const char *glass[] = {"tree", "path", nullptr};
 constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, evenly spread over it.", 1, 256),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Primary rays per pixel, evenly spread over the pixel.", 1,
+                   256),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
-                   "Shadow rays per primary or secondary ray to each area light and to the environment.", 1, 256),
-    arhost::option(ARHOST_OPTION_BOOL, "accumulate", "false",
-                   "Average over frames while camera and scene are static; images then depend on the previous ones."),
+                   "Shadow rays from each shaded point to each area light and to the environment.", 1, 256),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "accumulate", "false",
+        "Average over frames while the camera and scene are static; each image then depends on earlier frames."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
-                   "Rays traced at glass: 'tree': reflected and refracted; 'path': a random one of them.", 0, 0,
-                   glass),
+                   "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
+                   "chosen at random.",
+                   0, 0, glass),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
-    arhost::option(ARHOST_OPTION_BOOL, "robust", "false", "Watertight at shared triangle edges; about 10 % slower."),
+    arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
+                   "Prevent rays from passing between triangles that share an edge (watertight); about 10 % slower."),
     arhost::option(ARHOST_OPTION_TEXT, "instruction_set", "auto",
-                   "Vector instructions used for shading; auto: the widest available.", 0, 0, instruction_sets)};
+                   "Vector instructions used for shading; 'auto': the widest that the processor supports.", 0, 0,
+                   instruction_sets)};
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_RAYTRACER,
@@ -74,7 +79,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "CPU ray tracer: packets of 16 rays traced by Intel Embree.",
+                                          "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
                                           ARHOST_CAPABILITY_LENS_DISTORTION,
                                           std::size(options),
                                           options,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The ray direction of each pixel, with the lens distortion undone; computed once from the intrinsics.
+// The ray direction of each pixel, corrected for lens distortion. Computed once from the camera intrinsics.
 #pragma once
 
 #include "kernel.hpp"
@@ -13,10 +13,10 @@
 
 namespace rt_embree {
 
-// Bounding rectangle of a tile or a bounding box on the plane z = 1 in camera axes.
+// The bounding rectangle of the projection of a tile, or of a 3D bounding box, onto the plane z = 1 in camera axes.
 struct Window {
     double x0, y0, x1, y1;
-    bool unbounded; // extends behind the camera: no rectangle on that plane contains it
+    bool unbounded; // part of the tile or box is behind the camera, so its projection is unbounded
 
     bool intersects(const Window &other) const {
         return unbounded || other.unbounded || (x0 <= other.x1 && other.x0 <= x1 && y0 <= other.y1 && other.y0 <= y1);
@@ -29,10 +29,10 @@ public:
 
     Rays rays() const { return {blocks_.data(), dimensions_, has_derivatives_}; }
     const std::vector<Tile> &tiles() const { return tiles_; }
-    // Of a tile; empty (x1 < x0) if none of its pixels has a ray.
+    // The window of a tile. It is empty (x1 < x0) if no pixel of the tile has a ray.
     const Window &window(std::size_t tile) const { return windows_[tile]; }
 
-    // The direction at a pixel's centre; x is NaN if the pixel has no ray.
+    // Returns the ray direction at a pixel's centre. x is NaN if the pixel has no ray.
     arhost::shading::Vec3T<float> direction(std::int32_t x, std::int32_t y) const;
 
 private:

@@ -23,7 +23,8 @@ using Vec3d = arhost::shading::Vec3T<double>;
     throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, message);
 }
 
-// The part of the plane z = 1 that a box covers; empty if it lies behind the camera.
+// Returns the bounding rectangle of a box projected onto the plane z = 1; empty if the whole box is behind the
+// camera.
 Window window_of(const Box &box, const Pose &pose) {
     const double infinity = std::numeric_limits<double>::infinity();
     Window window{infinity, infinity, -infinity, -infinity, false};
@@ -38,7 +39,7 @@ Window window_of(const Box &box, const Pose &pose) {
             continue;
         }
         const double x = dot(p, pose.right) / z, y = dot(p, pose.down) / z;
-        // Exceeds single-precision errors of a ray's direction and origin.
+        // The margin exceeds the error of single-precision ray directions and origins.
         const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(pose.eye) / z;
         window.x0 = std::min(window.x0, x - margin);
         window.y0 = std::min(window.y0, y - margin);
@@ -49,7 +50,8 @@ Window window_of(const Box &box, const Pose &pose) {
     return window;
 }
 
-// By then, noise and the rounding of float sums are below half an 8-bit code; the image no longer changes.
+// Accumulation stops at this number of samples. The remaining noise and the rounding errors of the float sums are
+// then below half an 8-bit code, so more samples would not change the image.
 constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
@@ -87,13 +89,14 @@ Kernel choose_kernel(const std::string &instruction_set) {
     if (requested("base"))
         return {base::render_tile, "base"};
     throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                  "option 'instruction_set': this processor or build does not support " + instruction_set +
-                      "; set it to 'auto'");
+                  "option 'instruction_set': this processor or this build of rt_embree does not support '" +
+                      instruction_set + "'; use 'auto'");
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
-    // Up to two queued rays per pixel after the first hit, fewer than three packets after others (scatter.inl).
-    // Packets are read whole, so each row needs one more packet.
+    // The first queue holds up to two rays per pixel, as glass reflects and refracts; all others hold fewer than
+    // three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled queues, so
+    // each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = 8;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
@@ -125,10 +128,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!same(camera.intrinsics, intrinsics_))
-        refuse("the camera's intrinsics differ from those passed to start");
+        refuse("the camera's intrinsics differ from the intrinsics passed to start");
     if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
         image.stride < 4 * image.width)
-        refuse("the output image's size differs from the one passed to start");
+        refuse("the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
     const Pose pose(camera);
     if (motion)
         scene_.move(*motion);
@@ -176,7 +179,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     });
     if (host_.cancelled()) {
         history_camera_.reset(); // the sums are incomplete
-        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while an image was traced");
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
     }
     if (!history_.empty())
         history_samples_ += static_cast<std::uint32_t>(samples_.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders an image for a camera: selects the visible tiles and distributes them over threads.
+// Renders an image: selects the tiles in which objects can be visible, and distributes them over threads.
 #pragma once
 
 #include "embree_scene.hpp"
@@ -19,13 +19,13 @@ struct Settings {
     std::uint32_t samples = 1; // per pixel
     unsigned threads = 0;      // 0: one per processor
     bool robust = false;
-    std::int32_t light_samples = 4; // shadow rays per ray and area light
-    bool accumulate = false;        // average over frames while camera and scene are static
+    std::int32_t light_samples = 4; // shadow rays per shaded point to each area light
+    bool accumulate = false;        // average over frames while the camera and scene are static
     bool single_path = false;       // glass spawns one random ray instead of two
     std::string instruction_set = "auto";
 };
 
-// Owns a thread's `Scratch`.
+// Owns the memory of a thread's `Scratch`.
 class ScratchMemory {
 public:
     explicit ScratchMemory(std::uint32_t max_depth);
@@ -41,8 +41,8 @@ class Renderer {
 public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host);
 
-    // Returns a rectangle that contains all non-zero alphas; empty: x1 <= x0. `motion` may be NULL: nothing has
-    // moved.
+    // Returns a rectangle that contains all pixels with non-zero alpha; if there are none, it has x1 <= x0. `motion`
+    // is NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
     const EmbreeScene &scene() const { return scene_; }
 
@@ -56,19 +56,20 @@ private:
     ThreadPool threads_;
     RayTable ray_table_;
     std::uint32_t samples_per_frame_;
-    std::vector<arhost::raytracer_common::Sample> samples_; // of this frame
+    std::vector<arhost::raytracer_common::Sample> samples_; // sample positions of the current frame
     EmbreeScene scene_;
     std::vector<ScratchMemory> scratch_; // one per thread
     std::int32_t light_samples_;
     bool single_path_;
 
-    // Accumulation: sample sums so far, and the camera they belong to.
-    std::vector<float> history_; // empty unless accumulating
-    std::uint32_t history_samples_ = 0;
-    std::optional<arhost_camera> history_camera_;
+    // State of the option `accumulate`.
+    std::vector<float> history_;                  // sums of the samples so far; empty unless accumulating
+    std::uint32_t history_samples_ = 0;           // number of samples in the sums
+    std::optional<arhost_camera> history_camera_; // the camera of the sums; empty: they are invalid
 };
 
-// The named kernel, or for "auto" the widest that this processor supports. Throws Failure if unsupported.
+// Returns the kernel for `instruction_set`; "auto" selects the one with the widest registers that this processor
+// supports. Throws Failure if the processor or this build does not support `instruction_set`.
 Kernel choose_kernel(const std::string &instruction_set);
 
 } // namespace rt_embree

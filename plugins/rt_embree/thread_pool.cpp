@@ -10,7 +10,7 @@
 namespace rt_embree {
 
 #if defined(__SSE2__)
-// Flush-to-zero and denormals-are-zero (Intel SDM vol. 1, 10.2.3).
+// 0x8040 sets the bits flush-to-zero and denormals-are-zero (Intel SDM vol. 1, 10.2.3).
 FlushDenormals::FlushDenormals() : before_(_mm_getcsr()) {
     _mm_setcsr(before_ | 0x8040);
 }
@@ -34,14 +34,14 @@ void ThreadPool::for_each(std::size_t count, const Work &work) {
         std::lock_guard lock(mutex_);
         work_ = &work;
         count_ = count;
-        // Relaxed: the mutex publishes it to the helpers.
+        // Relaxed: the mutex publishes the value to the helpers.
         next_.store(0, std::memory_order_relaxed);
         busy_ = helpers_.size();
         ++round_;
     }
     started_.notify_all();
     run_items(0);
-    // Pairs with each helper's unlock in run_helper(), which publishes its results.
+    // Locking synchronizes with each helper's unlock in run_helper(), which publishes the helper's results.
     std::unique_lock lock(mutex_);
     done_.wait(lock, [this] { return busy_ == 0; });
 }
@@ -61,7 +61,7 @@ void ThreadPool::run_helper(const std::stop_token &stop, std::size_t thread) {
 
 void ThreadPool::run_items(std::size_t thread) {
     const FlushDenormals flush;
-    // Relaxed: fetch_add alone makes each index unique; no other data depends on its order.
+    // Relaxed: fetch_add makes each index unique, and next_ does not publish any other data.
     for (std::size_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < count_;)
         (*work_)(i, thread);
 }

@@ -14,17 +14,18 @@ using arhost::Failure;
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 
-// Refitted structures degrade as meshes deform; measuring by how much would cost more than rebuilding at this rate.
+// Number of refits between rebuilds. Refitted structures degrade as meshes deform; measuring the degradation would
+// cost more than rebuilding at this interval.
 constexpr std::uint32_t max_refits = 60;
 constexpr VkDeviceSize block_size = VkDeviceSize{4} << 20; // bytes
-constexpr VkDeviceSize structure_alignment = 256;          // bytes, by the specification
+constexpr VkDeviceSize structure_alignment = 256;          // bytes, required by the Vulkan specification
 
 constexpr VkBufferUsageFlags storage_usage =
     VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
 constexpr VkBufferUsageFlags scratch_usage =
     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
 
-// Makes earlier uploads and builds available to the next build.
+// Inserts a barrier that makes earlier uploads and builds visible to the next build.
 void await_inputs(const VolkDeviceTable &vk, VkCommandBuffer commands) {
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
             VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
@@ -69,7 +70,7 @@ AccelerationStructures::AccelerationStructures(const Device &device, const Submi
                                                const arhost::Host &host)
     : device_(device), submission_(submission), arena_(arena), host_(host), readers_(readers),
       instances_(objects.size()),
-      refits_(max_refits) { // the arena's vertices may differ from every pose: the first update rebuilds
+      refits_(max_refits) { // makes the first update rebuild: the arena's vertices may differ from all poses
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     const auto from = elements<arhost_object>(arena, arena.objects);
     const auto check_limit = [&](std::uint64_t count, std::uint64_t limit, const char *what) {
@@ -77,9 +78,9 @@ AccelerationStructures::AccelerationStructures(const Device &device, const Submi
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
                                                                "' traces at most " + std::to_string(limit) + " " +
                                                                what + ", but the scene has " + std::to_string(count) +
-                                                               ": use option 'path': plain, or rt_embree");
+                                                               "; set option 'path' to 'plain', or use rt_embree");
     };
-    // instanceCustomIndex has 24 bits.
+    // An object's index must fit instanceCustomIndex, which has 24 bits.
     check_limit(from.size(), std::min<std::uint64_t>(device.physical().tracing.max_objects, 1u << 24), "objects");
 
     std::size_t moving_size = instances_.size() * sizeof(VkAccelerationStructureInstanceKHR);
@@ -114,16 +115,17 @@ AccelerationStructures::AccelerationStructures(const Device &device, const Submi
         for (std::uint32_t i = 0; i < positions.count; ++i)
             std::memcpy(to + 3 * sizeof(float) * i, first + std::size_t{positions.stride} * i, 3 * sizeof(float));
     }
-    build_moving(); // creates all structures, whose addresses the instances need
+    build_moving(); // creates all structures: the instances need their addresses
     for (std::uint32_t i = 0; i < from.size(); ++i) {
         VkAccelerationStructureInstanceKHR &instance = instances_[i];
         instance.instanceCustomIndex = i;
         instance.mask = objects[i].mask;
-        // The hit group in the shader binding table.
+        // Selects the hit group in the shader binding table: 0 for triangles, 1 for spheres.
         instance.instanceShaderBindingTableRecordOffset = objects[i].flags & is_spheres ? 1 : 0;
         instance.flags = objects[i].flags & has_holes ? VK_GEOMETRY_INSTANCE_FORCE_NO_OPAQUE_BIT_KHR
                                                       : VK_GEOMETRY_INSTANCE_FORCE_OPAQUE_BIT_KHR;
-        const auto structure = bottom_level_.find(from[i].geometry); // absent if empty; rays ignore reference 0
+        const auto structure = bottom_level_.find(
+            from[i].geometry); // absent if the mesh is empty; rays ignore instances with reference 0
         instance.accelerationStructureReference = structure == bottom_level_.end() ? 0 : address(structure->second);
         write_instance(i, from[i].world_from_object);
     }
@@ -180,7 +182,7 @@ VkDeviceAddress AccelerationStructures::address(const Structure &structure) cons
     return device_.functions().vkGetAccelerationStructureDeviceAddressKHR(device_.handle(), &which);
 }
 
-// Builds the structure of a mesh that does not deform, and compacts it.
+// Builds and compacts the structure of a geometry that does not deform.
 void AccelerationStructures::build_static(Structure &structure, const arhost_geometry &geometry) {
     if (host_.cancelled())
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while building acceleration structures");
@@ -245,7 +247,8 @@ void AccelerationStructures::build_static(Structure &structure, const arhost_geo
     submission_.free(commands);
 }
 
-// Creates the structures of deforming meshes, the top-level one, and the commands that build and refit them.
+// Creates the structures of deforming meshes and the top-level structure, and records the command buffers that build
+// and refit them.
 void AccelerationStructures::build_moving() {
     const VkDeviceSize alignment = device_.physical().tracing.scratch_alignment;
     VkDeviceSize scratch_size = 0;
@@ -272,11 +275,12 @@ void AccelerationStructures::build_moving() {
     scratch_ = Buffer(device_, scratch_size + alignment, scratch_usage, Buffer::Place::device);
     refit_ = submission_.new_commands();
     rebuild_ = submission_.new_commands();
-    record_moving(rebuild_, false); // first: validation layers take the order of recording for that of execution
+    record_moving(rebuild_, false); // recorded first: validation layers assume that buffers execute in this order
     record_moving(refit_, true);
 }
 
-// The top-level structure is small and always rebuilt: a refitted one would degrade as objects move apart.
+// Records commands that refit (`refits`) or build the structures of deforming meshes, and rebuild the top-level
+// structure. The latter is never refitted: it is small, and refitting would degrade it as objects move apart.
 void AccelerationStructures::record_moving(VkCommandBuffer commands, bool refits) const {
     const VolkDeviceTable &vk = device_.functions();
     const VkDeviceAddress scratch = aligned(scratch_.address(), device_.physical().tracing.scratch_alignment);

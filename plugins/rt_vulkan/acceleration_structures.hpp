@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The scene in the driver's acceleration structures, for the paths `query` and `pipeline`: a bottom-level structure
-// for each geometry and a top-level one for the objects. The device builds and updates them.
+// The Vulkan acceleration structures of a scene, for the paths `query` and `pipeline`: one bottom-level structure per
+// geometry, and one top-level structure whose instances are the scene's objects. The device builds and updates them.
 #pragma once
 
 #include "device.hpp"
@@ -13,34 +13,36 @@
 
 namespace rt_vulkan {
 
-// Usage of buffers that structures are built from.
+// Usage flags of buffers from which acceleration structures are built.
 inline constexpr VkBufferUsageFlags build_input_usage =
     VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
 
 class AccelerationStructures {
 public:
-    // `objects` are the scene's, in order; their first_index refers to `indices`. `readers`: the pipeline stages that
-    // trace rays. `arena` outlives this.
+    // `objects`: the objects of `arena`, in the same order; their first_index refers to `indices`. `readers`: the
+    // pipeline stages that trace rays. `device`, `submission` and `arena` must outlive this object.
     AccelerationStructures(const Device &device, const Submission &submission, const arhost_scene &arena,
                            std::span<const Object> objects, const Buffer &indices, VkPipelineStageFlags readers,
                            const arhost::Host &host);
 
     VkAccelerationStructureKHR top_level() const { return top_level_.handle.get(); }
 
-    // Writes the new positions; the returned commands update the structures and must run before the next image.
+    // Writes the new transforms and vertices to host memory. Returns a command buffer that updates the structures; it
+    // must run before the next image is traced.
     VkCommandBuffer update(const arhost_motion &motion);
 
 private:
     struct Structure {
         VkAccelerationStructureTypeKHR type;
         VkBuildAccelerationStructureFlagsKHR flags;
-        VkAccelerationStructureGeometryKHR geometry; // of the top level: the instances
-        std::uint32_t count;                         // of triangles, spheres or instances
+        VkAccelerationStructureGeometryKHR geometry; // of the top-level structure: the instances
+        std::uint32_t count;                         // number of triangles, spheres or instances
         AccelerationStructure handle;
         VkDeviceSize scratch_size = 0, scratch_offset = 0;
-        std::size_t vertices_offset = 0; // in `moving_`, if it deforms; else 0
+        std::size_t vertices_offset =
+            0; // of a deforming mesh's vertices in `moving_`, bytes; 0 if it does not deform
     };
-    // Storage is suballocated from blocks, as devices allow only some thousand allocations.
+    // The storage of a structure is a part of a larger block, because devices allow only a few thousand allocations.
     struct Storage {
         VkBuffer buffer;
         VkDeviceSize offset;
@@ -63,14 +65,14 @@ private:
     arhost::Host host_;
     VkPipelineStageFlags readers_;
     std::vector<Buffer> blocks_;
-    VkDeviceSize filled_ = 0;                         // bytes of the last block
-    std::map<std::uint32_t, Structure> bottom_level_; // by geometry
+    VkDeviceSize filled_ = 0;                         // bytes used in the last block
+    std::map<std::uint32_t, Structure> bottom_level_; // key: geometry index
     Structure top_level_{};
-    Buffer moving_; // written by the host: the instances, then the vertices of deforming meshes
+    Buffer moving_; // the host writes it: the instances, followed by the vertices of deforming meshes
     std::vector<VkAccelerationStructureInstanceKHR> instances_;
     Buffer scratch_;
     VkCommandBuffer refit_ = VK_NULL_HANDLE, rebuild_ = VK_NULL_HANDLE;
-    std::uint32_t refits_; // since the last rebuild
+    std::uint32_t refits_; // number of refits since the last rebuild
 };
 
 } // namespace rt_vulkan

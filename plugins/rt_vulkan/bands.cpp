@@ -6,7 +6,7 @@
 namespace rt_vulkan {
 
 void Bands::record(std::uint32_t rows, Milliseconds time) {
-    // At most doubled: the next rows may be more expensive.
+    // The height at most doubles from band to band, because the next rows may be more expensive.
     if (time <= max_time_ / 2)
         rows_ = std::max(rows_, 2 * rows);
     else if (time > max_time_)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The rows of an image per submission. A driver's watchdog takes seconds of GPU work for a hang, and submitted work
-// cannot be cancelled: a slow image is split into bands of rows, whose height follows the last band's duration.
+// Splits slow images into bands of rows, which are submitted one after another. This is necessary because a driver's
+// watchdog mistakes GPU work that takes seconds for a hang, and because submitted work cannot be cancelled. The
+// height of a band depends on the duration of the previous one.
 #pragma once
 
 #include <chrono>
@@ -11,14 +12,15 @@ namespace rt_vulkan {
 
 class Bands {
 public:
-    static constexpr std::uint32_t unit = 8; // rows; bands have a multiple of this, except an image's last
+    static constexpr std::uint32_t unit =
+        8; // rows; the height of each band except an image's last is a multiple of this
     using Milliseconds = std::chrono::duration<double, std::milli>;
 
-    // A band should take `max_time` at most, and at least half of it unless the whole image takes less.
+    // Aims at bands that take between half of `max_time` and `max_time`, or less if the whole image takes less.
     Bands(std::uint32_t image_rows, Milliseconds max_time) : image_rows_(image_rows), max_time_(max_time) {}
-    // Of the next band; the image's last may have fewer.
+    // The number of rows of the next band. The caller reduces it for an image's last band.
     std::uint32_t rows() const { return rows_; }
-    // Reports the time of a band of `rows`, including work submitted with it.
+    // Records that a band of `rows` took `time`, including other work in the same submission.
     void record(std::uint32_t rows, Milliseconds time);
 
 private:

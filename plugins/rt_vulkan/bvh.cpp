@@ -11,14 +11,14 @@ namespace rt_vulkan {
 namespace {
 
 constexpr int bin_count = 16;
-constexpr float traversal_cost = 1; // of a node, relative to a primitive test
+constexpr float traversal_cost = 1; // cost of visiting a node, relative to the cost of an intersection test
 
 float half_area(const Box &box) {
     const float x = box.high[0] - box.low[0], y = box.high[1] - box.low[1], z = box.high[2] - box.low[2];
     return x < 0 ? 0 : x * y + y * z + z * x;
 }
 
-// Twice the centre: sorting and binning need no more.
+// Returns twice the box's centre along `axis`, which is sufficient for sorting and binning.
 float centre(const Box &box, int axis) {
     return box.low[axis] + box.high[axis];
 }
@@ -41,7 +41,7 @@ public:
     Bvh build(int max_depth) {
         struct Task {
             std::uint32_t node, first, count;
-            int depth; // levels allowed below
+            int depth; // maximum number of levels below this node
         };
         std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(boxes_.size()), max_depth}};
         std::uint32_t since_check = 0;
@@ -72,7 +72,8 @@ public:
     }
 
 private:
-    // Partitions a node's boxes and returns the size of the left part; 0: the node is a leaf.
+    // Partitions the boxes of a node. Returns the number of boxes in the left child, or 0 if the node is to be a
+    // leaf.
     std::uint32_t split(std::uint32_t first, std::uint32_t count, int depth, const Box &box) {
         if (count <= 1)
             return 0;
@@ -82,7 +83,7 @@ private:
             const float point[3] = {centre(boxes_[*i], 0), centre(boxes_[*i], 1), centre(boxes_[*i], 2)};
             include(centres, point);
         }
-        // A median split if another could exceed the depth limit.
+        // Splits at the median if an uneven split could make the BVH exceed the depth limit.
         const bool needs_median = static_cast<int>(std::bit_width(count - 1)) >= depth;
         float best_cost = std::numeric_limits<float>::infinity();
         int best_axis = -1, best_bin = 0;

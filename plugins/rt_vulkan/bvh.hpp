@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bounding volume hierarchies for the plain path.
+// Software bounding volume hierarchies, for the path `plain`.
 #pragma once
 
 #include "layout.hpp"
@@ -18,24 +18,25 @@ Box empty_box();
 void include(Box &box, const Box &other);
 void include(Box &box, const float *point);
 
-// Indices are relative to the BVH's first node and first primitive. Children come after their parents.
+// A BVH. Node indices start at 0 for the root; indices in leaves refer to `order`. Children come after their parents.
 struct Bvh {
-    std::vector<Node> nodes;          // at most twice the number of boxes
-    std::vector<std::uint32_t> order; // of the boxes, leaf by leaf
+    std::vector<Node> nodes;          // at most twice as many as there are boxes
+    std::vector<std::uint32_t> order; // the indices of the boxes, leaf by leaf
 };
 
-// Depth limits; their sum fits the shader's stack (trace_plain.glsl).
+// Maximum depths of the top-level BVH and of a mesh's BVH. Their sum must be below the size of the shader's stack
+// (trace_plain.glsl).
 inline constexpr int max_top_depth = 22, max_mesh_depth = 40;
 
-// Binned SAH (I. Wald, On fast Construction of SAH-based Bounding Volume Hierarchies, 2007). `boxes` must not be
-// empty. Calls `check_cancelled` regularly, which may throw.
+// Builds a BVH over `boxes` with the binned SAH (I. Wald, On fast Construction of SAH-based Bounding Volume
+// Hierarchies, 2007). `boxes` must not be empty. Regularly calls `check_cancelled`, which may throw.
 Bvh build_bvh(std::span<const Box> boxes, std::uint32_t max_leaf_size, int max_depth,
               const std::function<void()> &check_cancelled);
 
-// Fits the nodes to moved boxes; the topology stays.
+// Updates the bounds of the nodes to moved `boxes`. The topology does not change.
 void refit(Bvh &bvh, std::span<const Box> boxes);
 
-// SAH cost: the area of all nodes relative to the root's.
+// Returns the SAH cost: the total area of all nodes divided by the area of the root.
 double sah_cost(const Bvh &bvh);
 
 } // namespace rt_vulkan

@@ -11,7 +11,8 @@ using arhost::Failure;
 
 constexpr VkMemoryPropertyFlags mappable = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
-// Tries `types` in order: memory that is both device-local and mappable can be scarce.
+// Allocates memory. Tries the memory types in order, because memory that is both device-local and mappable can be
+// scarce.
 Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::uint32_t> types, const void *next) {
     VkMemoryAllocateInfo info{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, .pNext = next, .allocationSize = size};
     VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
@@ -121,16 +122,17 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
     const VkMemoryPropertyFlags preferred = place == Place::staging     ? 0
                                             : place == Place::host_read ? VK_MEMORY_PROPERTY_HOST_CACHED_BIT
                                                                         : VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    // Drivers list types with fewer properties first, so staging does not take device-local memory.
+    // Drivers list memory types with fewer properties first, so staging buffers do not use device-local memory.
     const std::vector<std::uint32_t> types =
         device.memory_types(requirements.memoryTypeBits, place == Place::device ? 0 : mappable, preferred);
     if (types.empty())
-        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the Vulkan device '" + device.physical().name +
-                                                           "' has no memory that the host can write; choose another");
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                      "the Vulkan device '" + device.physical().name +
+                          "' has no memory that the host can write; choose another device");
     const bool has_address = usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     const VkMemoryAllocateFlagsInfo flags{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO,
                                           .flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT};
-    // No fallback to host memory for device buffers: it would be slow without notice.
+    // Device buffers do not fall back to host memory: rendering would be slow and the user would not learn why.
     const std::size_t tried = place == Place::device ? 1 : types.size();
     memory_ = allocated(device, requirements.size, std::span(types).first(tried), has_address ? &flags : nullptr);
     check(vk.vkBindBufferMemory(device.handle(), get(), memory_.get(), 0), "binding GPU memory");
@@ -147,7 +149,7 @@ Buffer::Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage
 
 Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
     constexpr auto type = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
-    constexpr VkDeviceSize page = 4096; // images are mapped up to a page's end (arhost/raytracer.h)
+    constexpr VkDeviceSize page = 4096; // an image's memory extends to the end of its last page (arhost/raytracer.h)
     const VolkDeviceTable &vk = device.functions();
     if (!device.physical().imports_host_memory || device.physical().import_alignment > page ||
         reinterpret_cast<std::uintptr_t>(memory) % page)
@@ -177,7 +179,7 @@ Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
                                           .allocationSize = info.size,
                                           .memoryTypeIndex = types[0]};
     VkDeviceMemory handle = VK_NULL_HANDLE;
-    // A driver may refuse some kinds of memory.
+    // A driver may refuse to import some kinds of host memory.
     if (vk.vkAllocateMemory(device.handle(), &allocation, nullptr, &handle) != VK_SUCCESS)
         return {};
     buffer.memory_ = Memory(device, handle);
@@ -228,7 +230,7 @@ void Submission::run(std::span<const VkCommandBuffer> commands) const {
     check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "submitting GPU commands");
     const VkResult result = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX);
     if (result != VK_SUCCESS)
-        vk.vkDeviceWaitIdle(device_.handle()); // the caller destroys objects that the commands may still use
+        vk.vkDeviceWaitIdle(device_.handle()); // the caller will destroy objects that the commands may still use
     check(result, "waiting for the GPU");
 }
 

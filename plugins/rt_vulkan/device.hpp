@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A logical device with one queue, and RAII wrappers of its handles: buffers with memory, commands, and the rest.
+// A logical device with one queue, and RAII wrappers of the device's handles.
 #pragma once
 
 #include "instance.hpp"
@@ -13,7 +13,7 @@ namespace rt_vulkan {
 
 class Device {
 public:
-    // Enables the extensions that `path` needs. The Instance of `physical` outlives this.
+    // Enables the extensions that `path` needs. The Instance that listed `physical` must outlive this object.
     explicit Device(const PhysicalDevice &physical, Path path = Path::plain);
     ~Device();
     Device(const Device &) = delete;
@@ -23,7 +23,8 @@ public:
     VkQueue queue() const { return queue_; }
     const VolkDeviceTable &functions() const { return functions_; }
     const PhysicalDevice &physical() const { return physical_; }
-    // The types in `allowed` with all of `required`; those that also have `preferred` come first.
+    // Returns the indices of the memory types that are in the bit mask `allowed` and have all of the `required`
+    // properties. Types that also have the `preferred` properties come first.
     std::vector<std::uint32_t> memory_types(std::uint32_t allowed, VkMemoryPropertyFlags required,
                                             VkMemoryPropertyFlags preferred) const;
 
@@ -35,12 +36,13 @@ private:
     VolkDeviceTable functions_{};
 };
 
-// Owns a handle of a device, which outlives it; `destroy` is the member of VolkDeviceTable that destroys it.
+// Owns a handle that belongs to a device. The device must outlive this object. `destroy`: the member of
+// VolkDeviceTable that destroys the handle.
 template <class Handle, auto destroy> class Unique {
 public:
     Unique() = default;
     Unique(const Device &device, Handle handle) : device_(&device), handle_(handle) {}
-    // Calls `create`, a vkCreate… function; `what` names the operation in error messages.
+    // Creates the handle with `create`, which is a vkCreate… function. `what` names the operation in error messages.
     template <class Create, class Info>
     Unique(const Device &device, Create create, const Info &info, const char *what) : device_(&device) {
         check(create(device.handle(), &info, nullptr, &handle_), what);
@@ -75,34 +77,35 @@ using PipelineCache = Unique<VkPipelineCache, &VolkDeviceTable::vkDestroyPipelin
 using Pipeline = Unique<VkPipeline, &VolkDeviceTable::vkDestroyPipeline>;
 using AccelerationStructure = Unique<VkAccelerationStructureKHR, &VolkDeviceTable::vkDestroyAccelerationStructureKHR>;
 
-// The next multiple of `alignment`; 0: no alignment is required.
+// Rounds `size` up to a multiple of `alignment`. An alignment of 0 means that none is required.
 inline VkDeviceSize aligned(VkDeviceSize size, VkDeviceSize alignment) {
     return alignment ? (size + alignment - 1) / alignment * alignment : size;
 }
 
-// A buffer and its memory.
+// A Vulkan buffer and its memory.
 class Buffer {
 public:
     enum class Place {
-        device,       // fastest for the device, not mapped
+        device,       // not mapped; fastest for the device
         host_written, // mapped; the host writes, the device reads repeatedly
         staging,      // mapped; the host writes, the device copies from it
         host_read     // mapped; the device writes, the host reads
     };
     Buffer() = default;
     Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place);
-    // Host memory as a copy destination; empty if the device cannot import it.
+    // Returns a buffer in the given host memory, for use as a copy destination. The buffer is empty if the device
+    // cannot import that memory.
     static Buffer imported(const Device &device, void *memory, VkDeviceSize size);
 
     VkBuffer get() const { return buffer_.get(); }
     VkDeviceSize size() const { return size_; }
-    // Requires VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
+    // Valid only if the buffer has VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT.
     VkDeviceAddress address() const { return address_; }
     explicit operator bool() const { return memory_.get() != VK_NULL_HANDLE; }
     std::span<std::byte> mapped() const { return {mapped_, static_cast<std::size_t>(size_)}; }
 
 private:
-    // In this order: the buffer is destroyed before its memory.
+    // The order of these two members matters: the buffer must be destroyed before its memory.
     Memory memory_;
     Unique<VkBuffer, &VolkDeviceTable::vkDestroyBuffer> buffer_;
     VkDeviceSize size_ = 0; // bytes
@@ -127,11 +130,11 @@ private:
     Fence fence_;
 };
 
-// Makes writes of stage `from` available to stage `to`.
+// Inserts a barrier: accesses `used` in stage `to` see the writes `written` of stage `from`.
 void barrier(const VolkDeviceTable &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
              VkPipelineStageFlags to, VkAccessFlags used);
 
-// Writes `parts`, concatenated, to a device buffer via a staging buffer.
+// Concatenates `parts` and copies them to a device buffer via a staging buffer.
 void upload(const Device &device, const Submission &submission, const Buffer &to,
             std::span<const std::span<const std::byte>> parts);
 

@@ -71,16 +71,17 @@ const char *name_of(VkResult result) {
     }
 }
 
-// "; VK_DRIVER_FILES is …" if a variable restricts the drivers that the loader looks for.
+// If an environment variable restricts the drivers that the loader looks for, returns a hint for error messages that
+// names the variable and its value.
 std::string driver_variable_hint() {
     for (const char *variable : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
         if (const char *files = std::getenv(variable))
             return std::string("; ") + variable + " is '" + files +
-                   "': the loader looks for these drivers only, and the sandbox must allow them ('reads')";
+                   "', so the loader looks for these drivers only; allow the plugin to read the files with 'reads'";
     return "";
 }
 
-// Higher is better.
+// Returns a device's preference for `auto`: higher is better, and −1 means unusable.
 int rank(const PhysicalDevice &device) {
     if (!missing_requirement(device).empty())
         return -1;
@@ -98,7 +99,7 @@ int rank(const PhysicalDevice &device) {
     }
 }
 
-// Adds the hardware paths whose extensions and features the device has, and their limits.
+// Adds those hardware paths to `device` whose extensions and features it supports, and sets their limits.
 void add_tracing(PhysicalDevice &device, bool has_query, bool has_pipeline) {
     if (!has_query && !has_pipeline)
         return;
@@ -180,7 +181,7 @@ PhysicalDevice inspect(VkPhysicalDevice handle) {
     vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, nullptr);
     std::vector<VkQueueFamilyProperties> families(family_count);
     vkGetPhysicalDeviceQueueFamilyProperties(handle, &family_count, families.data());
-    // Preferably a family without graphics: a long image would delay the desktop's windows.
+    // Prefers a queue family without graphics, because an image that takes long would delay the desktop's windows.
     const auto find_compute = [&](VkQueueFlags excluded) {
         return std::find_if(families.begin(), families.end(), [excluded](const VkQueueFamilyProperties &family) {
             return family.queueFlags & VK_QUEUE_COMPUTE_BIT && !(family.queueFlags & excluded);
@@ -208,7 +209,7 @@ std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
 }
 
 std::string missing_requirement(const PhysicalDevice &device) {
-    constexpr std::uint32_t buffers_needed = binding_count - 1; // the frame is a uniform buffer
+    constexpr std::uint32_t buffers_needed = binding_count - 1; // all but the frame, which is a uniform buffer
     const std::uint32_t buffers = device.properties.limits.maxPerStageDescriptorStorageBuffers;
     if (device.properties.apiVersion < VK_API_VERSION_1_1)
         return "supports Vulkan 1.0 only; 1.1 is required";
@@ -273,7 +274,8 @@ Instance::Instance(const arhost::Host &host, bool validate, const std::string &l
                       loader + " is not a Vulkan loader: vkGetInstanceProcAddr is missing");
     volkInitializeCustom(get);
     create(validate);
-    // volk's instance functions are global. The loader's are the same for all instances, except those of extensions.
+    // volk keeps instance functions in global variables. Several instances can share them, because the loader returns
+    // the same functions for all instances, except for functions of extensions.
     volkLoadInstanceOnly(instance_);
     if (!validate)
         return;
@@ -282,7 +284,7 @@ Instance::Instance(const arhost::Host &host, bool validate, const std::string &l
     if (!vkCreateDebugUtilsMessengerEXT ||
         vkCreateDebugUtilsMessengerEXT(instance_, &info, nullptr, &messenger_) != VK_SUCCESS) {
         vkDestroyInstance(instance_, nullptr);
-        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Vulkan's validation layers do not report messages");
+        throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Vulkan's validation layers cannot be made to report messages");
     }
 }
 
@@ -305,13 +307,13 @@ void Instance::create(bool validate) {
                           "option 'validate': Vulkan's validation layers are not installed (Debian: "
                           "vulkan-validationlayers); install them or omit the option");
     }
-    if (!vkEnumerateInstanceVersion) // since Vulkan 1.1
+    if (!vkEnumerateInstanceVersion) // exists since Vulkan 1.1
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "the Vulkan loader supports version 1.0 only; install one for 1.1 or later");
     const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                         .pApplicationName = "arhost",
                                         .apiVersion = VK_API_VERSION_1_2};      // the highest version used
-    const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_); // during vkCreateInstance
+    const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_); // for messages of vkCreateInstance
     const VkValidationFeatureEnableEXT feature = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
     const VkValidationFeaturesEXT features{.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
                                            .pNext = &messenger,
@@ -334,12 +336,12 @@ void Instance::create(bool validate) {
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "option 'validate': Vulkan's validation layers cannot be loaded; reinstall them (Debian: "
                       "vulkan-validationlayers) or omit the option");
-    if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders also return it for damaged manifests
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY) // loaders also return this code for damaged manifests
         throw Failure(
             ARHOST_STATUS_ERROR_UNSUPPORTED,
-            "Vulkan cannot be started (VK_ERROR_OUT_OF_HOST_MEMORY): memory is exhausted, or a manifest of a driver "
-            "or layer is damaged; check vulkan/ in /usr/share and /etc and the files named by VK_LAYER_PATH, or use "
-            "rt_embree" +
+            "Vulkan cannot be started (VK_ERROR_OUT_OF_HOST_MEMORY): either memory is exhausted, or a driver's or "
+            "layer's manifest is damaged; check /usr/share/vulkan, /etc/vulkan and the folders in VK_LAYER_PATH, or "
+            "use rt_embree" +
                 driver_variable_hint());
     check(result, "creating a Vulkan instance");
 }
@@ -365,13 +367,14 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
         return *std::max_element(devices.begin(), devices.end(),
                                  [](const PhysicalDevice &a, const PhysicalDevice &b) { return rank(a) < rank(b); });
     const auto refuse = [&](const std::string &why) {
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "option 'device': " + why + " '" + wanted +
-                                                             "'; available: " + list_of(devices) +
-                                                             "; give a number, a UUID, a part of a name, or auto");
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "option 'device': " + why + " '" + wanted + "'; available: " + list_of(devices) +
+                          "; use a number, a UUID, a unique part of a name, or 'auto'");
     };
     std::string uuid = lower(wanted);
     std::erase(uuid, '-');
-    std::vector<const PhysicalDevice *> exact, partial; // by number, UUID or whole name; by part of the name
+    // `exact`: matches by number, UUID or whole name; `partial`: matches by a part of the name.
+    std::vector<const PhysicalDevice *> exact, partial;
     for (std::size_t i = 0; i < devices.size(); ++i) {
         const std::string name = lower(devices[i].name);
         if (wanted == std::to_string(i) || devices[i].uuid == uuid || name == lower(wanted))
@@ -388,7 +391,8 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
 }
 
 std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted) {
-    // On a CPU device the driver's acceleration structures are software, too, and slower (README.md).
+    // On a CPU device, the driver's acceleration structures are also in software, and slower than `plain`
+    // (README.md).
     if (wanted == "auto" && device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
         return {Path::plain};
     if (wanted == "auto")
@@ -398,7 +402,7 @@ std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &
             return {path};
     throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                   "option 'path': the Vulkan device '" + device.name + "' does not support '" + wanted +
-                      "'; it supports " + list_of(device.paths) + ": give one of these, auto, or another device");
+                      "'; it supports " + list_of(device.paths) + "; use one of these, 'auto', or another device");
 }
 
 } // namespace rt_vulkan

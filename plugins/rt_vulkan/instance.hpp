@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The Vulkan loader, an instance and its devices. The loader is opened at run time (volk), so that a machine without
-// it gets a message.
+// The Vulkan loader, a Vulkan instance and its devices. The loader is opened at run time with volk, so the plugin can
+// report a clear error on machines without Vulkan.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -13,7 +13,7 @@
 
 namespace rt_vulkan {
 
-// How rays are intersected with the scene.
+// How intersections of rays with the scene are found.
 enum class Path {
     plain,   // software BVH traversal in a compute shader
     query,   // hardware acceleration structures, ray queries in a compute shader (VK_KHR_ray_query)
@@ -21,32 +21,32 @@ enum class Path {
 };
 const char *name_of(Path path);
 
-// All 0 if the device supports neither `query` nor `pipeline`.
+// Limits of the hardware paths. All are 0 if the device supports neither `query` nor `pipeline`.
 struct TracingLimits {
     std::uint64_t max_objects, max_primitives;
     std::uint32_t scratch_alignment;                              // bytes
-    std::uint32_t handle_size, handle_alignment, table_alignment; // bytes, of shader binding tables
+    std::uint32_t handle_size, handle_alignment, table_alignment; // bytes, for shader binding tables
 };
 
-// The properties of a device, queried without opening it.
+// The properties of a Vulkan device, which can be queried without creating a logical device.
 struct PhysicalDevice {
     VkPhysicalDevice handle;
     std::string name, uuid; // uuid: 32 hexadecimal digits
     VkPhysicalDeviceProperties properties;
-    std::uint32_t queue_family; // supports compute; VK_QUEUE_FAMILY_IGNORED: none does
+    std::uint32_t queue_family; // a family with compute support, or VK_QUEUE_FAMILY_IGNORED if there is none
     std::uint32_t timestamp_bits;
     bool imports_host_memory;
     VkDeviceSize import_alignment;        // bytes
-    std::vector<Path> paths{Path::plain}; // supported; a GPU prefers the last
+    std::vector<Path> paths{Path::plain}; // supported paths; `auto` prefers the last on a GPU
     TracingLimits tracing;
 };
 
-// Why no path can run on the device, e.g. "has no compute queue"; empty if one can.
+// Returns why the device cannot run any path, for example "has no compute queue"; empty if it can.
 std::string missing_requirement(const PhysicalDevice &device);
 
 class Instance {
 public:
-    // `validate`: enables the validation layers with synchronization validation, and logs their messages as errors.
+    // `validate`: enable the validation layers with synchronization validation, and log their messages as errors.
     Instance(const arhost::Host &host, bool validate, const std::string &loader = "libvulkan.so.1");
     ~Instance();
     Instance(const Instance &) = delete;
@@ -68,15 +68,17 @@ private:
     PFN_vkDestroyDebugUtilsMessengerEXT destroy_messenger_ = nullptr;
 };
 
-// `wanted`: a device's number in the list, its UUID or a part of its name; "auto": the fastest kind of usable device.
+// Returns the device selected by `wanted`: its index in `devices`, its UUID or a part of its name; "auto" selects the
+// fastest kind of usable device.
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted);
 
-// The path called `wanted`; "auto": all supported paths, best first, as some drivers announce paths that then fail.
+// Returns the path called `wanted`. For "auto", returns all paths worth trying, best first, because some drivers
+// announce paths that then fail.
 std::vector<Path> choose_paths(const PhysicalDevice &device, const std::string &wanted);
 
-// 32 digits
+// Returns a UUID as 32 hexadecimal digits.
 std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]);
-// "plain, query"
+// Returns a list for messages, for example "plain, query".
 std::string list_of(const std::vector<Path> &paths);
 
 // Throws arhost::Failure if `result` is an error; `what` names the attempted operation.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shaders' buffers, as shaders/scene.glsl declares them: std430, the frame std140. Offsets count elements.
+// The contents of the shaders' buffers, with the same layout as in shaders/scene.glsl: std140 for Frame, std430 for
+// all others. Offsets are in elements, not bytes.
 #pragma once
 
 #include <arhost/scene.h>
@@ -67,7 +68,8 @@ struct Node {
     float low[3];
     std::uint32_t first;
     float high[3];
-    std::uint32_t count; // of primitives or objects; 0: an inner node, whose children are `first` and the next
+    std::uint32_t
+        count; // number of primitives or objects; 0 for an inner node: its children are nodes `first` and first + 1
 };
 
 struct Primitive {
@@ -100,7 +102,7 @@ struct Frame {
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * max_samples);
 
-// The frame is binding 0.
+// The bindings of the descriptor set, in order: 0 is the frame.
 enum Binding : std::uint32_t {
     frame_binding,
     objects_binding,
@@ -117,11 +119,11 @@ enum Binding : std::uint32_t {
     history_binding,
     image_binding,
     drawn_binding,
-    binding_count,                    // of buffers
+    binding_count,                    // number of buffers
     top_level_binding = binding_count // the acceleration structure, on hardware paths
 };
 
-// The shaders' specialization constants, in order of their ids.
+// The specialization constants of the shaders, in the order of their constant_ids.
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1

@@ -9,7 +9,7 @@
 namespace rt_vulkan {
 namespace {
 
-// Indices of the stages of Path::pipeline (shaders.hpp).
+// Indices of the shaders of Path::pipeline in Shaders::stages.
 constexpr std::uint32_t raygen_stage = 0, miss_stage = 1, closest_hit_stage = 2, any_hit_stage = 3,
                         intersection_stage = 4;
 constexpr std::uint32_t group_count = 4; // raygen, miss, triangle hits, sphere hits
@@ -86,7 +86,8 @@ void ImagePipeline::compile(Path path, std::span<const VkPipelineShaderStageCrea
     pipeline_ = Pipeline(device_, pipeline);
 }
 
-// Three aligned regions: raygen, miss and hit. Instances choose one of the two hit groups.
+// Writes the shader binding table, which consists of three aligned regions: raygen, miss and hit. Each instance
+// selects one of the two hit groups.
 void ImagePipeline::make_binding_table() {
     const TracingLimits &limits = device_.physical().tracing;
     const VkDeviceSize size = limits.handle_size, stride = aligned(size, limits.handle_alignment);

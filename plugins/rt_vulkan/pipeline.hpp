@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A path's compiled shaders, specialized for a scene, and the command that runs them for each pixel.
+// The compiled shaders of a path, specialized for a scene, and the commands that run them for each pixel.
 #pragma once
 
 #include "device.hpp"
@@ -9,19 +9,19 @@
 
 namespace rt_vulkan {
 
-inline constexpr std::uint32_t group_side = 8; // px; work groups of the compute shaders are square
+inline constexpr std::uint32_t group_side = 8; // px; side of a compute work group, which is square
 
 // A range of an image's rows.
 struct Rows {
     std::uint32_t first, count;
     bool operator==(const Rows &) const = default;
 };
-// The push constants of shaders/scene.glsl.
+// Size of the push constants in shaders/scene.glsl, bytes.
 inline constexpr std::uint32_t push_constants_size = sizeof Rows::first;
 
 class ImagePipeline {
 public:
-    // Compiles for seconds, unless the pipeline cache has the driver's result.
+    // Compiles the shaders. This takes seconds unless the pipeline cache contains the result.
     ImagePipeline(const Device &device, const Shaders &shaders, VkPipelineLayout layout,
                   const Specialization &constants);
 
@@ -35,7 +35,7 @@ private:
     VkPipelineLayout layout_;
     VkShaderStageFlags stage_flags_;
     Pipeline pipeline_;
-    Buffer binding_table_; // of `pipeline` only
+    Buffer binding_table_; // only on the path `pipeline`
     VkStridedDeviceAddressRegionKHR raygen_{}, miss_{}, hit_{};
 };
 

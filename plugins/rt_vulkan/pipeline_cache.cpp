@@ -12,13 +12,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Each scene adds to the cache; a larger file is discarded.
+// Maximum size of the file. Larger files are ignored; the cache grows with each new scene.
 constexpr std::uintmax_t max_size = std::uintmax_t{64} << 20; // bytes
 
-// One file per device and driver version; empty: nowhere.
+// Returns the path of the cache file, which is specific to a device and driver version; empty if there is no cache
+// folder.
 fs::path file_of(const Device &device) {
-    const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox gives each plugin its own
-    if (!caches || *caches != '/') // a relative one is to be ignored (XDG Base Directory Specification)
+    const char *caches = std::getenv("XDG_CACHE_HOME"); // the sandbox sets it to a folder of the plugin's own
+    if (!caches || *caches != '/') // relative paths are ignored (XDG Base Directory Specification)
         return {};
     return fs::path(caches) /
            ("rt_vulkan-" + hexadecimal(device.physical().properties.pipelineCacheUUID) + ".pipelines");
@@ -44,7 +45,7 @@ PipelineCache read_pipeline_cache(const Device &device) {
     const std::vector<char> data = read(file_of(device));
     const VkPipelineCacheCreateInfo info{
         .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
-        .initialDataSize = data.size(), // the driver checks its header, and ignores data of another driver
+        .initialDataSize = data.size(), // the driver checks the header and ignores data of other drivers
         .pInitialData = data.data()};
     return {device, device.functions().vkCreatePipelineCache, info, "creating a pipeline cache"};
 }
@@ -62,7 +63,7 @@ void write_pipeline_cache(const Device &device, const PipelineCache &cache) {
     data.resize(size);
     if (result != VK_SUCCESS || data.size() > max_size || data == read(file))
         return;
-    std::string temporary = file.string() + ".XXXXXX"; // each process has its own
+    std::string temporary = file.string() + ".XXXXXX"; // a unique name for each process
     const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);
     if (descriptor < 0)
         return;

@@ -7,10 +7,10 @@
 
 namespace rt_vulkan {
 
-// Empty if the file is missing or unusable.
+// Reads the cache from its file. The cache is empty if the file is missing or unusable.
 PipelineCache read_pipeline_cache(const Device &device);
 
-// Replaces the file atomically. Failures are ignored: the cache only saves time.
+// Atomically replaces the file with the contents of `cache`. Ignores failures, because the cache only saves time.
 void write_pipeline_cache(const Device &device, const PipelineCache &cache);
 
 } // namespace rt_vulkan

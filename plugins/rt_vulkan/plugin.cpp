@@ -26,7 +26,8 @@ arhost_device_kind kind_of(VkPhysicalDeviceType type) {
     }
 }
 
-// Logs why `auto` skips devices that the user may expect.
+// Returns the device that option `device` selects. For `auto`, also logs why devices are skipped, and warns if no GPU
+// is usable.
 PhysicalDevice chosen_device(const Instance &instance, const std::string &wanted, const arhost::Host &host) {
     const std::vector<PhysicalDevice> found = instance.devices();
     PhysicalDevice chosen = choose_device(found, wanted);
@@ -36,14 +37,14 @@ PhysicalDevice chosen_device(const Instance &instance, const std::string &wanted
         if (const std::string why = missing_requirement(device); !why.empty() && device.handle != chosen.handle)
             host.warn("Vulkan device '" + device.name + "' is skipped: it " + why);
     if (chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
-        host.warn("no usable GPU among the Vulkan devices: '" + chosen.name +
-                  "' traces on the CPU, where rt_embree is faster");
+        host.warn("no Vulkan device is a usable GPU: rendering on the CPU with '" + chosen.name +
+                  "'; rt_embree is faster on the CPU");
     return chosen;
 }
 
 class Plugin {
 public:
-    // The choices of option `device`.
+    // Lists the choices of the option `device`, for `arhost plugins --devices`.
     static std::vector<arhost::Device> devices(const arhost::Host &host) {
         const Instance instance(host, false);
         const std::vector<PhysicalDevice> found = instance.devices();
@@ -92,16 +93,18 @@ public:
     void stop() {
         if (const std::uint64_t count = renderer_->image_count(); count && renderer_->gpu_ms() > 0) {
             char text[128];
-            std::snprintf(text, sizeof text, "%llu images, %.3f ms each on the GPU, %s",
+            std::snprintf(text, sizeof text, "%llu images, mean GPU time %.3f ms; %s",
                           static_cast<unsigned long long>(count), renderer_->gpu_ms() / static_cast<double>(count),
-                          renderer_->wrote_in_place() ? "written in place" : "copied by the host");
+                          renderer_->wrote_in_place() ? "the device wrote them directly to host memory"
+                                                      : "the host copied them from a mapped buffer");
             host_.info(text);
         }
         renderer_.reset();
     }
 
 private:
-    // False if the path failed and another is left.
+    // Tries to start with the first of `paths_`. Returns false if it failed but another path remains to be tried;
+    // throws if none remains or another path would not help.
     bool try_start(const arhost_raytracer_setup &setup) {
         try {
             renderer_.emplace(setup, settings_, host_, physical_, shaders_);
@@ -120,7 +123,7 @@ private:
     arhost::Host host_;
     Instance instance_;
     PhysicalDevice physical_;
-    std::vector<Path> paths_; // not yet failed, best first
+    std::vector<Path> paths_; // paths that have not failed yet, best first
     Shaders shaders_;
     Settings settings_;
     std::optional<Renderer> renderer_;
@@ -131,22 +134,25 @@ constexpr const char *paths[] = {"auto", "plain", "query", "pipeline", nullptr};
 constexpr const char *needs[] = {"gpu", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_TEXT, "device", "auto",
-                   "The Vulkan device: its number, its UUID or a part of its name; auto: the fastest kind."),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "device", "auto",
+        "Vulkan device: its number, its UUID or a part of its name; 'auto': the fastest kind of usable device."),
     arhost::option(
         ARHOST_OPTION_TEXT, "path", "auto",
-        "How rays are traced: 'plain' by software BVH traversal in a compute shader, 'query' and 'pipeline' by "
-        "ray tracing hardware; auto: on a GPU the last of these that works, else 'plain'.",
+        "How rays are traced; 'plain': software BVH traversal; 'query' and 'pipeline': hardware acceleration "
+        "structures; 'auto': on a GPU the first of 'pipeline', 'query' and 'plain' that works, on a CPU 'plain'.",
         0, 0, paths),
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Samples per pixel, evenly distributed.", 1, max_samples),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Primary rays per pixel, evenly spread over the pixel.", 1,
+                   max_samples),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
-                   "Shadow rays per sample to each area light and to the environment.", 1, 256),
+                   "Shadow rays from each shaded point to each area light and to the environment.", 1, 256),
     arhost::option(
         ARHOST_OPTION_BOOL, "accumulate", "false",
-        "Average over frames while camera and scene stand still: images then depend on the preceding ones."),
+        "Average over frames while the camera and scene are static; each image then depends on earlier frames."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
-                   "Which rays continue at glass: 'tree' reflected and refracted, 'path' one of them at random.", 0,
-                   0, glass_modes),
+                   "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
+                   "chosen at random.",
+                   0, 0, glass_modes),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 
@@ -157,7 +163,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "Ray tracer for any Vulkan 1.1 GPU; matches rt_embree's images.",
+                                          "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
                                           ARHOST_CAPABILITY_LENS_DISTORTION,
                                           std::size(options),
                                           options,

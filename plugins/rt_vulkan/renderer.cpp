@@ -18,19 +18,21 @@ namespace {
 
 using arhost::Failure;
 
-static_assert(Bands::unit % group_side == 0); // work groups do not cross bands
+static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
 
 constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
-// Accumulation stops here: the remaining noise and the rounding of float sums are below half an 8-bit code.
+// Accumulation stops at this number of samples. The remaining noise and the rounding errors of the float sums are
+// then below half an 8-bit code, so more samples would not change the image.
 constexpr std::uint32_t max_accumulated_samples = 1u << 16;
-constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // shaders/scene.glsl
-constexpr std::size_t max_targets = 8;                       // image memory that is reused (arhost/raytracer.h)
+constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // bytes of the buffer Drawn in shaders/scene.glsl
+constexpr std::size_t max_targets = 8; // kept, as the host reuses image memory (arhost/raytracer.h)
 enum Timestamp : std::uint32_t { begun, traced, copied, timestamp_count }; // per image
 
 std::string in_mib(std::uint64_t size) {
     return std::to_string((size + (1u << 20) - 1) >> 20) + " MiB";
 }
 
+// Returns what a buffer contains, as the subject of an error message.
 const char *contents_of(Binding binding) {
     switch (binding) {
     case nodes_binding:
@@ -58,13 +60,15 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     return device;
 }
 
-// Far below any watchdog's timeout (0.5 s: Linux's v3d and panfrost), far above a submission's cost (about 0.1 ms).
-// CPU devices have no watchdog, and lavapipe distributes rows evenly to its threads: each band makes threads wait.
+// Returns the maximum duration of a band. On a GPU, it is far below the shortest watchdog timeout (0.5 s, of Linux's
+// v3d and panfrost drivers) and far above the overhead of a submission (about 0.1 ms). CPU devices have no watchdog;
+// longer bands are better there, because lavapipe's threads wait for each other at the end of each band.
 std::chrono::milliseconds max_band_time(const PhysicalDevice &device) {
     return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 250 : 100);
 }
 
-// Reports progress to the host while a driver works; stops after a timeout, as the driver may hang.
+// Reports progress to the host while the driver works, so that the host does not assume a hang. Stops reporting after
+// a timeout, because the driver itself may hang.
 class Heartbeat {
 public:
     Heartbeat(const arhost::Host &host, const char *what)
@@ -109,7 +113,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                                          .queryType = VK_QUERY_TYPE_TIMESTAMP,
                                          .queryCount = timestamp_count};
         timestamps_ = {device_, device_.functions().vkCreateQueryPool, info, "creating the timestamp queries"};
-        // Submitted first: the time of an image includes rebuilding structures.
+        // These commands are submitted first, so an image's GPU time includes rebuilding acceleration structures.
         start_timestamps_ = submission_.new_commands();
         submission_.begin(start_timestamps_);
         device_.functions().vkCmdResetQueryPool(start_timestamps_, timestamps_.get(), 0, timestamp_count);
@@ -131,13 +135,13 @@ Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std:
     std::size_t filled = 0;
     for (const Bytes &part : parts)
         filled += part.size();
-    const std::size_t size = std::max({filled, min_size, std::size_t{16}}); // empty buffers are invalid
+    const std::size_t size = std::max({filled, min_size, std::size_t{16}}); // Vulkan does not allow empty buffers
     const std::uint64_t limit = device_.physical().properties.limits.maxStorageBufferRange;
     if (size > limit)
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       std::string(contents_of(binding)) + " need a buffer of " + in_mib(size) +
-                          ", and the Vulkan device '" + device_.physical().name + "' supports at most " +
-                          in_mib(limit) + ": use smaller ones, another device or rt_embree");
+                          ", but the Vulkan device '" + device_.physical().name + "' supports at most " +
+                          in_mib(limit) + "; reduce their size, or use another device or rt_embree");
     Buffer buffer(device_, size,
                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | more_usage,
@@ -233,7 +237,7 @@ void Renderer::make_descriptor_set(const Shaders &shaders) {
 }
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
-    // If glass sends both rays on, the stack holds one for each depth.
+    // If glass spawns two rays, up to one ray per depth waits on the stack.
     const bool branches = scene_.has_glass() && !settings_.one_path;
     const Specialization constants{branches ? static_cast<std::int32_t>(max_depth) + 1 : 1,
                                    scene_.has_glass(),
@@ -244,7 +248,8 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.has_textures()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
-    // Lavapipe compiles a shader at its first dispatch: run it once for a frame of width 0, which traces no pixel.
+    // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shader once for a frame of
+    // width 0, which traces no pixel.
     const VkCommandBuffer commands = submission_.new_commands();
     std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
@@ -254,7 +259,8 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     submission_.free(commands);
 }
 
-// The target for an image's memory. If one import fails, none is tried again, and all images share one buffer.
+// Returns the target for an image's memory. After a failed import, no further import is tried, and all images share
+// one buffer.
 Renderer::Target &Renderer::target_for(const arhost_image &image) {
     for (Target &target : targets_)
         if (target.rgba == image.rgba && target.stride == image.stride)
@@ -275,7 +281,7 @@ Renderer::Target &Renderer::target_for(const arhost_image &image) {
                                Buffer::Place::host_read);
     }
     target.commands = submission_.new_commands();
-    if (targets_.size() > max_targets) { // evict the oldest; no submission is pending here
+    if (targets_.size() > max_targets) { // evict the oldest target, which no pending submission uses
         submission_.free(targets_.front().commands);
         targets_.erase(targets_.begin());
     }
@@ -289,7 +295,7 @@ void Renderer::record(Target &target, Rows rows) const {
     submission_.begin(target.commands);
     if (rows.first == 0)
         record_preparation(target.commands);
-    else // all bands read and extend the bounding box of drawn pixels
+    else // all bands read and extend the bounding rectangle of drawn pixels
         barrier(device_.functions(), target.commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
     pipeline_->record(target.commands, set_, intrinsics_.width, rows);
@@ -299,7 +305,7 @@ void Renderer::record(Target &target, Rows rows) const {
     target.recorded = rows;
 }
 
-// Uploads the moving parts and empties the bounding box of drawn pixels.
+// Records commands that upload the moving parts and reset the bounding rectangle of drawn pixels to empty.
 void Renderer::record_preparation(VkCommandBuffer commands) const {
     const VolkDeviceTable &vk = device_.functions();
     VkDeviceSize offset = 0;
@@ -323,7 +329,7 @@ void Renderer::record_copy(const Target &target) const {
             VK_ACCESS_TRANSFER_READ_BIT);
     if (timestamps_.get())
         vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), traced);
-    // Row by row if the image has padding, which must not be overwritten.
+    // If the image has padding at the end of rows, copies row by row: the padding must not be overwritten.
     const VkDeviceSize row = VkDeviceSize{4} * intrinsics_.width;
     std::vector<VkBufferCopy> rows;
     if (target.stride == row)
@@ -358,12 +364,17 @@ void Renderer::write_moving_parts() {
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     if (!arhost::raytracer_common::same(camera.intrinsics, intrinsics_))
-        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the camera's intrinsics differ from those of start");
-    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
-        image.stride < 4 * image.width || image.stride % 4)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                      "the image's size or stride does not match that of start");
-    if (host_.cancelled()) // before the scene is updated
+                      "the camera's intrinsics differ from the intrinsics passed to start");
+    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
+        image.stride < 4 * image.width)
+        throw Failure(
+            ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+            "the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
+    if (image.stride % 4)
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "the image buffer's stride must be a multiple of 4 bytes");
+    if (host_.cancelled()) // checked before the scene is updated
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled before tracing the image");
     Target &target = target_for(image);
     set_camera(camera, frame_);
@@ -381,7 +392,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (settings_.accumulate) {
         if (motion || !history_camera_ || !arhost::raytracer_common::same_view(*history_camera_, camera))
             history_samples_ = 0;
-        history_camera_.reset(); // if this image fails, the sums are invalid
+        history_camera_.reset(); // stays empty if this image fails, as the sums are then invalid
         samples_ = arhost::raytracer_common::sample_positions(
             history_samples_, history_samples_ < max_accumulated_samples ? settings_.samples : 0);
     }
@@ -401,7 +412,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     return read_back(target, image);
 }
 
-// `commands` run before the first band.
+// Traces the image band by band. `commands` run before the first band.
 void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
     for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
         if (rows.first > 0 && host_.cancelled())

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders images: in one submission, whose commands are recorded once per target, or band by band if that takes long.
+// Renders images. Usually renders an image with one submission, whose commands are recorded once per target; images
+// that take long are split into bands (bands.hpp).
 #pragma once
 
 #include "acceleration_structures.hpp"
@@ -17,10 +18,10 @@ namespace rt_vulkan {
 
 struct Settings {
     std::uint32_t samples = 1;                        // per pixel
-    std::uint32_t light_samples = 4;                  // shadow rays to an extended light, per sample
-    bool accumulate = false;                          // average over frames while the camera stands still
-    bool one_path = false;                            // glass follows one randomly chosen ray instead of both
-    std::optional<Bands::Milliseconds> max_band_time; // for tests; default: depends on the device
+    std::uint32_t light_samples = 4;                  // shadow rays per shaded point to each area light
+    bool accumulate = false;                          // average over frames while the camera and scene are static
+    bool one_path = false;                            // glass spawns one random ray instead of two
+    std::optional<Bands::Milliseconds> max_band_time; // set by tests only; the default depends on the device
 };
 
 struct Rectangle {
@@ -32,29 +33,33 @@ public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
              const PhysicalDevice &physical, const Shaders &shaders);
 
-    // Returns the bounding box of the pixels with alpha above 0; width 0 if there are none. `motion` may be NULL.
+    // Returns the bounding rectangle of the pixels with non-zero alpha; its width is 0 if there are none. `motion` is
+    // NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
 
     const SceneData &scene() const { return scene_; }
     // Whether the device wrote the last image directly into the caller's memory.
     bool wrote_in_place() const { return wrote_in_place_; }
     std::uint64_t image_count() const { return image_count_; }
-    double gpu_ms() const { return gpu_ms_; }                  // of all images; 0 without timestamps
-    std::uint64_t last_gpu_ns() const { return last_gpu_ns_; } // of the last image; 0 without timestamps
-    // For benchmarks: the time of copying all images from device memory to their targets.
+    double gpu_ms() const { return gpu_ms_; } // total GPU time of all images; 0 if the device has no timestamps
+    std::uint64_t last_gpu_ns() const {
+        return last_gpu_ns_;
+    } // GPU time of the last image; 0 if the device has no timestamps
+    // For benchmarks: the total time of copying images from device memory to their targets.
     double read_back_ms() const { return read_back_ms_; }
-    // For benchmarks: records the last image's shader without copies.
+    // For benchmarks: records the commands that trace the last image, without copying it.
     void record_shader(VkCommandBuffer commands) const;
     const Submission &submission() const { return submission_; }
 
 private:
-    // Where the device writes an image: the caller's imported memory, or a buffer (rgba NULL) that the host copies.
+    // Where the device writes an image: either the caller's memory, imported into Vulkan, or a buffer from which the
+    // host copies the image (`rgba` is NULL).
     struct Target {
         std::uint8_t *rgba = nullptr;
         std::uint32_t stride = 0;
         Buffer buffer;
         VkCommandBuffer commands = VK_NULL_HANDLE;
-        Rows recorded{}; // which `commands` trace
+        Rows recorded{}; // the rows that `commands` trace
     };
     void make_buffers(const arhost_intrinsics &intrinsics, Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
@@ -72,18 +77,18 @@ private:
     arhost::Host host_;
     Settings settings_;
     arhost_intrinsics intrinsics_;
-    VkPipelineStageFlags stage_; // that runs the shaders
+    VkPipelineStageFlags stage_; // pipeline stage in which the shaders run
     Device device_;
     Submission submission_;
     SceneData scene_;
     std::uint32_t ray_dimensions_ = 2;
-    std::vector<arhost::raytracer_common::Sample> samples_; // of an image
+    std::vector<arhost::raytracer_common::Sample> samples_; // sample positions of the current image
     Frame frame_{};
     std::array<Buffer, binding_count> buffers_;
-    Buffer moving_;                                    // staging of the moving parts, one after another
-    Buffer drawn_;                                     // the bounding box of drawn pixels
-    std::optional<AccelerationStructures> structures_; // none on the plain path
-    QueryPool timestamps_;                             // none if unsupported
+    Buffer moving_;                                    // staging buffer for the moving parts of all buffers
+    Buffer drawn_;                                     // bounding rectangle of the drawn pixels, for the host
+    std::optional<AccelerationStructures> structures_; // empty on the path `plain`
+    QueryPool timestamps_;                             // empty if unsupported
     VkCommandBuffer start_timestamps_ = VK_NULL_HANDLE;
     Bands bands_;
     DescriptorSetLayout set_layout_;
@@ -92,13 +97,14 @@ private:
     PipelineLayout layout_;
     std::optional<ImagePipeline> pipeline_;
     std::vector<Target> targets_;
-    bool imports_ = true; // until an import fails
+    bool imports_ = true; // false once an import of host memory has failed
     bool wrote_in_place_ = false;
     std::uint64_t image_count_ = 0;
     double gpu_ms_ = 0, read_back_ms_ = 0;
     std::uint64_t last_gpu_ns_ = 0;
 
-    // Of accumulation: the samples so far, and their camera.
+    // State of the option `accumulate`: the number of samples so far, and their camera (empty if the sums are
+    // invalid).
     std::uint32_t history_samples_ = 0;
     std::optional<arhost_camera> history_camera_;
 };

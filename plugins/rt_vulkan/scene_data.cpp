@@ -21,7 +21,8 @@ using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::object_extent;
 
-// SAH cost relative to the last build, above which a rebuild pays off.
+// A BVH is rebuilt if its SAH cost exceeds this times the cost after the last build: above that, a rebuild saves more
+// tracing time than it costs.
 constexpr double max_degradation = 1.3;
 constexpr std::uint32_t max_leaf_size = 4;
 
@@ -74,13 +75,13 @@ Light light_of(const arhost_light &from) {
     return to;
 }
 
-// Rounds to an 8-bit code, so that the mean of several samples yields that code.
+// Rounds `alpha` to a multiple of 1/255, so that the mean over several samples yields the same 8-bit code.
 float alpha_of_code(float alpha) {
     return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
 
-// The world box of a transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990), with a
-// margin for the rounding of rays that are transformed to object space.
+// Returns the bounding box, in world space, of a box in object space (Arvo, Transforming Axis-Aligned Bounding Boxes,
+// Graphics Gems 1990). Adds a margin for the rounding errors of rays that are transformed to object space.
 Box in_world(const Box &local, const float *m) {
     Box world;
     float extent[3];
@@ -104,7 +105,7 @@ Bytes bytes_of(const auto &vector) {
     return std::as_bytes(std::span(vector));
 }
 
-// Primitives in the geometry's order, as acceleration structures number them; no nodes.
+// Returns a BVH without nodes, with the primitives in the geometry's order, which acceleration structures use.
 Bvh unordered(std::size_t count) {
     Bvh bvh;
     bvh.order.resize(count);
@@ -129,7 +130,7 @@ SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Hos
     for (const arhost_object &object : objects)
         anything_moves_ |= object.moves || object.deforms;
     if (has_bvhs)
-        nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // the top-level BVH's
+        nodes_.resize(std::max<std::size_t>(1, 2 * objects.size())); // space for the top-level BVH
     for (const arhost_object &object : objects)
         if (object.deforms)
             add_normals(mesh_of(object.geometry, true), geometries[object.geometry]);
@@ -248,7 +249,7 @@ void SceneData::add_texcoords(Mesh &mesh, const arhost_geometry &geometry) {
     }
 }
 
-// Writes the nodes, and the primitives in leaf order.
+// Writes a mesh's nodes, and its primitives in the order of the leaves.
 void SceneData::write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Points points) {
     for (std::size_t i = 0; i < mesh.bvh.nodes.size(); ++i) {
         Node node = mesh.bvh.nodes[i];
@@ -350,7 +351,7 @@ void SceneData::build_top_level() {
     if (boxes.size() > std::size_t{1} << max_top_depth)
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "the scene has more than " +
                                                            std::to_string(1 << max_top_depth) +
-                                                           " objects: merge some, or use rt_embree");
+                                                           " objects; merge some of them, or use rt_embree");
     const Bvh bvh = build_bvh(boxes, 1, max_top_depth, [this] { check_cancelled(); });
     for (std::size_t i = 0; i < bvh.nodes.size(); ++i) {
         nodes_[i] = bvh.nodes[i];
@@ -417,7 +418,7 @@ void SceneData::add_textures() {
     }
 }
 
-// In the order of scene.glsl.
+// Fills `tables_` in the order that scene.glsl expects: sRGB encoding, sRGB decoding, environment.
 void SceneData::add_tables() {
     const arhost::shading::Srgb8Table codes = arhost::shading::make_srgb8_table();
     tables_.assign(std::begin(codes.cells), std::end(codes.cells));

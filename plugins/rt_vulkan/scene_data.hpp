@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The scene as the shaders read it, for the plain path with BVHs. Moving parts come first in each array, so that one
-// copy updates them on the device.
+// Converts a scene to the buffers that the shaders read; for the path `plain`, also builds BVHs. In each buffer, the
+// parts that may move come first, so a single copy updates them on the device.
 #pragma once
 
 #include "bvh.hpp"
@@ -23,25 +23,28 @@ struct Points {
     const std::byte *first;
     std::uint32_t stride; // bytes
 };
-// The bounding box of each triangle or sphere.
+// Returns the bounding box of each triangle or sphere of a geometry whose positions are `points`.
 std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geometry, Points points);
 
 class SceneData {
 public:
-    // `has_bvhs`: build BVHs, for software traversal. `arena` outlives this.
+    // `has_bvhs`: build BVHs for software traversal. `arena` must outlive this object.
     SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Host &host);
 
     void update(const arhost_motion &motion);
-    std::uint64_t rebuilds() const { return rebuilds_; } // of BVHs that degraded too much to be refitted
+    std::uint64_t rebuilds() const {
+        return rebuilds_;
+    } // number of BVHs rebuilt so far because they had degraded too much
 
-    // A buffer's contents, concatenated; moving_size(): the bytes at its start that may change.
+    // parts() returns the contents of a buffer, to be concatenated. moving_size() returns the number of bytes at the
+    // start of the buffer that may change.
     std::vector<Bytes> parts(Binding binding) const;
     std::size_t moving_size(Binding binding) const;
-    // Frees what never changes, once it is on the device.
+    // Frees the data that never changes. Call it after the data has been uploaded.
     void release_static_parts();
 
     std::span<const Object> objects() const { return objects_; }
-    // The fields that depend on the scene; the rest is 0.
+    // Returns a frame in which only the fields that depend on the scene are set; all others are 0.
     Frame frame() const;
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
@@ -49,14 +52,14 @@ public:
     bool has_textures() const { return !textures_.empty(); } // including the environment
 
 private:
-    // A geometry's offsets in the arrays.
+    // The offsets of a geometry's data in the arrays below.
     struct Mesh {
         std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord;
         Box local;
         bool is_empty;
-        // Kept only for deforming meshes:
-        Bvh bvh;               // without nodes if !has_bvhs_
-        double built_cost = 0; // sah_cost() of the last build
+        // The following members are set for deforming meshes only.
+        Bvh bvh;               // has no nodes if !has_bvhs_
+        double built_cost = 0; // sah_cost() after the last build
     };
 
     Mesh &mesh_of(std::uint32_t geometry, bool deforms);
@@ -70,17 +73,17 @@ private:
     void build_top_level();
     void add_textures();
     void add_tables();
-    void check_cancelled() const; // throws if the host cancels; reports progress
+    void check_cancelled() const; // throws if the host has cancelled, else reports progress
 
     const arhost_scene &arena_;
     bool has_bvhs_;
     arhost::Host host_;
-    std::map<std::uint32_t, Mesh> meshes_;          // by geometry
-    std::vector<std::array<float, 12>> transforms_; // world from object
+    std::map<std::uint32_t, Mesh> meshes_;          // key: geometry index
+    std::vector<std::array<float, 12>> transforms_; // world from object, one per object
     std::vector<Object> objects_;
     std::vector<Material> materials_;
     std::vector<Light> lights_;
-    std::vector<Node> nodes_; // the top-level BVH's come first
+    std::vector<Node> nodes_; // the nodes of the top-level BVH come first
     std::vector<Primitive> primitives_;
     std::vector<std::uint32_t> indices_;
     std::vector<float> attributes_;

@@ -18,10 +18,10 @@ struct Shader {
 
 struct Shaders {
     Path path;
-    std::vector<Shader> stages; // of `pipeline`: raygen, miss, closest hit, any hit, intersection
+    std::vector<Shader> stages; // on the path `pipeline`: raygen, miss, closest hit, any hit, intersection
 
     VkShaderStageFlags stage_flags() const;
-    VkPipelineStageFlags pipeline_stage() const; // for barriers
+    VkPipelineStageFlags pipeline_stage() const; // the stage in which the shaders run, for barriers
 };
 
 Shaders shaders_of(Path path);

@@ -52,7 +52,7 @@ RayTable make_ray_table(const arhost_intrinsics &intrinsics, bool has_slopes) {
             for (std::uint32_t x = 0; x < intrinsics.width; ++x)
                 fill(x, y, &table.values[values_per_pixel * (std::size_t{y} * intrinsics.width + x)]);
     };
-    std::vector<std::jthread> threads; // joined before the table is read
+    std::vector<std::jthread> threads; // joined below, before the table is returned
     for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i)
         threads.emplace_back(work);
     work();

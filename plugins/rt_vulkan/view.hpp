@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The camera as the shaders read it: its axes in the world, and each pixel's ray direction.
+// Computes the camera data that the shaders read: the camera's axes in world space, and each pixel's ray direction.
 #pragma once
 
 #include "layout.hpp"
@@ -11,12 +11,12 @@
 
 namespace rt_vulkan {
 
-// Writes the frame's eye and axes.
+// Sets `eye` and `world_from_camera` of the frame.
 void set_camera(const arhost_camera &camera, Frame &frame);
 
-// Each pixel's direction in camera coordinates (x right, y down, z forward), row by row; z only if `dimensions` is 3,
-// else it is 1. With `has_slopes`, the direction is followed by its derivatives along x and y, per px. x is 1e30 for
-// pixels outside the lens's field of view.
+// The ray direction of each pixel in camera axes (x right, y down, z forward), row by row. If `dimensions` is 2, only
+// x and y are stored, and z is 1. With `has_slopes`, each direction is followed by its derivatives along image rows
+// and image columns, per px. x is 1e30 for pixels outside the field of view of the lens.
 struct RayTable {
     std::uint32_t dimensions; // 2 or 3
     std::vector<float> values;

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The integrator: traces a tile in blocks of 4×4 pixels. Included by <isa>.cpp, which defines ARHOST_ISA.
+// The integrator, which renders a tile in blocks of 4×4 pixels. base.cpp, avx2.cpp and avx512.cpp each define
+// ARHOST_ISA and include this file.
 #include "kernel.hpp"
 #include "packet.hpp"
 
 namespace rt_embree::ARHOST_ISA {
 namespace {
 
-// Included here so that each instruction set has its own copy.
+// Included inside the namespace so that each instruction set has its own copy of the functions.
 #include "scatter.inl"
 
-constexpr int block = 4; // px a side
+constexpr int block = 4; // side of a block, px
 
-// Returns the alphas; `coloured`: any of the pixels has radiance. Catchers do not hide virtual objects behind them,
-// occluders hide everything.
+// Traces the primary rays of a block and shades their hits. Returns the alpha of each pixel, and sets `coloured` if
+// any of the pixels can have radiance. Catchers do not hide the virtual objects behind them; occluders hide
+// everything.
 ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool active, bool &coloured) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
@@ -50,7 +52,7 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
     return alpha;
 }
 
-// Loads a block's directions or their derivatives.
+// Loads a block's ray directions or their derivatives. `z`: the z component if only x and y are stored.
 ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float z) {
     return {load(arrays), load(arrays + lanes), dimensions == 3 ? load(arrays + 2 * lanes) : Float(z)};
 }
@@ -81,7 +83,7 @@ ARHOST_INLINE Vec3 radiance_of(const Scratch &scratch, int first_pixel) {
             load(scratch.radiance[2] + first_pixel)};
 }
 
-// Pixels of a single sample.
+// Returns a block's RGBA pixels for images with a single sample per pixel.
 ARHOST_INLINE Int encode(const Frame &frame, const Scratch &scratch, int first_pixel, bool coloured) {
     const Int alpha = to_int(code_8bit(load(scratch.alpha + first_pixel)));
     if (!coloured)
@@ -91,7 +93,8 @@ ARHOST_INLINE Int encode(const Frame &frame, const Scratch &scratch, int first_p
     return rgba8(srgb8(table, radiance.x), srgb8(table, radiance.y), srgb8(table, radiance.z), alpha);
 }
 
-// Sums samples as the compositor mixes them: sRGB-encoded, premultiplied.
+// Adds the current sample to the pixels' sums. Colours are sRGB-encoded and premultiplied, as the compositor blends
+// them.
 ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, bool first) {
     const Float alpha = load(scratch.alpha + first_pixel);
     Vec3 colour = black();
@@ -106,7 +109,8 @@ ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, 
     }
 }
 
-// Adds the sums of previous frames to this one's and stores the result. A frame may have no samples.
+// Adds the sums of previous frames to the sums of this frame, and stores the totals for the next frame. A frame has
+// no samples once accumulation is complete; its totals are those of the previous frame.
 ARHOST_INLINE void add_history(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
     for (int i = 0; i < 4; ++i) {
         float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
@@ -120,7 +124,8 @@ ARHOST_INLINE void add_history(const Frame &frame, Scratch &scratch, std::size_t
 
 ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::uint32_t count) {
     const Float alpha = load(scratch.sum[3] + first_pixel);
-    // Straight alpha; the sample count cancels out.
+    // Dividing the summed colour by the summed alpha gives a colour with straight alpha: the sample count cancels
+    // out.
     const Float scale = Float(1.0f) / max(alpha, Float(1e-6f));
     const auto code = [&](int i) __attribute__((always_inline)) {
         return to_int(code_8bit(load(scratch.sum[i] + first_pixel) * scale));
@@ -139,7 +144,8 @@ ARHOST_INLINE void write_block(const Frame &frame, int x, int y, int width, int 
     }
 }
 
-// Calls use(index, x, y, width, height) for each block, row by row.
+// Calls use(index, x, y, width, height) for each block, row by row. Blocks at the right and bottom edges may be
+// smaller than 4×4 pixels.
 template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use use) {
     int index = 0;
     for (int y = all.y0; y < all.y1; y += block)
@@ -163,8 +169,8 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
         for_each_block(all, [&](int number, int, int, int width, int height) {
             const int first_pixel = number * lanes;
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
-            const Bool inside =
-                (column < Int(width)) & (row < Int(height)) & (direction.x == direction.x); // NaN: no ray
+            const Bool inside = (column < Int(width)) & (row < Int(height)) &
+                                (direction.x == direction.x); // false if NaN: the pixel has no ray
             store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
         });
         trace_queued_rays(work);
@@ -181,7 +187,7 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
             has_sums ? mean(scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count))
                      : encode(frame, scratch, first_pixel, coloured[number]);
         write_block(frame, x, y, width, height, pixels);
-        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside the tile have alpha 0
+        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside the image have alpha 0
             drawn.x0 = x < drawn.x0 ? x : drawn.x0;
             drawn.y0 = y < drawn.y0 ? y : drawn.y0;
             drawn.x1 = x + width > drawn.x1 ? x + width : drawn.x1;

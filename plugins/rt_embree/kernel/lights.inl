@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Direct light of lamps and the environment, and its occlusion.
+// Direct light from lamps and the environment, and its occlusion.
 #pragma once
 #include "random.inl"
 #include "surface.inl"
 
 enum Purpose : int { environment_purpose = 1, glass_purpose, rough_purpose, first_lamp_purpose };
 
-// A point of a light, relative to the lanes' surface points.
+// A sampled point of a light source, relative to the surface point of each lane.
 struct LightSample {
-    Vec3 to_light; // vector to the point; unit length if the light is infinitely far
-    float t_far;   // of the shadow ray along `to_light`: 1, or infinity
+    Vec3 to_light; // vector from the surface to the sampled point; of unit length if the light is infinitely far
+    float t_far;   // end of the shadow ray in lengths of `to_light`: 1, or infinity
     bool from_environment;
-    Vec3 direction;   // unit length
-    Float cosine;     // of the angle of incidence; 0 if the light is behind the surface
-    Float irradiance; // per unit of intensity, at cosine 1
+    Vec3 direction;   // of `to_light`, unit length
+    Float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
+    Float irradiance; // at perpendicular incidence, per unit of intensity
 };
 
 ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, float t_far, Float irradiance) {
@@ -32,7 +32,7 @@ ARHOST_INLINE bool is_extended(const arhost_light &light) {
     return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
 }
 
-// `uv` selects the point of an area light.
+// `uv` selects the sampled point of an area light.
 ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface &s, Pair uv) {
     if (light.type == ARHOST_LIGHT_DIRECTIONAL)
         return make_light_sample(s, -splat(light.direction), far_away, Float(1.0f));
@@ -52,17 +52,19 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
     return sample;
 }
 
-// Of a light from the surface points.
+// The visibility of a light source from the surface point of each lane.
 struct Visibility {
-    Bool unoccluded; // by opaque objects
-    Bool is_tinted;  // there is glass in between
-    Vec3 tint;       // transmittance of that glass
+    Bool unoccluded; // no opaque object is in between
+    Bool is_tinted;  // glass is in between
+    Vec3 tint;       // transmittance of the glass in between
 };
 
-// Transmittance of the glass between surface points and a light.
+// Returns the transmittance of the glass between the surface points and a light source. Sets `is_tinted` for lanes
+// with glass in between.
 ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, const LightSample &sample, Bool active,
                               Bool &is_tinted) {
-    constexpr int max_surfaces = 64; // further ones are ignored: ends loops between coincident faces
+    constexpr int max_surfaces =
+        64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     Vec3 tint = white(), start = origin, remaining = sample.to_light;
     for (int i = 0; i < max_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
@@ -85,7 +87,7 @@ ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, const LightSample
     return tint;
 }
 
-// Real surfaces cast no shadow on each other: the video already shows it.
+// Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already shows their shadows.
 ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sample, const Surface &s, Bool active) {
     const Vec3 origin = s.position + s.geometric_normal * s.offset;
     const Vec3 to_light = sample.t_far < far_away ? sample.to_light - s.geometric_normal * s.offset : sample.to_light;
@@ -101,7 +103,8 @@ ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sa
     return visibility;
 }
 
-// Binary search per lane: index of the first cumulative sum above `value`.
+// For each lane, returns the index (from 0, relative to `first`) of the first cumulative sum above `value`, found by
+// binary search.
 ARHOST_INLINE Int search(const float *sums, Int first, std::int32_t count, Float value) {
     Int low(0), high(count - 1);
     for (std::int32_t remaining = count; remaining > 1; remaining = (remaining + 1) / 2) {
@@ -125,10 +128,10 @@ ARHOST_INLINE Vec3 environment_light(const Scene &scene, Vec3 direction) {
 
 struct EnvironmentSample {
     LightSample light_sample;
-    Vec3 intensity; // as a lamp's; the density is in `light_sample.irradiance`
+    Vec3 intensity; // linear colour; `light_sample.irradiance` accounts for the sampling density
 };
 
-// Importance sampling by the environment's luminance.
+// Samples a direction in proportion to the environment's luminance. `uv`: random numbers from 0 to 1.
 ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Surface &s, Pair uv) {
     const Environment &environment = scene.environment;
     const Texture &image = *environment.image;
@@ -147,7 +150,7 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     const Float u = x * Float(1.0f / static_cast<float>(image.width)),
                 v = y * Float(1.0f / static_cast<float>(image.height));
     const Vec3 d = equirectangular_direction(u, v);
-    // The rotation's transpose is its inverse.
+    // The inverse of a rotation matrix is its transpose.
     const float *m = environment.environment_from_world;
     const Vec3 to_light{dot(splat(m), d), dot(splat(m + 3), d), dot(splat(m + 6), d)};
     const Float texels = Float(static_cast<float>(image.width) * static_cast<float>(image.height));
@@ -155,12 +158,14 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     EnvironmentSample sample;
     sample.light_sample = make_light_sample(s, to_light, far_away, irradiance_of_density(density));
     sample.light_sample.from_environment = true;
-    // Not interpolated, as the density isn't: a bright neighbour would be too much for a dark texel's density.
+    // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
+    // divided by the low density of this texel, which causes bright noise.
     sample.intensity = texel_at(scene, image, column, row).colour * Float(environment.intensity);
     return sample;
 }
 
-// Calls use(light_sample, intensity, fraction) for each sample of each light; `fraction` is 1 / the light's samples.
+// Calls use(light_sample, intensity, fraction) for each sample of each light source. `fraction` is the reciprocal of
+// the number of samples of that light source.
 template <class Use>
 ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Random &random, Use use) {
     const Scene &scene = frame.scene;
@@ -182,7 +187,8 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
         }
 }
 
-// Radiance towards the eye, except of mirrors and glass.
+// Returns the radiance that surfaces other than mirrors and glass send towards the ray's origin: ambient light,
+// emission and the reflected direct light.
 ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_eye, Bool active,
                                 const Random &random) {
     Vec3 sum = s.ambient * splat(frame.scene.ambient) + s.emission;
@@ -201,7 +207,7 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
             const Vec3 half_vector = normalize(sample.direction + to_eye);
             const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
             const Float lobe = ggx_lobe(sample.cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-            // The secondary ray adds the environment's specular reflection.
+            // The secondary ray adds the specular reflection of the environment.
             const Vec3 specular = sample.from_environment ? black() : fresnel * lobe;
             reflected = select(s.is_rough, s.diffuse * (white() - fresnel) * sample.cosine + specular, reflected);
         }
@@ -211,19 +217,19 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
     return sum;
 }
 
-// What the overlay shows on a catcher.
+// The overlay's alpha and colour at a shadow catcher.
 struct CatcherShadow {
     Float alpha;
     Vec3 colour; // linear
 };
 
-// The fraction of a catcher's light that virtual objects block.
+// Computes the shadow on a catcher from the fraction of its irradiance that virtual objects block.
 ARHOST_INLINE CatcherShadow catcher_shadow(const Frame &frame, const RTCRayHit16 &rays, Bool active,
                                            const Random &random) {
     const Scene &scene = frame.scene;
     const Surface s = surface_at(scene, rays, active);
     Float irradiance = 0.0f, hidden_part = 0.0f, tinted_part = 0.0f;
-    Vec3 weighted_colour = black(); // by channel, with coloured shadows
+    Vec3 weighted_colour = black(); // weighted sum of each channel's alpha; used for coloured shadows only
     for_each_light(frame, s, random, [&](const LightSample &sample, Vec3 intensity, float fraction) {
         const Bool facing = active & (sample.cosine > Float(0.0f));
         if (!any(facing))
@@ -235,7 +241,7 @@ ARHOST_INLINE CatcherShadow catcher_shadow(const Frame &frame, const RTCRayHit16
         irradiance = irradiance + weight;
         hidden_part = hidden_part + select(hidden, weight, Float(0.0f));
         tinted_part =
-            tinted_part + select(facing & visibility.is_tinted, weight, Float(0.0f)); // tinted implies not hidden
+            tinted_part + select(facing & visibility.is_tinted, weight, Float(0.0f)); // a tinted light is not hidden
         if (scene.coloured_shadows) {
             const Vec3 opaque = white() * Float(scene.shadow_alpha_opaque);
             const Vec3 through = select(visibility.is_tinted, opaque * (white() - visibility.tint), black());
@@ -247,7 +253,8 @@ ARHOST_INLINE CatcherShadow catcher_shadow(const Frame &frame, const RTCRayHit16
                      Float(scene.shadow_alpha_opaque), Float(scene.shadow_alpha_translucent));
     CatcherShadow shadow{select(active, alpha, Float(0.0f)), black()};
     if (scene.coloured_shadows) {
-        // Alpha per channel; the colour compensates where the common alpha darkens a channel too much.
+        // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's
+        // colour compensates for channels that this alpha would darken too much.
         const Vec3 channel_alpha{fraction_of_light(weighted_colour.x, irradiance),
                                  fraction_of_light(weighted_colour.y, irradiance),
                                  fraction_of_light(weighted_colour.z, irradiance)};

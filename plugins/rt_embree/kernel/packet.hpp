@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// SIMD packets of 16 lanes, Embree's widest: Float, Bool and Int, built from compiler vector types of the machine's
-// register width.
+// SIMD types with 16 lanes, like Embree's widest ray packets: Float, Bool and Int. Each consists of compiler vectors
+// that are as wide as the processor's registers.
 //
 // The kernel is compiled once per instruction set, each in its own namespace (ARHOST_ISA), so that code for one
 // instruction set is never linked into another. For the same reason it calls no inline functions of the standard
 // library.
 //
-// Highway is not used because its vectors are as wide as the machine's, so that every formula would have to loop;
-// target_clones is not because GCC lowers vector types to the base instruction set before it clones.
+// The Highway library is not used: its vectors are as wide as a register, so every formula would need a loop over the
+// 16 lanes. The attribute target_clones is not used either: GCC lowers vector types to the base instruction set
+// before it clones the function.
 #pragma once
 
 #include <arhost/shading/vec3.hpp>
@@ -23,7 +24,7 @@ namespace rt_embree::ARHOST_ISA {
 
 inline constexpr int lanes = 16;
 #if defined(__AVX512F__)
-inline constexpr int width = 16; // of a register
+inline constexpr int width = 16; // 4-byte values per register
 #elif defined(__AVX2__)
 inline constexpr int width = 8;
 #else
@@ -33,12 +34,12 @@ inline constexpr int width = 4;
 typedef float FloatPart __attribute__((vector_size(4 * width)));
 typedef int IntPart __attribute__((vector_size(4 * width)));
 
-// The registers that hold `count` lanes. Nested halves rather than an array: GCC keeps members in registers, but
-// arrays in memory.
+// The registers that hold `count` lanes, as nested halves. An array would be simpler, but GCC keeps arrays in memory,
+// and members in registers.
 template <class Part, int count> struct Wide { Wide<Part, count / 2> low, high; };
 template <class Part> struct Wide<Part, width> { Part part; };
 
-// to = op(from…), register by register.
+// Computes `to` = `op`(`from`…) register by register.
 template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To &to, const From &...from) {
     if constexpr (requires { to.part; }) {
         to.part = op(from.part...);
@@ -48,7 +49,8 @@ template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To 
     }
 }
 
-// Body of a function of the packets a (and b): `expression` in their registers a_ (and b_).
+// The body of a function of the packets `a` (and `b`) that returns a `Type`. Evaluates `expression` for each register
+// of `a` (and `b`), which it calls `a_` (and `b_`).
 #define ARHOST_UNARY(Type, expression)                                                                               \
     Type to;                                                                                                         \
     apply(                                                                                                           \
@@ -60,7 +62,7 @@ template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To 
         [](auto a_, auto b_) __attribute__((always_inline)) { return expression; }, to.lane, a.lane, b.lane);        \
     return to
 
-// Lanes are 0 (false) or −1 (true).
+// Each lane is 0 (false) or −1 (true).
 struct alignas(64) Bool {
     Wide<IntPart, lanes> lane;
     ARHOST_INLINE friend Bool operator&(Bool a, Bool b) { ARHOST_BINARY(Bool, a_ & b_); }
@@ -116,7 +118,7 @@ ARHOST_INLINE Bool bool_of(bool b) {
         [b]() __attribute__((always_inline)) { return IntPart{} - static_cast<int>(b); }, a.lane);
     return a;
 }
-// If `a` is NaN, the result is b.
+// min() and max() return `b` if `a` is NaN.
 ARHOST_INLINE Float min(Float a, Float b) {
     ARHOST_BINARY(Float, a_ < b_ ? a_ : b_);
 }
@@ -144,9 +146,10 @@ ARHOST_INLINE Vec3 select(Bool b, Vec3 yes, Vec3 no) {
 ARHOST_INLINE Float to_float(Int a) {
     ARHOST_UNARY(Float, __builtin_convertvector(a_, FloatPart));
 }
+// Rounds towards 0.
 ARHOST_INLINE Int to_int(Float a) {
     ARHOST_UNARY(Int, __builtin_convertvector(a_, IntPart));
-} // towards 0
+}
 ARHOST_INLINE Int bits_of(Float a) {
     ARHOST_UNARY(Int, reinterpret_cast<IntPart>(a_));
 }
@@ -190,7 +193,7 @@ ARHOST_INLINE Vec3 normalize(Vec3 a) {
     return a * (Float(1.0f) / length(a));
 }
 
-// One bit per lane.
+// Returns one bit per lane: 1 if the lane is true.
 ARHOST_INLINE unsigned mask_of(Wide<IntPart, width> b) {
 #if defined(__AVX512DQ__)
     return _mm512_movepi32_mask(reinterpret_cast<__m512i>(b.part));
@@ -234,8 +237,9 @@ ARHOST_INLINE Float gather(const float *table, Int index) {
     return float_of(gather(reinterpret_cast<const int *>(table), index));
 }
 
-// Arrays of 16, as in Embree's packets. Copied register by register: GCC copies whole packets in halves of
-// registers, which the processor cannot forward to the following load.
+// Loading and storing packets as arrays of 16 values, the layout of Embree's ray packets. These functions copy one
+// register at a time: GCC would copy a whole packet in pieces of half a register, and the processor cannot forward
+// two such stores to one load.
 template <class To> ARHOST_INLINE void load_registers(To &to, const void *from) {
     if constexpr (requires { to.part; }) {
         __builtin_memcpy(&to.part, from, sizeof to.part);
@@ -278,10 +282,11 @@ ARHOST_INLINE void store(int *to, Bool a) {
     store_registers(to, a.lane);
 }
 
-// log2 of a positive, normal number, error 2e-7: mantissa m in [√½, √2), odd series 2 atanh(s) / ln 2 in
-// s = (m − 1)/(m + 1).
+// Returns log2(a) with an error of at most 2e-7; `a` must be positive and not denormal. Splits `a` into an exponent
+// and a mantissa m in [√½, √2), and computes log2(m) = 2 atanh(s) / ln 2, where s = (m − 1)/(m + 1), as an odd power
+// series.
 ARHOST_INLINE Float log2(Float a) {
-    const Int bits = bits_of(a) - Int(0x3f3504f3); // √½
+    const Int bits = bits_of(a) - Int(0x3f3504f3); // the bits of √½
     const Int exponent = bits >> Int(23);
     const Float m = float_of(bits_of(a) - (exponent << Int(23)));
     const Float s = (m - Float(1.0f)) / (m + Float(1.0f)), s2 = s * s;
@@ -291,7 +296,8 @@ ARHOST_INLINE Float log2(Float a) {
     return to_float(exponent) + s * series;
 }
 
-// 2^a, relative error 2e-7: integer part into the exponent, Taylor series of e^(x ln 2) on [−½, ½].
+// Returns 2^a with a relative error of at most 2e-7. The integer part of `a` becomes the exponent; the fraction f,
+// from −½ to ½, is the argument of a Taylor series of e^(f ln 2).
 ARHOST_INLINE Float exp2(Float a) {
     const Float x = min(max(a, Float(-126.0f)), Float(127.0f));
     const Float whole = floor(x + Float(0.5f)), f = x - whole;
@@ -304,13 +310,13 @@ ARHOST_INLINE Float exp2(Float a) {
     return series * float_of((to_int(whole) + Int(127)) << Int(23));
 }
 
-ARHOST_INLINE Float pow(Float a, Float b) { // a > 0
+ARHOST_INLINE Float pow(Float a, Float b) { // requires a > 0
     return exp2(b * log2(a));
 }
 
-// sin(2πt), error 6e-8: Taylor series on [−¼, ¼] turns.
+// Returns sin(2πt) with an error of at most 6e-8: reduces t to [−¼, ¼] and evaluates a Taylor series.
 ARHOST_INLINE Float sine_of_turn(Float t) {
-    const Float x = t - floor(t + Float(0.5f)); // −½ to ½
+    const Float x = t - floor(t + Float(0.5f)); // from −½ to ½
     const Float folded = select(abs(x) > Float(0.25f), select(x < Float(0.0f), Float(-0.5f), Float(0.5f)) - x, x);
     const Float a = folded * Float(6.28318531f), a2 = a * a;
     return a * (Float(1.0f) + a2 * (Float(-0.166666667f) +
@@ -321,8 +327,8 @@ ARHOST_INLINE Float sine_of_turn(Float t) {
 ARHOST_INLINE Float cosine_of_turn(Float t) {
     return sine_of_turn(t + Float(0.25f));
 }
-// The angle of (x, y) from the y axis towards the x axis in turns, −½ to ½, error 2e-6 (Abramowitz and Stegun,
-// 4.4.49).
+// Returns the angle from the y axis to the vector (x, y), positive towards the x axis, in turns from −½ to ½. The
+// error is at most 2e-6 (Abramowitz and Stegun, 4.4.49).
 ARHOST_INLINE Float turn_of(Float x, Float y) {
     const Float ax = abs(x), ay = abs(y);
     const Float q = min(ax, ay) / max(max(ax, ay), Float(1e-30f)), q2 = q * q;

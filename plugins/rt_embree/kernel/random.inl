@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Deterministic quasi-random numbers: all pixels use the same sequence, each with a hashed start.
+// Deterministic quasi-random numbers. All pixels use the same sequence; each pixel starts at an offset that is a hash
+// of its position.
 #pragma once
 #include "trace.inl"
 
-// 32-bit hash (C. Wellons' "lowbias32").
+// Returns a 32-bit hash of `x` ("lowbias32" by C. Wellons).
 ARHOST_INLINE Int hash(Int x) {
     x = (x ^ shift_right_unsigned(x, 16)) * Int(0x7feb352d);
     x = (x ^ shift_right_unsigned(x, 15)) * Int(static_cast<int>(0x846ca68bu));
@@ -12,16 +13,17 @@ ARHOST_INLINE Int hash(Int x) {
 }
 
 struct Random {
-    Int pixel, seed;      // choose the start of the sequence
-    std::uint32_t sample; // index within the pixel
+    Int pixel, seed;      // determine the start of the sequence
+    std::uint32_t sample; // index among the samples of the pixel
 };
 
 struct Pair {
     Float u, v; // [0, 1)
 };
 
-// The `count` pairs of a purpose are evenly spread over the unit square, and so are those of all samples of a pixel
-// together (R2: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
+// Returns pair `index` of the `count` pairs that a sample needs for `purpose`. These pairs are evenly spread over the
+// unit square, as are the pairs of all samples of a pixel (R2 sequence: M. Roberts, The Unreasonable Effectiveness of
+// Quasirandom Sequences, 2018).
 ARHOST_INLINE Pair pair(const Random &random, int purpose, int index, int count) {
     const Int base = hash(random.pixel ^ random.seed);
     const Int start = hash(base + Int(purpose * 2)), start_2 = hash(base + Int(purpose * 2 + 1));

@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Secondary rays. They are queued by depth until a packet is full, so that packets stay full however rays scatter.
+// Secondary rays. Rays of the same depth wait in a queue until they fill a packet of 16, because partly filled
+// packets waste lanes.
 #pragma once
 #include "lights.inl"
 
 // Pixel and throughput of 16 paths.
 struct Paths {
-    Int pixel;                // index in the tile
-    std::int32_t first_pixel; // primary rays only: their pixels are consecutive
+    Int pixel;                // index of the pixel in the tile
+    std::int32_t first_pixel; // pixel of lane 0; valid for primary rays only, whose pixels are consecutive
     Vec3 throughput;
-    std::uint32_t depth; // bounces so far
+    std::uint32_t depth; // number of bounces so far
 };
 
 // State of the tile being rendered.
 struct Work {
     const Frame &frame;
     Scratch &scratch;
-    std::uint32_t deepest; // upper bound of the depths with queued rays
-    Int seed;              // of the tile's random numbers
-    std::uint32_t sample;  // index among all accumulated samples
+    std::uint32_t deepest; // no queue of a greater depth has rays
+    Int seed;              // seed of the tile's random numbers
+    std::uint32_t sample;  // index of the current sample among all accumulated ones
 };
 
 ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
@@ -52,7 +53,7 @@ ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, B
     }
 }
 
-// Queues a ray of the next depth for each active lane.
+// Adds a secondary ray for each active lane to the queue of the depth of `from`.
 ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
     alignas(64) float by_lane[RayQueue::rows][lanes];
     const Float values[] = {origin.x,    origin.y,     origin.z,     direction.x,  direction.y,
@@ -85,8 +86,9 @@ ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active);
 }
 
-// Queues the reflected and the refracted ray, or a random one of them (`single_path`). Rays that are cut off
-// contribute the material's cutoff colour.
+// Queues the reflected and the refracted ray, or only one of them, chosen at random, if `single_path` is set. A ray
+// that exceeds the depth limit or falls below the importance cutoff is not traced: it contributes the material's
+// cutoff colour.
 ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                     const arhost_material &glass, Bool active) {
     const Vec3 transmittance = select(s.back_face, bouguer(splat(glass.extinction), s.distance), white());
@@ -98,7 +100,8 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
     Float squared = refracted_cosine_squared(cosine, ratio);
     Float refracted_cosine = sqrt(max(squared, Float(0.0f)));
     Vec3 refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
-    // As with reflection: if the interpolated normal refracts the ray to the outside, use the facet's normal.
+    // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used
+    // instead; reflected() does the same for reflection.
     const Bool wrong_side = (dot(refracted, s.geometric_normal) > Float(0.0f)) & (squared > Float(0.0f));
     if (any(active & wrong_side)) {
         normal = select(wrong_side, s.geometric_normal, normal);
@@ -141,10 +144,10 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
                 reflected_throughput, reflects);
 }
 
-// Rays below this throughput change no 8-bit code by half a step.
+// Rough reflections below this throughput change no 8-bit code by half a step.
 constexpr float min_throughput = 2e-3f;
 
-// Reflects off a sampled microfacet.
+// Queues rays that are reflected off a randomly sampled microfacet.
 ARHOST_INLINE void scatter_rough(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
     const Pair uv = pair(random_of(work, paths), rough_purpose, 0, 1);
     const Vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v);
@@ -170,7 +173,7 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     if (!s.any_scattering)
         return;
     if (paths.depth >= scene.max_depth) {
-        // Depth limit: glass shows its cutoff colour.
+        // At the depth limit, glass shows its cutoff colour.
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
             if (object.material->model == ARHOST_MATERIAL_GLASS)
                 add_radiance(work, paths, splat(object.material->cutoff_colour), here);
@@ -191,7 +194,7 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     });
 }
 
-// Traces up to 16 of the rays queued at a depth, newest first.
+// Removes the newest rays, at most 16, from the queue of `depth`, traces them and shades their hits.
 ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
     RayQueue &queue = work.scratch.queues[depth];
     const std::int32_t first = queue.count > lanes ? queue.count - lanes : 0;
@@ -211,8 +214,9 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
         shade(work, rays, hit, paths);
 }
 
-// Empties the queues. The deepest full packet is traced first, so that every queue but the first holds fewer than
-// three packets; if none is full, the shallowest, whose secondary rays may fill the others.
+// Traces packets until all queues are empty. Picks the deepest queue that holds a full packet, which keeps every
+// queue but the first below three packets. If no queue holds a full packet, picks the shallowest non-empty one,
+// because its secondary rays may fill the deeper queues.
 ARHOST_INLINE void trace_queued_rays(Work &work) {
     RayQueue *queues = work.scratch.queues;
     for (;;) {

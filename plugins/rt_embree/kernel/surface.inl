@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shading inputs at the hits of a packet.
+// Computes what shading needs to know about the surfaces that a packet of rays hits.
 #pragma once
 #include "texture.inl"
 
 struct Surface {
     Vec3 position;
-    Vec3 geometric_normal, normal; // of the facet, and interpolated: unit length, facing the ray origin
-    Bool back_face;                // the ray hit the side that the facet's own normal points away from
-    Float offset;                  // mm: secondary rays start this far above the facet
-    Float distance;                // mm, from the ray origin
+    // The triangle's normal and the shading normal (interpolated from the vertices, and perturbed by the normal map).
+    // Both have unit length and face the ray origin.
+    Vec3 geometric_normal, normal;
+    Bool back_face; // the ray hit the back face; `geometric_normal` has been flipped
+    Float offset;   // mm: distance of a secondary ray's origin from the surface
+    Float distance; // mm, from the ray origin
     Vec3 ambient, diffuse, specular, emission;
-    Float exponent; // Phong's
-    Float alpha;    // GGX's, if `is_rough`
-    Bool is_lit;    // shaded by direct light: neither mirror nor glass
-    Bool is_rough;  // metallic-roughness: `specular` is the reflectance at normal incidence
+    Float exponent; // Phong exponent
+    Float alpha;    // GGX roughness parameter; valid if `is_rough`
+    Bool is_lit;    // shaded by direct light: neither a mirror nor glass
+    Bool is_rough;  // has a metallic-roughness material; `specular` is then the reflectance at normal incidence
     Bool is_real;   // a catcher or occluder
-    bool any_specular, any_rough, any_scattering; // any lane; scattering: the surface spawns secondary rays
+    // Whether any lane has the property. A scattering surface spawns secondary rays.
+    bool any_specular, any_rough, any_scattering;
 };
 
-// A vertex attribute interpolated at the hits. Lanes outside `here` read triangle 0. Strides are multiples of 4 bytes
-// (arhost/scene.h).
+// Interpolates a vertex attribute at the hits. Lanes outside `here` yield values of triangle 0, which the caller
+// ignores. `stride` is in bytes and a multiple of 4 (arhost/scene.h).
 template <int components> struct Attribute { Float of[components]; };
 template <int components>
 ARHOST_INLINE Attribute<components> interpolated(const Object &object, const float *values, std::uint32_t stride,
@@ -37,7 +40,8 @@ ARHOST_INLINE Attribute<components> interpolated(const Object &object, const flo
     return sum;
 }
 
-// White if the object has no texture coordinates. `texture` is not ARHOST_NONE.
+// Samples a texture at the hits; returns white if the object has no texture coordinates. `texture`: an index, not
+// ARHOST_NONE.
 ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &object, std::uint32_t texture,
                                           const RTCHit16 &hit, Bool here) {
     if (!object.texcoords)
@@ -46,7 +50,8 @@ ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &obje
     return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
 }
 
-// `normal` perturbed by the object's normal map. The tangent is per facet.
+// Returns `normal`, perturbed by the object's normal map. `facet` is the geometric normal. The tangents are constant
+// over each triangle.
 ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal,
                                  const RTCHit16 &hit, Bool here) {
     const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
@@ -79,7 +84,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     const Vec3 facet{load(hit.Ng_x), load(hit.Ng_y), load(hit.Ng_z)};
     const Vec3 step = direction * load(rays.ray.tfar);
 
-    Surface s; // not `= {}`, which compiles to a slow string instruction
+    Surface s; // without `= {}`, which GCC compiles to a slow string instruction
     s.ambient = s.diffuse = s.specular = s.emission = black();
     s.exponent = s.alpha = Float(0.0f);
     s.is_lit = s.is_rough = s.is_real = bool_of(false);

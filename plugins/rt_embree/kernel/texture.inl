@@ -2,17 +2,19 @@
 #pragma once
 #include "trace.inl"
 
-// Colour and alpha, linear.
+// Linear colour and alpha.
 struct Texel {
     Vec3 colour;
     Float alpha;
 };
 
+// Returns the texel index inside the texture that `i`, which may be outside, maps to.
 ARHOST_INLINE Int wrapped(Int i, std::int32_t size, arhost_wrap wrap) {
     const Int last(size - 1), zero(0);
     if (wrap == ARHOST_WRAP_CLAMP)
         return select(i < zero, zero, select(i >= Int(size), last, i));
-    // i mod n in float arithmetic: exact, as textures are at most 2^14 wide and coordinates are reduced first.
+    // Computes i mod `period` in float arithmetic. The result is exact: textures have at most 2^14 texels a side, and
+    // sample_texture() has already reduced the coordinate.
     const int period = wrap == ARHOST_WRAP_MIRROR ? 2 * size : size;
     const Int times = to_int(floor((to_float(i) + Float(0.5f)) * Float(1.0f / static_cast<float>(period))));
     const Int within = i - times * Int(period);
@@ -40,9 +42,10 @@ ARHOST_INLINE Texel texel_at(const Scene &scene, const Texture &texture, Int x, 
     return {Vec3{to_float(byte(0)), to_float(byte(1)), to_float(byte(2))} * Float(1.0f / 255), alpha};
 }
 
-// Bilinear.
+// Samples a texture with bilinear filtering.
 ARHOST_INLINE Texel sample_texture(const Scene &scene, const Texture &texture, Float u, Float v) {
-    // Range reduction: the texel index must fit an int and keep its fraction.
+    // Reduces a coordinate to an equivalent one near 0: the texel index must fit an int, and the float must retain
+    // its fraction.
     const auto reduced = [](Float t, arhost_wrap wrap) __attribute__((always_inline)) {
         if (wrap == ARHOST_WRAP_CLAMP)
             return min(max(t, Float(-1.0f)), Float(2.0f));

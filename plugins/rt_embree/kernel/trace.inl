@@ -21,7 +21,7 @@ ARHOST_INLINE Int lane_numbers() {
     return load(numbers);
 }
 
-// `m`: column-major 3×3.
+// Returns m · a, where `m` is a column-major 3×3 matrix.
 ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
     return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;
 }
@@ -47,13 +47,15 @@ ARHOST_INLINE Vec3 direction_of(const RTCRay16 &ray) {
     return {load(ray.dir_x), load(ray.dir_y), load(ray.dir_z)};
 }
 
-// False for NaN, infinite or huge components, as computed e.g. from facets of 1e-15 mm: Embree aborts on such rays.
+// Returns false for rays with NaN, infinite or huge components, which result, for example, from triangles of 1e-15
+// mm. Embree aborts on such rays.
 ARHOST_INLINE Bool is_valid_ray(Vec3 origin, Vec3 direction) {
     return (largest(origin) < Float(1e18f)) & (largest(direction) < Float(1e18f)) &
            (dot(direction, direction) >= Float(0.0f));
 }
 
-// Finds the closest hits of the active lanes; returns the lanes with a hit. `bvh`: `scene.root` or `scene.catchers`.
+// Finds the closest hit of each active lane. Returns the lanes that have a hit. `bvh` is `scene.root` or
+// `scene.catchers`.
 ARHOST_INLINE Bool trace(const Scene &scene, RTCScene bvh, Query query, RTCRayHit16 &rays, Bool active) {
     alignas(64) int valid[lanes];
     active = active & is_valid_ray(origin_of(rays.ray), direction_of(rays.ray));
@@ -64,7 +66,7 @@ ARHOST_INLINE Bool trace(const Scene &scene, RTCScene bvh, Query query, RTCRayHi
     return active & (load(rays.hit.geomID) != Int(no_hit));
 }
 
-// The active lanes whose rays are occluded.
+// Returns the active lanes whose rays are occluded.
 ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     alignas(64) int valid[lanes];
     active = active & is_valid_ray(origin_of(rays), direction_of(rays));
@@ -75,13 +77,15 @@ ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     return active & (load(rays.tfar) < Float(0.0f)); // Embree sets −∞ on a hit
 }
 
+// Returns the index in `scene.objects` of the object that each lane hits.
 ARHOST_INLINE Int object_number(const Scene &scene, const RTCHit16 &hit) {
     const Int instance = load(hit.instID[0]);
     const Bool by_geometry = (instance == Int(no_hit)) | (instance == Int(scene.static_instance));
     return select(by_geometry, load(hit.geomID), instance);
 }
 
-// Calls use(object, lanes) for each object hit by `active` lanes: mostly one or two per packet.
+// Calls use(object, lanes) for each object that an active lane hits, with the lanes that hit it. A packet mostly hits
+// only one or two objects.
 template <class Use>
 ARHOST_INLINE void for_each_object(const Scene &scene, const RTCHit16 &hit, Bool active, Use use) {
     const Int numbers = object_number(scene, hit);

@@ -2,26 +2,26 @@
 //
 // Rays and their intersections with triangles and spheres. Each path implements
 //     Hit trace(Ray ray, bool any_hit, bool cull_back_faces)
-// which returns the nearest hit; with `any_hit`, some hit, of which only `object` is valid.
+// which returns the nearest hit. With `any_hit`, it may return any hit, in which only `object` is valid.
 
 struct Ray {
     vec3 origin, direction;
-    float t_max; // in lengths of `direction`
+    float t_max; // end of the ray, in lengths of `direction`
     uint mask;
 };
 
 struct Hit {
-    float t; // in lengths of the ray's direction
-    vec2 uv; // of a triangle: the barycentric coordinates of its second and third corner
+    float t; // distance, in lengths of the ray's direction
+    vec2 uv; // barycentric coordinates of a triangle's second and third corner
     vec3 facet; // the geometric normal in object space, not normalized
-    uint object, primitive; // object NONE: no hit
+    uint object, primitive; // `object` is NONE if there is no hit
 };
 
 Hit no_hit(Ray ray) {
     return Hit(ray.t_max, vec2(0.0), vec3(0.0), NONE, NONE);
 }
 
-// Tests the bits: compilers may assume that there are no NaNs.
+// Tests the bits of the floats, because compilers may assume that there are no NaNs.
 bool is_finite(float a) {
     return (floatBitsToUint(a) & 0x7f800000u) != 0x7f800000u;
 }
@@ -29,15 +29,16 @@ bool is_finite(vec3 a) {
     return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);
 }
 
-// False if numbers have left the range of floats (e.g. near facets of 1e-15 mm); tracing such a ray is undefined.
+// Returns false if the ray has NaN, infinite or huge components, which result, for example, from triangles of 1e-15 mm.
+// Tracing such a ray is undefined.
 bool can_hit(Ray ray) {
     return frame.object_count != 0u && is_finite(ray.origin) && is_finite(ray.direction) &&
            largest(ray.origin) < 1e18 && largest(ray.direction) < 1e18 &&
            floatBitsToUint(ray.t_max) <= floatBitsToUint(INFINITY); // neither below 0 nor NaN
 }
 
-// Fixed evaluation order without fused operations: `precise` does not apply inside GLSL's own dot(), cross() and
-// matrix products.
+// ordered_dot() and ordered_cross() compute the same bits on all devices: they have a fixed order of evaluation and no
+// fused operations. GLSL's own dot(), cross() and matrix products do not, because `precise` has no effect inside them.
 float ordered_dot(vec3 a, vec3 b) {
     precise float sum = a.x * b.x + a.y * b.y + a.z * b.z;
     return sum;
@@ -78,7 +79,8 @@ bool is_hole(uint object, uint primitive, vec2 uv) {
     return sample_texture(materials[material].colour_texture, texcoord).a < materials[material].alpha_cutoff;
 }
 
-// Möller-Trumbore, as Embree computes it.
+// Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. Returns true
+// and updates `hit` if the hit is not farther away than hit.t.
 bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
     vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
     vec3 to_corner = primitives[primitive].corner - origin;
@@ -121,8 +123,8 @@ vec3 facet_of(uint primitive) {
     return ordered_cross(primitives[primitive].edge_2, primitives[primitive].edge_1);
 }
 
-// a · b + c with a single rounding (T. J. Dekker, A Floating-Point Technique for Extending the Available Precision, 1971;
-// the sum: D. E. Knuth, The Art of Computer Programming 2, 4.2.2). GLSL's fma() may round twice.
+// Returns a · b + c with a single rounding (T. J. Dekker, A Floating-Point Technique for Extending the Available
+// Precision, 1971; for the sum: D. E. Knuth, The Art of Computer Programming 2, 4.2.2). GLSL's fma() may round twice.
 vec3 fused(float a, vec3 b, vec3 c) {
     const float half_of_the_bits = 4097.0;
     precise float a_wide = a * half_of_the_bits, a_high = a_wide - (a_wide - a), a_low = a - a_high;
@@ -134,8 +136,8 @@ vec3 fused(float a, vec3 b, vec3 c) {
     return result;
 }
 
-// For a small facet far away, rounding costs the barycentric coordinates 1e-5 and more, which glass magnifies:
-// recomputes them relative to the hit point.
+// Recomputes t and the barycentric coordinates of a hit relative to the hit point, which reduces rounding errors. For
+// small triangles far away, the original coordinates have errors of 1e-5 and more, which glass magnifies.
 void refine(Ray ray, inout Hit hit) {
     if (hit.object == NONE || (objects[hit.object].flags & IS_SPHERES) != 0u)
         return;
@@ -147,14 +149,14 @@ void refine(Ray ray, inout Hit hit) {
     precise float scale = 1.0 / ordered_dot(hit.facet, direction);
     precise float t = hit.t + ordered_dot(hit.facet, to_corner) * scale;
     vec2 uv = vec2(ordered_dot(moment, edge_2), ordered_dot(moment, edge_1)) * scale;
-    if (is_finite(vec3(uv, t)) && t > 0.0) { // not parallel to the facet
+    if (is_finite(vec3(uv, t)) && t > 0.0) { // false if the ray is parallel to the triangle
         hit.uv = uv;
         hit.t = t;
     }
 }
 
 // Recomputes a hit reported by the device with the plain path's formulas, so that all paths agree to the last bit. At
-// edges, where these may miss, keeps the device's values.
+// edges, these formulas may find no hit; the function then keeps the device's values.
 Hit recomputed_hit(Ray ray, uint object, uint primitive, float t, vec2 uv) {
     vec3 origin, direction;
     to_object_space(object, ray, origin, direction);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Computes a pixel's colour and alpha, as rt_embree's kernel/kernel.inl. A single loop with a single trace() handles
-// the rays of all stages, to keep the code small.
+// Computes a pixel's colour and alpha. Equivalent to rt_embree's kernel/kernel.inl. A single loop with a single call of
+// trace() handles all kinds of rays, because trace() is inlined and its code is long.
 
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
-// Linear light, and alpha. Catchers do not hide virtual objects behind them, so primary rays ignore catchers; occluders
-// hide everything behind them.
+// Renders a sample; returns its linear radiance and alpha. Catchers do not hide the virtual objects behind them, so
+// primary rays ignore catchers. Occluders hide everything behind them.
 vec4 trace_sample(vec3 direction, Random random) {
     vec3 light = vec3(0.0);
     float alpha = 0.0;
@@ -56,12 +56,14 @@ vec4 trace_sample(vec3 direction, Random random) {
     return vec4(light, alpha);
 }
 
-// A pixel's direction in camera space, or one of its derivatives.
+// Reads a ray direction in camera axes, or one of its derivatives, from `rays`. `z`: the z component if only x and y
+// are stored.
 vec3 stored_ray(uint first, float z) {
     return vec3(rays[first], rays[first + 1u], ray_dimensions == 3u ? rays[first + 2u] : z);
 }
 
-// False outside the lens's field of view.
+// Computes the ray direction, in world space, at the offset `within` from a pixel's centre. Returns false if the
+// pixel is outside the field of view of the lens.
 bool direction_of(uint pixel, vec2 within, out vec3 direction) {
     uint first = pixel * ray_dimensions * (has_slopes ? 3u : 1u);
     direction = stored_ray(first, 1.0);
@@ -70,15 +72,15 @@ bool direction_of(uint pixel, vec2 within, out vec3 direction) {
         direction += stored_ray(first + ray_dimensions, 0.0) * within.x +
                      stored_ray(first + 2u * ray_dimensions, 0.0) * within.y;
     mat3 m = frame.world_from_camera;
-    precise vec3 in_world = m[0] * direction.x + m[1] * direction.y + m[2] * direction.z; // see ordered_dot()
+    precise vec3 in_world = m[0] * direction.x + m[1] * direction.y + m[2] * direction.z; // not m * direction: see ordered_dot()
     direction = in_world;
     return is_visible;
 }
 
 uint srgb8(float linear) {
-    // As arhost/shading/srgb8.hpp: equal to the exact formula, rounded.
+    // Table lookup of arhost/shading/srgb8.hpp. The result equals the exact formula, rounded.
     int bits = floatBitsToInt(clamp(linear, 1.0 / 8192.0, 1.0));
-    uint number = min(uint((bits - (114 << 23)) >> 16), FIRST_LIGHT_OF_CODE - 1u); // also for NaN
+    uint number = min(uint((bits - (114 << 23)) >> 16), FIRST_LIGHT_OF_CODE - 1u); // stays inside the table even for NaN
     int cell = int(tables[FIRST_SRGB_CELL + number]);
     return uint((cell >> 17) + ((bits & 0xffff) >= (cell & 0x1ffff) ? 1 : 0));
 }
@@ -91,7 +93,7 @@ uint code_of(float value) {
     return uint(code_8bit(value));
 }
 
-// A single sample exactly, or the mean of all samples so far.
+// Returns a pixel's RGBA code: that of a single sample without averaging, or the mean of all samples so far.
 uint shade_pixel(uvec2 position) {
     uint pixel = position.y * frame.width + position.x;
     vec4 sum = vec4(0.0), value = vec4(0.0);
@@ -101,7 +103,7 @@ uint shade_pixel(uvec2 position) {
         value = vec4(0.0);
         if (direction_of(pixel, frame.samples[i].xy, direction))
             value = trace_sample(direction, random_of_pixel(position, frame.first_sample + i));
-        // Averaged as the compositor blends: premultiplied and sRGB-encoded.
+        // Averages premultiplied, sRGB-encoded colours, as the compositor blends them.
         if (averages)
             sum += vec4(vec3(srgb_encode(value.x), srgb_encode(value.y), srgb_encode(value.z)) * value.a, value.a);
     }
@@ -112,7 +114,7 @@ uint shade_pixel(uvec2 position) {
             sum += history[pixel];
         history[pixel] = sum;
     }
-    // Back to straight alpha: the sample count cancels out.
+    // Dividing the summed colour by the summed alpha gives a colour with straight alpha: the sample count cancels out.
     float scale = 1.0 / max(sum.a, 1e-6);
     float count = float(frame.first_sample + frame.sample_count);
     return packed(
@@ -127,7 +129,8 @@ void write_pixel(uvec2 position) {
     image_pixels[position.y * frame.width + position.x] = pixel;
     if (pixel >> 24 == 0u)
         return;
-    // Most pixels don't extend the bounding box and skip the atomics; a stale value only costs a redundant one.
+    // Most pixels do not extend the bounding rectangle and skip the atomic operations. A stale value causes at most a
+    // redundant atomic operation.
     ivec2 corner = ivec2(position);
     if (corner.x < drawn_x0)
         atomicMin(drawn_x0, corner.x);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Direct light of lamps and the environment, and its shadows (rt_embree's kernel/lights.inl).
+// Direct light from lamps and the environment, and its occlusion. Equivalent to rt_embree's kernel/lights.inl.
 
-// Light from one point of a light source at a surface point.
+// The light that arrives at a surface point from one sampled point of a light source.
 struct Incidence {
-    vec3 to_light;    // the vector to the point; unit length if infinitely far
-    float t_max;      // 1, or infinity
-    vec3 direction;   // unit length
-    float cosine;     // to the surface normal; 0 if the light is behind the surface
-    float irradiance; // per unit of intensity, at cosine 1
+    vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
+    float t_max;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
+    vec3 direction;   // of `to_light`, unit length
+    float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
+    float irradiance; // at perpendicular incidence, per unit of intensity
     vec3 intensity;
     bool from_environment;
 };
@@ -23,7 +23,7 @@ bool is_extended(uint lamp) {
     return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
 }
 
-// `sample_uv` chooses the point on an area light.
+// `sample_uv` selects the sampled point of an area light.
 Incidence incidence(uint lamp, Surface s, vec2 sample_uv) {
     uint type = lights[lamp].type;
     vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
@@ -44,17 +44,18 @@ Incidence incidence(uint lamp, Surface s, vec2 sample_uv) {
     return arriving;
 }
 
-// Visibility of a light from a surface point.
+// The visibility of a light source from a surface point.
 struct Visibility {
-    bool is_unoccluded; // nothing opaque lies between
-    bool is_tinted;     // glass lies between
-    vec3 tint;          // the glass's transmittance
+    bool is_unoccluded; // no opaque object is in between
+    bool is_tinted;     // glass is in between
+    vec3 tint;          // transmittance of the glass in between
 };
 
-// Real surfaces cast no shadows on each other: the video shows those. First a ray against opaque objects, then one from
-// each glass surface to the next, in one loop, as inlined trace() is long.
+// Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already
+// shows their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to
+// the next. A single loop traces all of them, because trace() is inlined and its code is long.
 Visibility visibility(Incidence arriving, Surface s) {
-    const int max_surfaces = 64; // the rest counts as clear: ends loops between coincident faces
+    const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     vec3 start = s.position + s.geometric_normal * s.offset, to_light = arriving.to_light;
     bool is_finite_distance = arriving.t_max < INFINITY;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
@@ -74,7 +75,7 @@ Visibility visibility(Incidence arriving, Surface s) {
                                      abs(dot(glass.normal, arriving.direction)));
             if (!(largest(result.tint) > 1e-3))
                 break;
-            // Continue behind it.
+            // The next ray starts behind the glass surface.
             vec3 next = glass.position - glass.geometric_normal * glass.offset;
             if (is_finite_distance)
                 to_light -= next - start;
@@ -85,7 +86,7 @@ Visibility visibility(Incidence arriving, Surface s) {
     return result;
 }
 
-// The index of the first cumulative sum above `value`.
+// Returns the index (from 0, relative to `first`) of the first cumulative sum above `value`, found by binary search.
 int search_sums(uint first, int count, float value) {
     int low = 0, high = count - 1;
     while (low < high) {
@@ -98,7 +99,7 @@ int search_sums(uint first, int count, float value) {
     return low;
 }
 
-// The sum before an element, and the element's own value.
+// Returns cumulative sum i - 1 (0 if i is 0), and the difference between it and cumulative sum i.
 vec2 step_of_sums(uint first, int i) {
     float before = i > 0 ? uintBitsToFloat(tables[first + uint(i - 1)]) : 0.0;
     return vec2(before, uintBitsToFloat(tables[first + uint(i)]) - before);
@@ -112,7 +113,7 @@ vec3 environment_light(vec3 direction) {
            frame.environment_intensity;
 }
 
-// A direction sampled in proportion to the environment's brightness.
+// Samples a direction in proportion to the environment's luminance. `sample_uv`: random numbers from 0 to 1.
 Incidence sample_environment(Surface s, vec2 sample_uv) {
     int width = textures[frame.environment_texture].width, height = textures[frame.environment_texture].height;
     int row = search_sums(frame.environment_rows, height, sample_uv.y);
@@ -122,22 +123,23 @@ Incidence sample_environment(Surface s, vec2 sample_uv) {
     vec2 column_step = step_of_sums(first, column);
     float u = (float(column) + fraction_of_step(sample_uv.x, column_step.x, column_step.y)) * (1.0 / float(width));
     float v = (float(row) + fraction_of_step(sample_uv.y, row_step.x, row_step.y)) * (1.0 / float(height));
-    // The rotation's transpose is its inverse.
+    // The inverse of a rotation matrix is its transpose.
     vec3 direction = equirectangular_direction(u, v) * frame.environment_from_world;
     float density = equirectangular_density(row_step.y * column_step.y * (float(width) * float(height)), v);
-    // Unfiltered, like the density: interpolated light would be too bright for the density of a darker texel.
+    // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
+    // divided by the low density of this texel, which causes bright noise.
     vec3 light = texel_at(frame.environment_texture, column, row).rgb * frame.environment_intensity;
     Incidence arriving = incidence_along(s, direction, INFINITY, irradiance_of_density(density), light);
     arriving.from_environment = true;
     return arriving;
 }
 
-// Light reflected along the ray by surfaces other than mirrors and glass; of catchers, how much of their irradiance
-// virtual objects block.
+// The effect of direct light at a surface point. For shadow catchers: the total irradiance, and the parts of it that
+// virtual objects block or tint. For other surfaces: `light`, the radiance towards the ray origin.
 struct DirectLight {
     vec3 light;
     float irradiance, blocked, tinted;
-    vec3 weighted_alpha; // per channel, for coloured shadows
+    vec3 weighted_alpha; // weighted sum of each channel's alpha; used for coloured shadows only
 };
 
 void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, float share) {
@@ -159,7 +161,7 @@ void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, Incidence arri
         vec3 half_vector = normalize(arriving.direction + to_eye);
         vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
         reflected *= vec3(1.0) - fresnel;
-        // The environment's specular reflection comes with the secondary ray.
+        // The secondary ray adds the specular reflection of the environment.
         if (!arriving.from_environment)
             reflected +=
                 fresnel * ggx_lobe(arriving.cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
@@ -197,13 +199,14 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, Random random) {
     return sum;
 }
 
-// The overlay of a shadow catcher: linear colour and alpha.
+// Returns the overlay's linear colour and alpha at a shadow catcher.
 vec4 catcher_shadow(DirectLight sum) {
     if (frame.coloured_shadows == 0u)
         return vec4(vec3(0.0), shadow_alpha(fraction_of_light(sum.blocked, sum.irradiance),
                                             fraction_of_light(sum.tinted, sum.irradiance),
                                             frame.shadow_alpha_opaque, frame.shadow_alpha_translucent));
-    // An alpha per channel; the colour compensates for the common alpha, their maximum.
+    // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's colour
+    // compensates for channels that this alpha would darken too much.
     vec3 alphas = vec3(fraction_of_light(sum.weighted_alpha.x, sum.irradiance),
                     fraction_of_light(sum.weighted_alpha.y, sum.irradiance),
                     fraction_of_light(sum.weighted_alpha.z, sum.irradiance));

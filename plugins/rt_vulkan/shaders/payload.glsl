@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The ray payload of the pipeline path.
+// The ray payload of the path `pipeline`.
 
 struct Payload {
     float t;
-    vec2 uv;     // of a triangle: the barycentric coordinates of its second and third corner
-    uint object; // MISS: no hit
-    uint number; // of the triangle or sphere in its geometry
+    vec2 uv;     // barycentric coordinates of a triangle's second and third corner
+    uint object; // MISS if there is no hit
+    uint number; // index of the triangle or sphere in its geometry
 };
 
 const uint MISS = 0xffffffffu;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The plain path: renders a pixel by software BVH traversal, on any Vulkan 1.1 device.
+// The main shader of the path `plain`: renders a pixel with software BVH traversal, on any Vulkan 1.1 device.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "arhost/shading/glsl.h"

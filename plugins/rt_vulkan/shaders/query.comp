@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The query path: renders a pixel by ray queries in a compute shader.
+// The main shader of the path `query`: renders a pixel with ray queries in a compute shader.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_query : require

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Secondary rays (rt_embree's kernel/scatter.inl), on a stack of pending paths, as shaders cannot recurse.
+// Secondary rays. They wait on a stack, because shaders cannot recurse. Equivalent to rt_embree's kernel/scatter.inl.
 
-// A ray and the throughput from it to the pixel.
+// A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
-    uint depth; // bounces so far
+    uint depth; // number of bounces so far
 };
 
 Path stack[stack_capacity];
@@ -15,11 +15,12 @@ void push(Path from, vec3 origin, vec3 direction, vec3 throughput) {
     stack[stack_size++] = Path(origin, direction, throughput, from.depth + 1u);
 }
 
-// Mirror reflections below this throughput are invisible.
+// Mirror and metal rays below this throughput are invisible.
 const float min_mirror_throughput = 1e-4;
-// Rough reflections below this change no 8-bit code by half a step.
+// Rough reflections below this throughput change no 8-bit code by half a step.
 const float min_rough_throughput = 2e-3;
 
+// Returns the origin of rays that leave a surface on the side that faces the viewer.
 vec3 above(Surface s) {
     return s.position + s.geometric_normal * s.offset;
 }
@@ -30,7 +31,9 @@ void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
         push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput);
 }
 
-// Pushes the reflected and the refracted ray, or one of them at random. Returns the light that replaces cut-off rays.
+// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray
+// that exceeds the depth limit or falls below the importance cutoff is not traced: the function returns the cutoff
+// colour that it contributes instead.
 vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec3 throughput = path.throughput;
     if (s.is_back_face)
@@ -40,7 +43,8 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     float cosine = max(-dot(direction, normal), 0.0), squared = refracted_cosine_squared(cosine, ratio);
     float refracted_cosine = sqrt(max(squared, 0.0));
     vec3 refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
-    // As with reflection: if the refracted ray would stay outside, use the facet's normal.
+    // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used instead;
+    // mirror_direction_off_facet() does the same for reflection.
     if (dot(refracted, s.geometric_normal) > 0.0 && squared > 0.0) {
         normal = s.geometric_normal;
         cosine = max(-dot(direction, normal), 0.0);
@@ -80,20 +84,20 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     return cut_off;
 }
 
-// Reflection at a random microfacet.
+// Pushes a ray that is reflected off a randomly sampled microfacet.
 void scatter_off_roughness(Path path, Surface s, vec3 to_eye, Random random) {
     vec2 sample_uv = pair(random, ROUGH_PURPOSE, 0u, 1u);
     vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, sample_uv.x, sample_uv.y);
     vec3 direction = mirror_direction(-to_eye, half_vector);
     float cosine = dot(direction, s.normal);
-    // Sampling visible normals accounts for the masking towards the eye.
+    // Sampling visible normals already accounts for the masking of `to_eye`.
     vec3 throughput =
         path.throughput * schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
     if (cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0 && largest(throughput) > min_rough_throughput)
         push(path, above(s), direction, throughput);
 }
 
-// Pushes secondary rays; returns the light that replaces those that are cut off.
+// Pushes the secondary rays of a surface. Returns the light that replaces rays that are cut off.
 vec3 scatter(Path path, Surface s, vec3 direction, uint material, Random random) {
     uint model = materials[material].model;
     if (path.depth >= frame.max_depth)

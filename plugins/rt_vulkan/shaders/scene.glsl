@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shaders' buffers and constants, as in layout.hpp. Offsets count elements.
+// The buffers and constants of the shaders. Buffers have the same layout as in layout.hpp. Offsets are in elements, not
+// bytes.
 
 const uint NONE = 0xffffffffu;
 #define INFINITY uintBitsToFloat(0x7f800000u)
 
-// As in arhost/scene.h.
+// The values of these constants are defined in arhost/scene.h.
 const uint DIFFUSE = 1u, SPECULAR = 2u, MIRROR = 3u, METAL = 4u, GLASS = 5u, METALLIC_ROUGHNESS = 6u;
 const uint VIRTUAL = 1u, CATCHER = 2u, OCCLUDER = 3u;
 const uint DIRECTIONAL_LIGHT = 2u, SPOT_LIGHT = 3u, RECTANGLE_LIGHT = 4u, SPHERE_LIGHT = 5u;
@@ -13,26 +14,26 @@ const uint FALLOFF_INVERSE_SQUARE = 2u;
 const uint TEXEL_SRGB8 = 1u, TEXEL_RGBA8 = 2u, TEXEL_RGBA32F = 3u;
 const uint WRAP_CLAMP = 2u, WRAP_MIRROR = 3u;
 
-// Object.mask and Ray.mask: which objects a ray can hit.
+// Bits of Object.mask and Ray.mask. A ray can hit an object only if their masks have a common bit.
 const uint OPAQUE_MASK = 1u, GLASS_MASK = 2u, CATCHER_MASK = 4u, OCCLUDER_MASK = 8u, ALL_MASKS = 15u;
-// Object.flags
+// Bits of Object.flags.
 const uint HAS_TRANSFORM = 1u, IS_SPHERES = 2u, HAS_HOLES = 4u;
 
-layout(constant_id = 0) const int stack_capacity = 1; // pending rays per pixel
+layout(constant_id = 0) const int stack_capacity = 1; // maximum number of pending rays per pixel
 layout(constant_id = 1) const bool has_glass = true;
 layout(constant_id = 2) const bool has_catchers = true;
-layout(constant_id = 3) const bool has_holes = true; // any object does
+layout(constant_id = 3) const bool has_holes = true; // whether any object has holes
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_slopes = false;
-layout(constant_id = 6) const bool has_textures = true; // any material does
+layout(constant_id = 6) const bool has_textures = true; // whether the scene has textures
 
 struct Object {
     mat4x3 object_from_world;
-    mat3 transform, normal_transform; // object to world, of directions and of normals
+    mat3 transform, normal_transform; // object to world, for directions and for normals
     uint material, role, mask, flags;
     uint root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     uint first_index, first_normal, first_texcoord; // NONE if absent
-    vec3 extent;                                    // object_extent() in raytracer_common/arena.hpp
+    vec3 extent;                                    // result of object_extent() (raytracer_common/arena.hpp)
 };
 
 struct Material {
@@ -77,8 +78,8 @@ struct Texture {
     int width, height, unused, unused_2;
 };
 
-// Inner nodes have count 0 and the children `first` and first + 1. Leaves have `count` primitives, in the top-level BVH
-// one object.
+// A node of a BVH. Inner nodes have count 0; their children are the nodes `first` and first + 1. A leaf contains
+// `count` primitives starting at `first`; a leaf of the top-level BVH contains one object.
 struct Node {
     vec3 low;
     uint first;
@@ -86,10 +87,11 @@ struct Node {
     uint count;
 };
 
-// A triangle abc: a, a - b and c - a. A sphere: its centre, and its radius in edge_1.x.
+// A triangle or sphere. For a triangle abc: corner = a, edge_1 = a - b, edge_2 = c - a. For a sphere: corner = centre,
+// edge_1.x = radius.
 struct Primitive {
     vec3 corner;
-    uint number; // in the geometry
+    uint number; // index in its geometry
     vec3 edge_1;
     float unused;
     vec3 edge_2;
@@ -111,7 +113,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     float environment_intensity;
     mat3 environment_from_world;
     uint environment_rows, environment_columns, unused, unused_2; // indices into `tables`
-    vec4 samples[256];                                            // x, y: offsets from the pixel's centre, −½ to ½
+    vec4 samples[256];                                            // x, y: offset from the pixel's centre in px, −½ to ½
 }
 frame;
 
@@ -139,7 +141,7 @@ layout(std430, set = 0, binding = 6) readonly buffer Indices {
     uint indices[];
 };
 layout(std430, set = 0, binding = 7) readonly buffer Attributes {
-    float attributes[]; // vertex normals and texcoords
+    float attributes[]; // vertex normals and texture coordinates
 };
 layout(std430, set = 0, binding = 8) readonly buffer Textures {
     Texture textures[];
@@ -148,19 +150,20 @@ layout(std430, set = 0, binding = 9) readonly buffer Texels {
     uint texels[];
 };
 layout(std430, set = 0, binding = 10) readonly buffer Tables {
-    uint tables[]; // sRGB encoding and decoding, the environment's cumulative sums
+    uint tables[]; // sRGB encoding, sRGB decoding, and the environment's cumulative sums
 };
 layout(std430, set = 0, binding = 11) readonly buffer Rays {
-    float rays[]; // make_ray_table() in view.hpp
+    float rays[]; // result of make_ray_table() (view.hpp)
 };
 layout(std430, set = 0, binding = 12) buffer History {
-    vec4 history[]; // sums of earlier samples, premultiplied
+    vec4 history[]; // sums of all earlier samples: premultiplied, sRGB-encoded colour; alpha
 };
 layout(std430, set = 0, binding = 13) writeonly buffer Image {
     uint image_pixels[];
 };
 layout(std430, set = 0, binding = 14) coherent buffer Drawn {
-    int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // the bounding box of pixels with alpha above 0
+    int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // bounding rectangle of the pixels with non-zero alpha
 };
 
+// Indices of the sRGB encoding and decoding tables in `tables`.
 const uint FIRST_SRGB_CELL = 0u, FIRST_LIGHT_OF_CODE = 1665u;

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shading data of a hit (rt_embree's kernel/surface.inl).
+// Computes what shading needs to know about the surface at a hit. Equivalent to rt_embree's kernel/surface.inl.
 
 struct Surface {
     vec3 position;
-    vec3 geometric_normal, normal; // of the facet, and interpolated: unit length, facing the ray's origin
-    bool is_back_face;             // the ray hit the side that the facet's normal points away from
-    float offset;                  // mm; of secondary rays' origins above the facet
-    float distance;                // mm, from the ray's origin
-    bool is_real;                  // a catcher or occluder
-    // Of lit materials, set by add_material().
+    // The triangle's normal and the shading normal (interpolated from the vertices, and perturbed by the normal map).
+    // Both have unit length and face the ray origin.
+    vec3 geometric_normal, normal;
+    bool is_back_face; // the ray hit the back face; `geometric_normal` has been flipped
+    float offset;      // mm: distance of a secondary ray's origin from the surface
+    float distance;    // mm, from the ray origin
+    bool is_real;      // a catcher or occluder
+    // add_material() sets the following members. They are 0 for mirrors and glass.
     vec3 ambient, diffuse, specular, emission;
-    float exponent; // Phong's
-    float alpha;    // GGX's, if `is_rough`
-    bool is_rough;  // metallic-roughness: `specular` is the reflectance at normal incidence
+    float exponent; // Phong exponent
+    float alpha;    // GGX roughness parameter; valid if `is_rough`
+    bool is_rough;  // has a metallic-roughness material; `specular` is then the reflectance at normal incidence
 };
 
 vec3 normal_at(uint object, uint number, vec2 uv) {
@@ -32,7 +34,8 @@ vec3 texture_colour(Hit hit, uint number) {
     return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.uv)).rgb;
 }
 
-// `normal` perturbed by the normal texture, with the facet's tangents.
+// Returns `normal`, perturbed by the normal texture. `facet` is the geometric normal. The tangents are constant over
+// each triangle.
 vec3 normal_mapped(Hit hit, vec3 facet, vec3 normal) {
     uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
     vec2 texcoords[3];
@@ -52,7 +55,7 @@ vec3 normal_mapped(Hit hit, vec3 facet, vec3 normal) {
                        texture_colour(hit, materials[objects[hit.object].material].normal_texture));
 }
 
-// `normal_maps`: whether to apply normal textures.
+// Returns the surface at a hit, without material properties. `normal_maps`: whether to apply normal textures.
 Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     uint object = hit.object, material = objects[object].material;
     precise vec3 path = ray.direction * hit.t;
@@ -82,7 +85,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     return s;
 }
 
-// Sets the material's properties; not for mirrors and glass.
+// Sets the material properties of a surface that is neither a mirror nor glass.
 void add_material(inout Surface s, Hit hit) {
     uint material = objects[hit.object].material, model = materials[material].model;
     bool is_rough = model == METALLIC_ROUGHNESS;
@@ -91,7 +94,7 @@ void add_material(inout Surface s, Hit hit) {
     s.emission = materials[material].emission;
     float metallic = materials[material].metallic, roughness = materials[material].roughness;
     if (has_textures) {
-        // One loop, as inlined sampling is long.
+        // A loop rather than three calls, because texture sampling is inlined and its code is long.
         uvec3 numbers = uvec3(materials[material].colour_texture, materials[material].metallic_roughness_texture,
                               materials[material].emission_texture);
         if (!is_rough)

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Textures in a buffer, with bilinear filtering in the shader: hardware samplers differ in rounding.
+// Textures, which are stored in a buffer. The shader computes bilinear filtering, because hardware samplers differ in
+// rounding.
 
+// Returns the texel index inside the texture that `i`, which may be outside, maps to.
 int wrapped(int i, int size, uint wrap) {
     if (wrap == WRAP_CLAMP)
         return clamp(i, 0, size - 1);
@@ -11,7 +13,7 @@ int wrapped(int i, int size, uint wrap) {
     return wrap == WRAP_MIRROR && within >= size ? period - 1 - within : within;
 }
 
-// Colour and alpha, linear.
+// Returns a texel's linear colour and alpha.
 vec4 texel_at(uint number, int x, int y) {
     uint at = uint(y * textures[number].width + x), first = textures[number].first_texel;
     if (textures[number].format == TEXEL_RGBA32F) {
@@ -35,7 +37,7 @@ float reduced(float t, uint wrap) {
     return bounded - 2.0 * floor(bounded * 0.5);
 }
 
-// Bilinear.
+// Samples a texture with bilinear filtering.
 vec4 sample_texture(uint number, vec2 texcoord) {
     uint wrap_u = textures[number].wrap_u, wrap_v = textures[number].wrap_v;
     int width = textures[number].width, height = textures[number].height;

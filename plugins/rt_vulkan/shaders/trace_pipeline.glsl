@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// trace() by VK_KHR_ray_tracing_pipeline. The device traverses its acceleration structures and calls pipeline.rint for
-// spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or pipeline.rmiss. None of them
-// traces further rays: the integrator's loop does.
+// Implements trace() with VK_KHR_ray_tracing_pipeline. The device traverses its acceleration structures and calls
+// pipeline.rint for spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or
+// pipeline.rmiss. These shaders do not trace further rays; only the integrator's loop does.
 
 layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
 layout(location = 0) rayPayloadEXT Payload payload;
@@ -10,7 +10,7 @@ layout(location = 0) rayPayloadEXT Payload payload;
 Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))
         return no_hit(ray);
-    payload.object = 0u; // stays if closest hit is skipped: any value but MISS
+    payload.object = 0u; // if the closest-hit shader is skipped, this stays: any value but MISS reports a hit
     traceRayEXT(top_level,
                 (any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
                     (cull_back_faces ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// trace() by software traversal of the BVHs (bvh.hpp). The top-level BVH's leaves are objects, each with a BVH in
-// object space.
+// Implements trace() with software traversal of the BVHs (bvh.hpp). The leaves of the top-level BVH are objects, each
+// of which has a BVH in object space.
 
-const int trace_stack_size = 64; // above the sum of the depth limits in bvh.hpp
+const int trace_stack_size = 64; // exceeds the sum of the depth limits in bvh.hpp
 
+// Returns 1 / d. Replaces components near 0 with ±1e-18, which avoids infinities.
 vec3 safe_reciprocal(vec3 d) {
     const float minimum = 1e-18;
     return 1.0 / mix(d, mix(vec3(minimum), vec3(-minimum), lessThan(d, vec3(0.0))), lessThan(abs(d), vec3(minimum)));
 }
 
-// The t at which the ray enters the box, INFINITY if it misses. The margin exceeds the rounding error.
+// Returns the t at which the ray enters the box, or INFINITY if it misses the box. The factor 1.000001 allows for
+// rounding errors.
 float box_entry(vec3 low, vec3 high, vec3 origin, vec3 reciprocal, float t_max) {
     vec3 a = (low - origin) * reciprocal, b = (high - origin) * reciprocal;
     vec3 enters = min(a, b), leaves = max(a, b);
@@ -24,7 +26,7 @@ Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))
         return hit;
     uint stack[trace_stack_size];
-    int top = 0, bottom = 0; // `bottom`: where the current object's entries begin
+    int top = 0, bottom = 0; // `bottom`: index of the current object's first entry
     uint node = 0u, object = NONE;
     vec3 origin = ray.origin, direction = ray.direction, reciprocal = safe_reciprocal(direction);
     for (;;) {
@@ -68,7 +70,7 @@ Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
                     return hit;
             }
         }
-        if (object != NONE && top == bottom) { // the object's BVH is exhausted
+        if (object != NONE && top == bottom) { // the traversal of the object's BVH is complete
             object = NONE;
             origin = ray.origin;
             direction = ray.direction;

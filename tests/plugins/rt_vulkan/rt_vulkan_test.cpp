@@ -516,7 +516,7 @@ TEST(Device, LackingARequirementIsRefused) {
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 13; }),
                 HasSubstr("supports 13 storage buffers per stage; 14 are required"));
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxStorageBufferRange = 64; }),
-                HasSubstr("supports at most 1 MiB: use smaller"));
+                HasSubstr("supports at most 1 MiB; reduce their size"));
 }
 
 TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
