@@ -209,7 +209,7 @@ TEST(Lens, RejectsAnInvalidCalibration) {
     for (const auto &camera : {three_coefficients, fisheye_of_five, unknown_model, no_focal_length})
         try {
             Lens lens(camera);
-            ADD_FAILURE() << "accepted";
+            ADD_FAILURE() << "the invalid input was accepted";
         } catch (const arhost::Failure &failure) {
             EXPECT_EQ(failure.status(), ARHOST_STATUS_ERROR_CONFIGURATION);
             EXPECT_THAT(failure.what(), testing::HasSubstr("calibration"));

@@ -39,8 +39,8 @@ inline cv::Point2d centre_px(const arhost_marker &marker) {
     return corner(0) + (corner(1) - corner(0)).cross(b) / a.cross(b) * a;
 }
 
-// Checks the poses and corners of the twelve tags of 53 mm in apriltag_photo. The tolerance of the corners is 0.5 px,
-// as in ViSP's own test.
+// Checks the poses and corners of the twelve tags of 53 mm in apriltag_photo. The corners may differ by 0.5 px, the
+// tolerance that ViSP uses.
 inline void expect_april_tag_photo(Tracker &tracker) {
     const auto folder = shared_data("markers/apriltag_photo");
     const auto photo = read_grey(folder / "AprilTag.png");

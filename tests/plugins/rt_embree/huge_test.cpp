@@ -78,7 +78,7 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
     builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(material));
     const Picture picture = Tracer(std::move(builder)).render(from_above());
-    EXPECT_EQ(picture.at(140, 120)[0], 255) << "bottom right";
+    EXPECT_EQ(picture.at(140, 120)[0], 255) << "the white area is at the bottom right";
     EXPECT_EQ(picture.at(110, 120)[0], 0);
     EXPECT_EQ(picture.at(140, 60)[0], 0);
 }

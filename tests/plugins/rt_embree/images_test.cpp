@@ -192,8 +192,8 @@ Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
         mesh.normals.assign(4, glm::normalize(tilt.world));
     }
     glm::mat4x3 place(1);
-    if (turned) // rotates by 90° about z and scales each axis differently, so tangents and normals transform
-                // differently
+    // Rotates by 90° about z and scales each axis differently. Tangents and normals therefore transform differently.
+    if (turned)
         place = glm::mat4x3(0, 2, 0, -2, 0, 0, 0, 0, 0.5f, 0, 0, 0);
     builder.add_object("square", builder.add_triangles(std::move(mesh)), builder.add_material(material),
                        ARHOST_ROLE_VIRTUAL, place);

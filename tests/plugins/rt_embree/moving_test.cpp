@@ -250,8 +250,7 @@ TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
 }
 
-// Returns a wavy sheet that is cut into strips; each strip is shifted along its length, further than the previous
-// one.
+// Returns a wavy sheet whose vertices are shifted along x in strips, each strip further than the previous one.
 scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     scene::TriangleMesh mesh = sheet(4, n);
     for (glm::vec3 &p : mesh.positions)

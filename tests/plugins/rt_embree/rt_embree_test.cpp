@@ -541,7 +541,7 @@ TEST(Samples, AccumulateWhileTheCameraIsStatic) {
     EXPECT_LT(distance(last), 0.1);
     EXPECT_GT(distance(first), 5 * distance(last));
     EXPECT_NE(render(other), last);
-    EXPECT_EQ(render(still), first) << "accumulation restarts";
+    EXPECT_EQ(render(still), first) << "the accumulation must restart";
 }
 
 TEST(Samples, StopChangingTheImageAtTheAccumulationLimit) {
@@ -813,7 +813,7 @@ TEST(Sizes, OddImageSizesAreWrittenExactly) {
                                         .render(opencv_axes(pinhole(width, height, 20)));
             EXPECT_EQ(picture.alpha(width / 2, height / 2), 255) << width << "x" << height;
             for (const Pixel &pixel : picture.pixels())
-                ASSERT_NE(pixel[3], 0xa5) << "not written";
+                ASSERT_NE(pixel[3], 0xa5) << "the plugin did not write this pixel";
         }
 }
 

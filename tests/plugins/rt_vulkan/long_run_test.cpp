@@ -19,7 +19,8 @@ TEST(LongRun, DoesNotLeak) {
     const LongRun run = long_run(scenes, changes, images, {});
     const LongRun::State &middle = run.states[changes / 2], &last = run.states.back();
     EXPECT_EQ(last.files, middle.files);
-    // Four starts lie between the two measurements. A leak of 1 MiB per start exceeds the tolerance of 3 MiB.
+    // The plugin is started four times between the two measurements. A leak of 1 MiB per start exceeds the tolerance
+    // of 3 MiB.
     EXPECT_LE(last.memory_mib, middle.memory_mib + 3);
 }
 

@@ -120,7 +120,7 @@ TEST_F(RichScene, AccumulatedMatchesRtEmbree) {
     const Likeness like = likeness(got, expected);
     EXPECT_EQ(like.alphas_off, 0) << like;
     EXPECT_GE(like.psnr(), 45) << like;
-    // Each change of the camera restarts the accumulation, also a change back to the first camera.
+    // Each change of the camera restarts the accumulation, including a change back to the first camera.
     ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_STATUS_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
@@ -543,10 +543,10 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1); // larger than the plugin's limit
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // rename() cannot replace it
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();

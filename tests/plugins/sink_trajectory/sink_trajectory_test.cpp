@@ -53,7 +53,7 @@ protected:
         EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
         return read_text(path);
     }
-    // Writes only these frames; a live run would have dropped the others.
+    // Writes only these frames, as if the others had been dropped.
     void write_frames(const std::string &format, const std::vector<std::uint64_t> &frames) const {
         SinkUnderTest s = sink(format);
         ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);

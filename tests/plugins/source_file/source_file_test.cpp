@@ -250,7 +250,7 @@ TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
         EXPECT_EQ(frames[n].info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
     }
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}}), ARHOST_STATUS_OK);
-    EXPECT_EQ(source.properties().frame_count, 0u) << "endless";
+    EXPECT_EQ(source.properties().frame_count, 0u) << "a loop has no end";
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"frames", "2"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read_all().size(), 3u);
