@@ -29,7 +29,7 @@ std::int64_t now_ns() {
 }
 
 struct Latencies {
-    std::vector<std::int64_t> forward, back; // ns
+    std::vector<std::int64_t> forward, back; // in ns, one per round
     void print(const char *name) {
         const auto percentile = [](std::vector<std::int64_t> &samples, double fraction) {
             std::sort(samples.begin(), samples.end());

@@ -89,7 +89,7 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
              const std::function<glm::vec3(glm::vec3, glm::vec3 noise, float amount)> &deform) {
     const rt_embree::DeviceHandle device(rtcNewDevice("threads=2,set_affinity=0"));
     std::vector<glm::vec3> positions = mesh.positions;
-    positions.reserve(positions.size() + 2); // Embree reads past the last vertex
+    positions.reserve(positions.size() + 2); // Embree may read beyond the last vertex
     const rt_embree::MeshView view{reinterpret_cast<const std::byte *>(positions.data()),
                                    reinterpret_cast<const std::byte *>(mesh.triangles.data()), sizeof(glm::vec3),
                                    sizeof mesh.triangles[0], static_cast<std::uint32_t>(mesh.triangles.size())};

@@ -79,7 +79,7 @@ double tracker_alone(const std::string &picture, const arhost_intrinsics &camera
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
 }
 
-// An image file as a BGR8 frame.
+// A BGR8 frame that is read from an image file.
 struct VideoFrame {
     explicit VideoFrame(const std::string &picture) : slot(layout(picture)) {
         for (int y = 0; y < bgr.rows; ++y)

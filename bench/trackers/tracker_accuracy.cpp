@@ -57,7 +57,7 @@ int main(int argc, char **argv) try {
     const auto a = measure(sequence, "tracker_aruco", aruco);
     const auto b = measure(sequence, "tracker_apriltag", april_tag);
     const double disagreement = percentile(RbtSequence::disagreement_px(a.frames, b.frames), 0.95);
-    std::printf("corner distance between the two trackers: p95 %.3f px\n", disagreement);
+    std::printf("distance between corresponding corners of the two trackers: p95 %.3f px\n", disagreement);
     return a.passed && b.passed && disagreement <= 0.5 ? 0 : 1;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "tracker-accuracy: %s\n", error.what());

@@ -71,7 +71,7 @@ private:
         format.width = static_cast<uint32_t>(size.width);
         format.height = static_cast<uint32_t>(size.height);
         if (!arhost_frame_layout(&format))
-            throw std::runtime_error("invalid frame size");
+            throw std::runtime_error("the frame size is invalid");
         return format;
     }
     arhost_frame_format format_;

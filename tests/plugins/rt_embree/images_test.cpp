@@ -54,7 +54,7 @@ TEST(Texture, IsUprightAndLinearised) {
 }
 
 TEST(Texture, IsInterpolatedInLinearLight) {
-    // Halfway between red and green.
+    // This pixel is halfway between the red and the green texel.
     const Pixel mixed = of_four_texels(ARHOST_WRAP_CLAMP, 1).at(99, 30);
     EXPECT_NEAR(mixed[0], shading::srgb8_exact(0.5), 2);
     EXPECT_NEAR(mixed[1], shading::srgb8_exact(0.5), 2);

@@ -293,7 +293,7 @@ TEST(BvhQuality, TriggersRebuilds) {
     std::vector<std::uint64_t> rebuilds;
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         std::vector<glm::vec3> positions = sheared(amount, 200).positions;
-        positions.resize(vertices + 2); // Embree reads past the last vertex
+        positions.resize(vertices + 2); // Embree may read beyond the last vertex
         const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
         rebuilds.push_back(scene.rebuilds());

@@ -108,7 +108,7 @@ TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
     EXPECT_THAT(tracer.plugin().log(), AllOf(HasSubstr("path '" + GetParam() + "' failed, trying '" + next + "'"),
                                              HasSubstr("path " + next + ", ")));
     EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
-    // A path requested by name has no fallback.
+    // A path that is selected by name has no fallback.
     tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }),
                 HasSubstr("that this is unsupported"));
@@ -193,7 +193,7 @@ TEST_F(OldDevice, IsRefusedIfSelected) {
 TEST_F(OldDevice, IsSkippedWithAReasonIfAnotherIsUsable) {
     const std::string once = copy_drivers(folder_.path() / "a"), again = copy_drivers(folder_.path() / "b");
     if (once.empty())
-        GTEST_SKIP() << "no driver manifests in the known folders";
+        GTEST_SKIP() << "found no Vulkan driver manifests on this machine";
     const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "first"),
         drivers("VK_DRIVER_FILES", once + ":" + again), old_name("VK_ICD_FILENAMES", once + ":" + again);
     PluginUnderTest plugin("rt_vulkan");

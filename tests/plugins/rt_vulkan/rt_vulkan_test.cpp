@@ -54,7 +54,7 @@ template <class Call> std::string refusal(arhost_status status, Call call) {
         EXPECT_EQ(failure.status(), status) << failure.what();
         return failure.what();
     }
-    ADD_FAILURE() << "no failure was thrown";
+    ADD_FAILURE() << "expected a Failure, but none was thrown";
     return "";
 }
 
@@ -288,7 +288,7 @@ TEST_P(EachPath, FollowsMotion) {
     ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.plugin().log();
     ASSERT_EQ(embree.start(tiny), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
-    constexpr int frames = 130; // more than two rebuild intervals
+    constexpr int frames = 130; // includes more than two rebuild intervals
     for (int frame = 0; frame < frames; ++frame) {
         const arhost_motion motion = evaluator.at(0.1 * frame);
         Picture got(tiny), expected(tiny);
@@ -330,7 +330,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     ARHOST_REQUIRE_VULKAN();
     RendererParts parts("plain");
     if (!parts.device.imports_host_memory)
-        GTEST_SKIP() << parts.device.name << " lacks VK_EXT_external_memory_host";
+        GTEST_SKIP() << parts.device.name << " does not support VK_EXT_external_memory_host";
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
@@ -480,7 +480,7 @@ TEST(Device, UnknownNameIsRefused) {
 
 TEST(Device, IsListedByTheHost) {
 #if defined(__SANITIZE_ADDRESS__)
-    GTEST_SKIP() << "leaks of drivers would fail the worker";
+    GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and arhost would fail";
 #endif
     ARHOST_REQUIRE_VULKAN();
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
@@ -548,7 +548,7 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::remove(file);
-    std::filesystem::create_directory(file); // rename() cannot replace it
+    std::filesystem::create_directory(file); // rename() cannot replace a folder
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_EQ(files(), std::vector{file}) << "a temporary file was left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");

@@ -189,7 +189,7 @@ TEST_F(SinkPoses, NonFiniteNumbersAreNull) {
 
 TEST_F(SinkPoses, AnInvalidFamilyNameDoesNotCorruptTheLine) {
     arhost_record record = full_record(0);
-    std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // no NUL
+    std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // without a terminating NUL
     std::memcpy(record.markers[0].family, "a\"\\\n\xff", 5);
     record.marker_count = 1;
     EXPECT_EQ(Json::parse(line_of(record))["markers"][0]["family"],
@@ -307,7 +307,7 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(log());
     {
-        const FileSizeLimit limit(before.size() + 100); // the next line fits only partly
+        const FileSizeLimit limit(before.size() + 100); // only a part of the next line fits
         EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(log()), before);

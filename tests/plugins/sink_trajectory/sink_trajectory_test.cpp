@@ -242,7 +242,7 @@ TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(file());
     {
-        const FileSizeLimit limit(before.size() + 20); // the next line fits only partly
+        const FileSizeLimit limit(before.size() + 20); // only a part of the next line fits
         EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(file()), before);

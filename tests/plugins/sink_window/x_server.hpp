@@ -77,7 +77,7 @@ class XObserver {
 public:
     explicit XObserver(const std::string &display) : display_(XOpenDisplay(display.c_str())) {
         if (!display_)
-            throw std::runtime_error("cannot connect to " + display);
+            throw std::runtime_error("cannot connect to the X display " + display);
     }
     ~XObserver() { XCloseDisplay(display_); }
     XObserver(const XObserver &) = delete;

@@ -258,7 +258,7 @@ TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
 
 TEST(SingleImage, IsDeliveredOnceOrFramesTimes) {
     ScratchFolder folder;
-    const fs::path file = folder.path() / "100%.png"; // an existing file is not a numbered name
+    const fs::path file = folder.path() / "100%.png"; // the name of an existing file is not parsed as a pattern
     cv::imwrite(file.string(), colourful(33, 21));
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_STATUS_OK) << source.log();

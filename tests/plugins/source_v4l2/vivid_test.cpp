@@ -29,11 +29,11 @@ const char *const device = "/dev/video0";
 
 // The ids of vivid's controls. The kernel header that defines them is not installed.
 enum : std::uint32_t {
-    test_pattern = 0x00f0f000,     // 1: 100% colour bars
-    osd_text_mode = 0x00f0f001,    // 2: no text over the picture
-    timestamp_source = 0x00f0f018, // 0: end of frame, 1: start of exposure
-    colorspace = 0x00f0f019,       // 1: Rec. 709, 2: sRGB
-    quantization = 0x00f0f01c,     // 1: full range
+    test_pattern = 0x00f0f000,     // 1 selects 100 % colour bars
+    osd_text_mode = 0x00f0f001,    // 2 disables the text over the picture
+    timestamp_source = 0x00f0f018, // 0 is the end of the frame, 1 the start of exposure
+    colorspace = 0x00f0f019,       // 1 is Rec. 709, 2 is sRGB
+    quantization = 0x00f0f01c,     // 1 is full range
     percentage_of_dropped_buffers = 0x00f0f040,
     disconnect = 0x00f0f041,
     inject_buffer_error = 0x00f0f042,
