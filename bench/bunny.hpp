@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shared by the ray tracer benchmarks: the mesh, and a host that only prints.
+// Used by all ray tracer benchmarks: the test mesh, and an arhost_host that prints log messages.
 #pragma once
 
 #include "scene/arena.hpp"
@@ -17,7 +17,7 @@
 
 namespace arhost::bench {
 
-// A ball of about `triangles` triangles with dents that occlude each other.
+// Returns a ball of about `triangles` triangles with dents that occlude each other.
 inline scene::TriangleMesh dented_ball(unsigned triangles) {
     scene::TriangleMesh mesh;
     const auto rings = static_cast<unsigned>(std::lround(std::sqrt(triangles / 2.0))), sides = rings + 1;
@@ -43,7 +43,8 @@ struct NamedMesh {
     const char *name;
 };
 
-// The bunny of `shared_data`, or a dented ball if it is missing: 100 mm high, on the plane y = 0.
+// Returns the Stanford bunny from `shared_data`, or a dented ball if the bunny's file is missing. Either is 100 mm
+// high and stands on the plane y = 0.
 inline NamedMesh bunny(const std::filesystem::path &shared_data) {
     const std::filesystem::path file = shared_data / "meshes/bunny_69451.ply.gz";
     const bool exists = std::filesystem::exists(file);
@@ -60,7 +61,7 @@ inline NamedMesh bunny(const std::filesystem::path &shared_data) {
     return named;
 }
 
-// Prints log messages to stderr.
+// Returns an arhost_host that prints log messages to stderr.
 inline arhost_host printing_host(const char *name) {
     return {sizeof(arhost_host),
             ARHOST_ABI_VERSION,

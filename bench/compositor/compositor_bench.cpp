@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The compositor compared with memcpy, at 1280×720, single-threaded. Calls cycle through more frames than fit into
-// the caches. The reference memcpy moves as many bytes (read plus written) as the compositor: 4 (B) + 3 (A) read and
-// 3 written make 10 per pixel, so it copies 5 per pixel.
+// Compares the compositor with memcpy, at 1280×720 and single-threaded. Successive calls use different frames, which
+// together exceed the caches. The reference memcpy moves as many bytes (read plus written) as the compositor. The
+// compositor reads 3 bytes of the frame and 4 bytes of the overlay and writes 3 bytes, which makes 10 bytes per
+// pixel; memcpy therefore copies 5 bytes per pixel.
 #include "compositor/compositor.hpp"
 #include "pixels/grey.hpp"
 
@@ -22,7 +23,8 @@ constexpr std::uint32_t width = 1280, height = 720;
 constexpr std::size_t pixels = std::size_t(width) * height;
 constexpr std::size_t pool_bytes = std::size_t(768) << 20; // per stream
 
-// Frames, page-aligned like arhost's slots and written once so that the pages are mapped.
+// A pool of frames that are page-aligned, like arhost's slots. Every byte is written once, so that all pages are
+// mapped.
 class Pool {
 public:
     explicit Pool(std::size_t frame_bytes) : frame_bytes_((frame_bytes + 4095) / 4096 * 4096) {
@@ -51,7 +53,8 @@ void fill_overlay(std::uint8_t *rgba, Overlay kind, std::uint32_t seed) {
         const std::size_t x = i % width, y = i / width;
         const std::uint32_t bits = random();
         std::memcpy(rgba + 4 * i, &bits, 3);
-        // mixed: 8×8 blocks of all kinds; sparse: an opaque disc with a soft edge on an empty background.
+        // `mixed` consists of 8×8 blocks, each transparent, opaque or translucent. `sparse` is an opaque disc with a
+        // soft edge on a transparent background.
         const std::uint32_t block = static_cast<std::uint32_t>((x / 8 * 2654435761u) ^ (y / 8 * 40503u)) >> 7;
         const double dx = double(x) - width / 2.0, dy = double(y) - height / 2.0, r2 = dx * dx + dy * dy;
         const std::uint8_t soft = static_cast<std::uint8_t>(1 + (bits >> 24) % 254);
@@ -85,7 +88,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Alternates `work(i)` and a memcpy of `moved` / 2 bytes, so that both run under the same conditions.
+// Runs `work(i)` and a memcpy of `moved` / 2 bytes alternately, so that both are timed under the same conditions.
 template <class Work> void against_memcpy(benchmark::State &state, std::size_t moved, const Work &work) {
     const Pool from(moved / 2), to(moved / 2);
     double work_s = 0, memcpy_s = 0;
@@ -115,7 +118,8 @@ void composite_overlay(benchmark::State &state, Overlay kind, bool whole) {
             fill_overlay(overlays.frame(i), kind, static_cast<std::uint32_t>(i));
         else
             std::memcpy(overlays.frame(i), overlays.frame(i % 4), 4 * pixels);
-    // For the sparse overlay, a ray tracer would report the disc's bounding rectangle.
+    // If not `whole`, the region is the bounding rectangle of the sparse overlay's disc, as a ray tracer would report
+    // it.
     const arhost::Region region =
         whole ? arhost::Region{0, 0, width, height} : arhost::Region{width / 2 - 154, height / 2 - 154, 309, 309};
     const std::size_t moved = 6 * pixels + 4 * std::size_t(region.width) * region.height;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One-way latency of a command from host to worker and of its result back, with sleeping and polling receivers,
-// compared with bare futexes and eventfds in the same run. Two processes.
+// Measures the one-way latency of a command from the host to a worker, and of the result on its way back. The
+// receivers sleep or poll. The baselines, bare futexes and bare eventfds, are measured in the same run. Host and
+// worker are two processes.
 #include "ipc/memory.hpp"
 #include "ipc/protocol.hpp"
 
@@ -28,7 +29,7 @@ std::int64_t now_ns() {
 }
 
 struct Latencies {
-    std::vector<std::int64_t> forward, back; // ns
+    std::vector<std::int64_t> forward, back; // in ns, one per round
     void print(const char *name) {
         const auto percentile = [](std::vector<std::int64_t> &samples, double fraction) {
             std::sort(samples.begin(), samples.end());
@@ -43,7 +44,8 @@ struct Latencies {
     }
 };
 
-// arhost's link: command ring and futex forward, result ring and doorbell back.
+// Measures arhost's link: commands go through a ring and wake the worker with a futex; results return through a ring
+// and wake the host with a doorbell.
 Latencies link(int rounds, bool polling) {
     const SharedMemory host_memory = SharedMemory::create("host", sizeof(HostPage));
     const SharedMemory worker_memory = SharedMemory::create("worker", sizeof(WorkerPage));
@@ -76,7 +78,7 @@ Latencies link(int rounds, bool polling) {
     ResultConsumer results(theirs.as<WorkerPage>().results, host.as<HostPage>().results);
     Latencies latencies;
     for (int i = 0; i < rounds; ++i) {
-        ::usleep(200); // let the other side fall asleep
+        ::usleep(200); // until the worker sleeps
         Command command{};
         command.capture_ns = now_ns();
         commands.push(command);
@@ -96,7 +98,8 @@ Latencies link(int rounds, bool polling) {
     return latencies;
 }
 
-// Lower bound for waking a sleeping process: a futex per direction, in a page with the time stamps.
+// Measures bare futexes, the fastest way to wake a sleeping process. Each direction has its own futex; both futexes
+// and the time stamps are in one shared page.
 Latencies futexes(int rounds) {
     struct Page {
         std::atomic<std::uint32_t> requests, responses;
@@ -136,7 +139,8 @@ Latencies futexes(int rounds) {
     return latencies;
 }
 
-// The same with two eventfds, which can be polled together with other descriptors.
+// Measures bare eventfds, one per direction. Unlike a futex, an eventfd can be polled together with other
+// descriptors.
 Latencies eventfds(int rounds) {
     const SharedMemory memory = SharedMemory::create("times", 4096);
     const Mapping page = memory.map(Access::read_write);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// rt_embree for tools/bench peers: `rt-embree-peers FOLDER THREADS` writes the scene to FOLDER for the peers
-// (scene.json, and the mesh as raw numbers), then answers each input line "CASE FRAMES" with the times of that many
-// frames as a line of JSON, and writes the last image to FOLDER/ours-CASE.rgba. Built with COUNT_RAYS, it also
-// reports rays per frame; its times are then meaningless.
+// Runs rt_embree for the benchmark `tools/bench peers`, which compares it with other ray tracers (the peers).
+// `rt-embree-peers FOLDER THREADS` first writes the scene for the peers to FOLDER: scene.json, and the mesh as raw
+// numbers. Then, for each line "CASE FRAMES" on standard input, it renders FRAMES frames of that case, prints their
+// times as one line of JSON, and writes the last image to FOLDER/ours-CASE.rgba. If built with COUNT_RAYS, it also
+// prints the number of rays per frame, but counting makes the times meaningless.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -31,7 +32,7 @@ std::atomic<std::uint64_t> rays_traced{0};
 }
 
 #ifdef COUNT_RAYS
-// The linker redirects the kernel's Embree calls to these wrappers (CMakeLists.txt).
+// The linker redirects rt_embree's calls of Embree to the wrappers below, which count rays (see CMakeLists.txt).
 namespace {
 void count(const int *valid, int width) {
     std::uint64_t active = 0;
@@ -70,10 +71,10 @@ using namespace arhost::scene;
 constexpr std::uint32_t width = 800, height = 600;
 constexpr double fov_y_degrees = 45;
 constexpr float eye[3] = {0, 50, 170}, look_at[3] = {0, 50, 0};
-constexpr float lamp_position[3] = {80, 200, 150}, lamp_intensity = 40'000; // over d², d in mm
+constexpr float lamp_position[3] = {80, 200, 150}, lamp_intensity = 40'000; // divided by d², d in mm
 constexpr float ground_half_side = 200;                                     // mm, at y = 0
 constexpr float bunny_grey = 0.6f, ground_grey = 0.5f, mirror_grey = 0.9f;
-// Each bounce loses a little light, so that different path lengths are visible in the picture.
+// Glass loses 5 % of the light at each bounce, so that a wrong path length is visible in the picture.
 constexpr float glass_grey = 0.95f, glass_index = 1.5f;
 constexpr std::uint32_t mirror_depth = 8, glass_depth = 20; // bounces
 
@@ -115,7 +116,8 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
         material = grey(ARHOST_MATERIAL_GLASS, glass_grey);
         material.index = glass_index;
         material.fresnel_minimum = std::pow((glass_index - 1) / (glass_index + 1), 2.0f);
-        // glass-path: limited by depth only, as in the peers. glass-tree: the default cutoff of 0.01.
+        // In "glass-path", only the depth limits a path, as in the peers. "glass-tree" also cuts off rays whose
+        // throughput is below 0.01, a common value.
         material.importance_cutoff = name == "glass-tree" ? 0.01f : 0;
         builder.settings.max_depth = glass_depth;
         made.settings.single_path = name == "glass-path";

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Determines the degradation at which rebuilding a BVH pays off: for increasingly deformed meshes, prints
-// BvhQuality's measure and the trace times through the refitted and through a rebuilt BVH.
+// `rt-embree-refit` determines the degradation at which rebuilding a BVH pays off. For increasingly deformed meshes,
+// it prints the degradation that BvhQuality measures, and the times to trace rays through a refitted and a rebuilt
+// BVH.
 #include "bunny.hpp"
 #include "embree_scene.hpp"
 
@@ -38,7 +39,7 @@ public:
         : scene_(rtcNewScene(device)), geometry_(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE)) {
         rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_DYNAMIC);
         rtcSetSceneBuildQuality(scene_.get(),
-                                RTC_BUILD_QUALITY_LOW); // a BVH per geometry, which can be refitted
+                                RTC_BUILD_QUALITY_LOW); // gives each geometry its own BVH, which can be refitted
         rtcSetSharedGeometryBuffer(geometry_.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions.data(), 0,
                                    sizeof(glm::vec3), positions.size());
         rtcSetSharedGeometryBuffer(geometry_.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(),
@@ -54,7 +55,7 @@ public:
         rtcCommitGeometry(geometry_.get());
         rtcCommitScene(scene_.get());
     }
-    // The primary rays of a 640×480 frame from 200 mm away, in packets.
+    // Traces the primary rays of a 640×480 frame in packets. The camera is 200 mm from the mesh's centre.
     void trace() const {
         alignas(64) int valid[16];
         std::fill_n(valid, 16, -1);
@@ -88,7 +89,7 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
              const std::function<glm::vec3(glm::vec3, glm::vec3 noise, float amount)> &deform) {
     const rt_embree::DeviceHandle device(rtcNewDevice("threads=2,set_affinity=0"));
     std::vector<glm::vec3> positions = mesh.positions;
-    positions.reserve(positions.size() + 2); // Embree reads past the last vertex
+    positions.reserve(positions.size() + 2); // Embree may read beyond the last vertex
     const rt_embree::MeshView view{reinterpret_cast<const std::byte *>(positions.data()),
                                    reinterpret_cast<const std::byte *>(mesh.triangles.data()), sizeof(glm::vec3),
                                    sizeof mesh.triangles[0], static_cast<std::uint32_t>(mesh.triangles.size())};
@@ -96,7 +97,7 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
     rt_embree::BvhQuality quality;
     quality.record_build(view);
     std::printf("%s, %zu triangles\n%8s %8s %10s %10s %10s %12s %12s %16s\n", name, mesh.triangles.size(), "amount",
-                "degr.", "measure ms", "refit ms", "build ms", "rays: refit", "rays: new", "rebuild pays in");
+                "degr.", "measure ms", "refit ms", "build ms", "refit rays", "new rays", "rebuild pays in");
     for (const float amount : amounts) {
         std::minstd_rand random(1);
         std::uniform_real_distribution<float> unit(-1, 1);
@@ -131,6 +132,7 @@ int main() {
                          p.x * std::sin(angle) + p.z * std::cos(angle));
     });
     measure("explosion of a ball", ball, {0, 0.1f, 0.25f, 0.5f, 1, 2}, [](glm::vec3 p, glm::vec3, float amount) {
-        return p + glm::vec3(std::sin(p.y), std::sin(p.z), std::sin(p.x)) * (20 * amount); // strips fly apart
+        return p + glm::vec3(std::sin(p.y), std::sin(p.z), std::sin(p.x)) *
+                       (20 * amount); // parts move in different directions
     });
 }

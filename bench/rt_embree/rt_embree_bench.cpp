@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Frame times of rt_embree, compared with bare Embree calls for the same primary rays:
+// Prints frame times of rt_embree, and the times of bare Embree calls for the same primary rays:
 // `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass]]]`.
 #include "bunny.hpp"
 #include "renderer.hpp"
@@ -42,7 +42,8 @@ Arena scene_of(const TriangleMesh &mesh, const arhost_material &material, bool l
     return std::move(builder).build();
 }
 
-// Medians over the frames. `cpu_ms`: all threads together; less sensitive to other load.
+// Median times of a frame. `cpu_ms` is the CPU time of all threads together, which depends less on other load than
+// the elapsed time `ms`.
 struct Timing {
     double ms, cpu_ms;
 };
@@ -83,7 +84,7 @@ arhost_intrinsics intrinsics() {
             {}};
 }
 
-// The bunny fills the image's height.
+// Returns a camera in whose image the bunny fills the height.
 arhost_camera camera() {
     return {sizeof(arhost_camera), 0, {0, 50, 170}, {0, 50, 169}, {0, 1, 0}, intrinsics()};
 }
@@ -114,8 +115,9 @@ private:
     rt_embree::Renderer renderer_;
 };
 
-// Only rtcIntersect16, or packets of the processor's native width, on precomputed rays in the same blocks, tiles and
-// threads.
+// Times only Embree's intersection calls: with the same blocks, tiles and threads as the renderer, but with
+// precomputed rays and without shading. Uses packets of the processor's native width if `native_width`, else
+// rtcIntersect16.
 Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settings, bool native_width) {
     const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
     rt_embree::ThreadPool threads(settings.threads);
@@ -203,7 +205,7 @@ int main(int argc, char **argv) {
         report("primary visibility", visible);
         const auto compare = [&](const char *what, const Timing &bare) {
             report(what, bare);
-            std::printf("%-28s %7.1f %%    %7.1f %%\n", "primary's relative speed", 100 * bare.ms / visible.ms,
+            std::printf("%-28s %7.1f %%    %7.1f %%\n", "speed of primary visibility", 100 * bare.ms / visible.ms,
                         100 * bare.cpu_ms / visible.cpu_ms);
         };
         if (only.empty()) {

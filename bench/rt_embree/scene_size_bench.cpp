@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Cost by scene size: time from an arena to the first frame compared with a bare rtcCommitScene of the same buffers,
-// memory compared with Embree's own plus the arena, and frame times by triangles and pixels.
+// Measures how rt_embree's costs grow with the size of the scene:
+// - the time from an arena to the first frame, relative to a bare rtcCommitScene of the same buffers;
+// - the memory, relative to that of the arena and a bare Embree scene;
+// - the frame times by numbers of triangles and pixels.
 //
-//   rt-embree-scene-size [MESH…]     without meshes: dented balls of 5k to 10M triangles
+//   rt-embree-scene-size [MESH…]     default: dented balls of 5k to 10M triangles
 //
-// Exits with 1 if a given mesh takes more than 1.15 times the bare commit or 1.3 times the bare memory.
+// Exits with 1 if, for a MESH, the time exceeds 1.15 times that of the bare commit or the memory exceeds 1.3 times
+// that of the bare scene.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -51,7 +54,8 @@ double resident_mb() {
     return 0;
 }
 
-// Measures in a separate process: a BVH of 10M triangles affects later measurements in the same one.
+// Runs `measure` in a child process and returns its result, because building a BVH of 10M triangles would affect
+// later measurements in the same process.
 template <class Result> Result in_a_process(const std::function<Result()> &measure) {
     int ends[2];
     if (::pipe(ends) != 0)
@@ -68,7 +72,7 @@ template <class Result> Result in_a_process(const std::function<Result()> &measu
     ::close(ends[0]);
     ::waitpid(child, nullptr, 0);
     if (!whole) {
-        std::fprintf(stderr, "a measurement process died: not enough memory?\n");
+        std::fprintf(stderr, "a child process died during its measurement; possibly there was not enough memory\n");
         std::exit(1);
     }
     return result;
@@ -87,7 +91,7 @@ Arena scene_of(TriangleMesh mesh) {
     return std::move(builder).build();
 }
 
-// 100 mm across and centred, so that all meshes cover a similar part of the image.
+// Centres the mesh and scales it to 100 mm, so that all meshes cover a similar part of the image.
 void normalise(TriangleMesh &mesh) {
     glm::vec3 low = mesh.positions[0], high = low;
     for (const glm::vec3 &p : mesh.positions) {
@@ -104,7 +108,7 @@ struct Bare {
     double commit_ms, mb;
 };
 
-// Only Embree, on the arena's buffers, with rt_embree's flags and build quality.
+// Commits an Embree scene of the arena's buffers without rt_embree, but with rt_embree's flags and build quality.
 Bare commit_bare(const Arena &arena) {
     const auto *bytes = reinterpret_cast<const std::byte *>(&arena.scene());
     const auto *geometry = reinterpret_cast<const arhost_geometry *>(bytes + arena.scene().geometries.offset);
@@ -153,7 +157,7 @@ Ours trace(const Arena &arena) {
     rt_embree::Settings settings;
     settings.threads = threads;
     Ours ours{};
-    // 800×600 first, as its start-up is timed.
+    // 800×600 (index 1) comes first, because the time to the first frame is measured at this size.
     for (const std::size_t i : {std::size_t{1}, std::size_t{0}, std::size_t{2}}) {
         const arhost_camera camera = camera_of(sizes[i]);
         const auto [width, height] = sizes[i];
@@ -186,7 +190,7 @@ bool measure(const std::string &name, TriangleMesh mesh) {
     if (mesh.normals.empty())
         mesh.normals = smooth_normals(mesh);
     const Arena arena = scene_of(std::move(mesh));
-    // Alternating, best of each: other load only slows them down.
+    // Measures both alternately and keeps the fastest run of each: other load can only slow a run down.
     std::optional<Bare> bare;
     std::optional<Ours> ours;
     for (int i = 0; i < repetitions; ++i) {
@@ -208,7 +212,7 @@ bool measure(const std::string &name, TriangleMesh mesh) {
 
 int main(int argc, char **argv) try {
     std::printf(
-        "best of %d, %d threads; frames: diffuse, one light with shadows, 1 sample; MB resident, including the "
+        "best of %d runs, %d threads; scene: diffuse, one light with shadows, 1 sample; MB: resident memory with the "
         "arena\n%-18s %9s %9s %9s %7s %8s %8s %7s %8s %8s %8s\n",
         repetitions, threads, "mesh", "triangles", "commit ms", "1st fr.ms", "ratio", "bare MB", "ours MB", "ratio",
         "400x300", "800x600", "1600x1200");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The baseline of the speed comparison: only traces the plugin's primary rays with the same trace(). Writes the hit
-// distance to the image; infinity for a miss.
+// The bare trace, baseline of the speed comparison: traces the plugin's primary rays with the plugin's trace(), without
+// shading. Writes the distance of each hit to the image, infinity if the ray misses.
 
 void write_distance(uvec2 position) {
     position.y += band.first_row;

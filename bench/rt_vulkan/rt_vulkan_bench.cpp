@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Compares rt_vulkan's time per image with a bare trace of the same primary rays, by a shader that calls the same
-// trace() and only writes distances; and measures leaks in a long run:
+// Measures rt_vulkan's speed and leaks.
 //
 //   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]
 //
-// prints a JSON line per path, and
+// compares the time of an image with that of a bare trace: a shader that traces the same primary rays with the same
+// trace(), but writes only distances (bare.glsl). Prints one line of JSON per path.
 //
 //   rt-vulkan-bench run IMAGES EVERY SCENE.yaml…
 //
-// changes the scene every EVERY images, and exits 1 if a target is missed.
+// renders IMAGES images, loads the next scene after every EVERY images, and prints what has leaked. Exits with 1 if a
+// target is missed.
 #include "bunny.hpp"
 #include "long_run.hpp"
 #include "renderer.hpp"
@@ -29,14 +30,14 @@ namespace {
 using namespace arhost;
 
 arhost_camera camera_from(const double *eye_and_target, bool z_up, std::uint32_t width, std::uint32_t height) {
-    const double f = height / 2 / 0.41421356237309503; // the dissertation's field of view of 45°
+    const double f = height / 2 / 0.41421356237309503; // the dissertation's vertical field of view, 45 degrees
     const double *p = eye_and_target;
     return test::camera({p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {0, z_up ? 0.0 : 1.0, z_up ? 1.0 : 0.0},
                         test::pinhole(width, height, f));
 }
 
-// Sorts triangles along a Morton curve. Lavapipe seems to build acceleration structures in the order of triangles:
-// with the scan's order it takes seconds per image.
+// Sorts triangles along a Morton curve. Lavapipe's acceleration structures seem to depend on the order of the
+// triangles: in the order of the scanned mesh, an image takes seconds.
 void sort_along_morton_curve(scene::TriangleMesh &mesh) {
     const auto morton_code = [&](const auto &triangle) {
         const glm::vec3 &p = mesh.positions[triangle[0]]; // within 128 mm of the origin
@@ -50,7 +51,8 @@ void sort_along_morton_curve(scene::TriangleMesh &mesh) {
               [&](const auto &a, const auto &b) { return morton_code(a) < morton_code(b); });
 }
 
-// The unlit bunny mainly measures visibility (rt_embree_bench.cpp, `primary`).
+// Returns a scene of the bunny without lights, whose render time is mostly that of visibility, as in the case
+// `primary` of rt_embree_bench.cpp.
 scene::Arena unlit_bunny() {
     auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);
     mesh.normals.clear();
@@ -74,7 +76,7 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
-// Page-aligned, so that the device can write to it directly.
+// Image memory that is page-aligned, so that the device can write to it directly.
 class ImageMemory {
 public:
     explicit ImageMemory(const arhost_intrinsics &in)
@@ -100,7 +102,7 @@ private:
     std::unique_ptr<std::uint8_t, decltype(&std::free)> bytes_;
 };
 
-// The plugin's shaders, with the bare trace as the main shader.
+// Returns the plugin's shaders for `path`, but with the bare trace instead of the shader that renders the image.
 rt_vulkan::Shaders bare_shaders(rt_vulkan::Path path) {
     rt_vulkan::Shaders shaders = rt_vulkan::shaders_of(path);
     using Words = std::span<const std::uint32_t>;
@@ -160,7 +162,7 @@ int trace(const std::vector<std::string> &words) {
     double from[6] = {0, 50, 170, 0, 50, 169};
     for (std::size_t i = 0; i < 6 && words.size() == 12; ++i)
         from[i] = std::stod(words[6 + i]);
-    scene::LoadCallbacks callbacks; // gpu.py reads from stderr which mesh was loaded
+    scene::LoadCallbacks callbacks; // print to stderr, where gpu.py finds the name of the loaded mesh
     callbacks.info = callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", text.c_str()); };
     const scene::Arena arena =
         is_bunny ? unlit_bunny() : scene::load_scene(std::filesystem::path(scene_name), callbacks).build();
@@ -185,7 +187,7 @@ int trace(const std::vector<std::string> &words) {
     return 0;
 }
 
-// One run without the validation layers, as they allocate memory, and one with them.
+// Runs twice: without the validation layers, because their memory would be counted as well, then with them.
 int run(const std::vector<std::string> &words) {
     constexpr double max_growth_mib = 2;
     const int images = std::stoi(words[1]), every = std::stoi(words[2]);
@@ -195,14 +197,14 @@ int run(const std::vector<std::string> &words) {
         has_missed |= !is_met;
         return is_met ? "" : ", MISSED";
     };
-    std::printf("%d images, with a change between %zu scenes every %d\n", images, scenes.size(), every);
+    std::printf("%d images of %zu scenes; the scene changes every %d images\n", images, scenes.size(), every);
     const test::LongRun plain = test::long_run(scenes, images / every, every, {});
-    // Caches fill in the first half.
+    // Growth is counted from the middle of the run, because caches fill during the first half.
     const test::LongRun::State &middle = plain.states[plain.states.size() / 2], &last = plain.states.back();
     const double growth_mib = last.memory_mib - middle.memory_mib;
-    std::printf("  memory at half time and at the end  %.1f, %.1f MiB (target: %g MiB more at most%s)\n",
+    std::printf("  memory at half time and at the end  %.1f, %.1f MiB (target: growth of at most %g MiB%s)\n",
                 middle.memory_mib, last.memory_mib, max_growth_mib, verdict(growth_mib <= max_growth_mib));
-    std::printf("  file descriptors                    %td, %td (target: no more%s)\n", middle.files, last.files,
+    std::printf("  file descriptors                    %td, %td (target: no growth%s)\n", middle.files, last.files,
                 verdict(last.files <= middle.files));
     std::fflush(stdout);
     const test::LongRun validated = test::long_run(scenes, images / every, every, {{"validate", "true"}});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Cost of the parts of a run without arhost: source_file, the grey conversion, tracker_aruco, rt_embree and the
-// compositor, called directly one after the other in this process. Prints the CPU time per frame of each in ms, as
+// Measures the parts of a run without arhost: calls source_file, the grey conversion, tracker_aruco, rt_embree and
+// the compositor directly, one after the other, in this process. Prints the CPU time of each in ms per frame, as
 // JSON.
 //
 //   plugins-alone SCENE TRAJECTORY PICTURE FRAMES
@@ -30,7 +30,8 @@ double cpu_ms() {
     return ms(usage.ru_utime) + ms(usage.ru_stime);
 }
 
-// CPU time per call, all threads, after ten warm-up calls (the period of tables.py's trajectories).
+// Returns the mean CPU time of a call, summed over all threads. Ten warm-up calls are not counted; ten frames are the
+// period of tables.py's trajectories.
 template <class Call> double cpu_ms_of(int calls, Call &&call) {
     constexpr int warm_up = 10;
     for (int i = 0; i < warm_up; ++i)
@@ -78,7 +79,7 @@ double tracker_alone(const std::string &picture, const arhost_intrinsics &camera
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
 }
 
-// An image file as a BGR8 frame.
+// A BGR8 frame that is read from an image file.
 struct VideoFrame {
     explicit VideoFrame(const std::string &picture) : slot(layout(picture)) {
         for (int y = 0; y < bgr.rows; ++y)

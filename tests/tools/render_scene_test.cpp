@@ -67,7 +67,7 @@ TEST_F(RenderScene, RefusesToOverwriteSceneInputs) {
     const std::string named = " " + scene.string() + " --output " + (folder() / "link.png").string();
     fs::create_hard_link(scene, folder() / "link.png");
     EXPECT_EQ(status_of(named), 1);
-    EXPECT_THAT(printed(), HasSubstr("link.png: is a file that the scene reads; choose another"));
+    EXPECT_THAT(printed(), HasSubstr("link.png: the scene reads this file; choose another"));
     EXPECT_EQ(fs::file_size(scene), 11u);
 }
 

@@ -21,7 +21,8 @@ using namespace arhost;
 
 namespace {
 
-// Relative to this program, both in a build folder and when installed.
+// Returns the folder of the built-in plugins. Its path relative to this program is the same in a build folder and in
+// an installation.
 std::filesystem::path built_in_plugins() {
     return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/arhost/plugins";
 }
@@ -39,7 +40,8 @@ constexpr arhost_host host = {sizeof(arhost_host),
                               [](const arhost_host *) { return 0; },
                               [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 
-// 16 instead of the default 1, if the plugin supports it: quality matters more than speed here.
+// Sets the option `samples` to 16 if it is not set and the plugin supports this value. Plugins default to 1, but here
+// quality matters more than speed.
 void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
     for (const ipc::OptionDeclaration &o : plugin.options)
         if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
@@ -47,7 +49,7 @@ void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
             options.override_value("samples", "16");
 }
 
-// Page-aligned, as arhost/raytracer.h requires.
+// Image memory that is page-aligned, as arhost/raytracer.h requires.
 class ImageMemory {
 public:
     explicit ImageMemory(std::size_t size)
@@ -84,7 +86,7 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
         passed.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
     expect_ok("create", plugin_->create(&host, passed.data(), static_cast<std::uint32_t>(passed.size()), &instance_));
     if (!instance_)
-        throw std::runtime_error(plugin.id + ": create succeeded without an instance");
+        throw std::runtime_error(plugin.id + ": the function create returned ARHOST_STATUS_OK, but no instance");
 }
 
 void RayTracer::expect_ok(const char *call, arhost_status status) const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A ray tracer plugin, loaded into this process like in arhost-worker, but without a sandbox.
+// Loads a ray tracer plugin into this process. arhost-worker does the same, but in a sandbox.
 #pragma once
 
 #include "yaml/yaml.hpp"
@@ -13,14 +13,15 @@
 
 class RayTracer {
 public:
-    // `name`: plugin name or path, as in a configuration. `options`: map of plugin options; missing ones get the
-    // plugin's default, except `samples`: 16 if supported. Throws std::runtime_error.
+    // `name` is the name or the path of a plugin, as in a configuration. `options` is a map of plugin options.
+    // Options that are not in the map get the plugin's default; only `samples` gets 16 if the plugin supports this
+    // value. Throws std::runtime_error.
     RayTracer(const std::string &name, arhost::yaml::Node options);
     ~RayTracer() { plugin_->destroy(instance_); }
     RayTracer(const RayTracer &) = delete;
     RayTracer &operator=(const RayTracer &) = delete;
 
-    // Returns an image: RGBA, straight alpha. Throws std::runtime_error.
+    // Returns an RGBA image with straight alpha. Throws std::runtime_error.
     cv::Mat render(const arhost_scene &scene, const arhost_camera &camera, double time_s) const;
 
 private:

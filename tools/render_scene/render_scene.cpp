@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// render-scene: renders a scene file from a given viewpoint with any ray tracer plugin, without video, tracker or
-// marker.
+// render-scene renders a scene file with any ray tracer plugin. The user chooses the viewpoint; the program needs no
+// video, tracker or marker.
 #include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
@@ -55,7 +55,7 @@ arhost_camera camera_of(const View &view) {
     return camera;
 }
 
-// Composites straight alpha over a grey checkerboard.
+// Composites an RGBA image with straight alpha over a grey checkerboard.
 cv::Mat over_checkerboard(const cv::Mat &rgba) {
     cv::Mat picture(rgba.size(), CV_8UC3);
     for (int y = 0; y < rgba.rows; ++y)
@@ -75,7 +75,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", base::printable(text).c_str()); };
     callbacks.reads = [&, of_output = base::identity_of(output)](const std::filesystem::path &read) {
         if (const auto [path, node] = base::identity_of(read); path == of_output.path || node == of_output.node)
-            throw std::runtime_error(output + ": is a file that the scene reads; choose another");
+            throw std::runtime_error(output + ": the scene reads this file; choose another output file");
     };
     callbacks.reads(file);
     const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
@@ -86,7 +86,7 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);
 }
 
-// Plugin options: those with their own command-line option, then those of `--set`.
+// Collects the plugin options: first those that have a command-line option of their own, then those of `--set`.
 arhost::yaml::Node options_of(const std::optional<int> &samples, const std::optional<int> &light_samples,
                               const std::vector<std::string> &settings) {
     arhost::yaml::Node options = arhost::yaml::Node::parse("{}", "render-scene");
@@ -97,7 +97,7 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
     for (const std::string &setting : settings) {
         const std::size_t equals = setting.find('=');
         if (equals == 0 || equals == std::string::npos)
-            throw std::runtime_error("--set " + setting + ": must be key=value, as in --set samples=4");
+            throw std::runtime_error("--set " + setting + ": the argument must be key=value, as in --set samples=4");
         options.override_value(setting.substr(0, equals), setting.substr(equals + 1));
     }
     return options;
@@ -106,7 +106,7 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a full disk and a closed pipe are error values
+    std::signal(SIGPIPE, SIG_IGN); // writing to a closed pipe then fails with an error instead of a signal
     std::signal(SIGXFSZ, SIG_IGN);
     base::CommandLine app(
         "Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
@@ -129,10 +129,11 @@ int main(int argc, char **argv) {
         .type_name("WIDTHxHEIGHT")
         .range(1, 16384)
         .default_text(std::to_string(view.size[0]) + "x" + std::to_string(view.size[1]));
-    app.option("--time", time_s, "Time in s; animations repeat")
+    app.option("--time", time_s, "Time of the animation in s; animations repeat")
         .check([](const std::string &text) {
             const double seconds = std::strtod(text.c_str(), nullptr);
-            return seconds >= 0 && seconds <= 1e6 ? std::string() : "must be 0 to 1e6, is " + text; // no NaN
+            return seconds >= 0 && seconds <= 1e6 ? std::string()
+                                                  : "must be 0 to 1e6, is " + text; // also rejects NaN
         })
         .show_default();
     app.option("--raytracer", ray_tracer, "Ray tracer plugin, as in a configuration")
@@ -152,7 +153,7 @@ int main(int argc, char **argv) {
     try {
         const std::string kind = std::filesystem::path(output).extension();
         if (kind != ".png" && kind != ".jpg" && kind != ".jpeg" && kind != ".ppm")
-            throw std::runtime_error(output + ": its name must end in .png, .jpg or .ppm");
+            throw std::runtime_error(output + ": the file's name must end in .png, .jpg, .jpeg or .ppm");
         base::AtomicFile file(output);
         const cv::Mat rgba =
             render(scene, view, time_s, RayTracer(ray_tracer, options_of(samples, light_samples, settings)), output);
@@ -168,7 +169,7 @@ int main(int argc, char **argv) {
                             colour, width, cv::LINE_AA);
         std::vector<unsigned char> bytes;
         if (!cv::imencode(kind, picture, bytes))
-            throw std::runtime_error(output + ": the picture cannot be encoded");
+            throw std::runtime_error(output + ": cannot encode the picture");
         file.write({bytes.begin(), bytes.end()});
     } catch (const std::exception &error) {
         std::fprintf(stderr, "render-scene: %s\n", base::printable(error.what()).c_str());

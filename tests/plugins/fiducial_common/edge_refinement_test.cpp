@@ -16,7 +16,7 @@ using arhost::fiducial::refine_edges;
 const arhost_intrinsics camera = intrinsics_of({320, 240}, 300, 300, 159.5, 119.5);
 const arhost::fiducial::Lens lens(camera);
 
-// Corner errors of one tag before and after refinement, against the projected corners.
+// Mean distance of a tag's corners from their projections before and after refinement, and mean offset afterwards.
 struct Errors {
     double before_px = 0, after_px = 0;
     cv::Point2d bias_px;
@@ -53,7 +53,7 @@ TEST(EdgeRefinement, MovesRoughCornersToTheProjectedOnes) {
         const Errors e = errors(inverted);
         EXPECT_GT(e.before_px, 0.7);
         EXPECT_LT(e.after_px, 0.05);
-        // Would show an offset of half a pixel: pixel centres are at integers.
+        // Fails if the refinement does not put pixel centres at integers: the bias would then be half a pixel.
         EXPECT_LT(cv::norm(e.bias_px), 0.02);
     }
 }
@@ -76,7 +76,7 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
 TEST(EdgeRefinement, ReturnsNothingWithoutEdges) {
     const Corners corners{{{100, 80}, {160, 80}, {160, 140}, {100, 140}}};
     for (const cv::Size size :
-         {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // square partly or entirely outside
+         {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // inside, partly and entirely outside
         EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens));
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const cv::Mat plain(240, 320, CV_8U, cv::Scalar(90));

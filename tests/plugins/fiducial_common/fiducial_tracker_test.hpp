@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests for every fiducial tracker, with tag36h11. A tracker's test includes this and instantiates the suite
-// FiducialTracker with its configurations.
+// Tests for every fiducial tracker, with the family tag36h11. Each tracker's test program includes this file and
+// instantiates the suite FiducialTracker with the tracker's configurations.
 #pragma once
 
 #include "prints.hpp"
@@ -17,7 +17,7 @@ namespace arhost::test {
 struct TrackerCase {
     const char *name, *plugin;
     Options options;
-    Options multithreaded; // added to `options` for several threads
+    Options multithreaded; // additional options that make the tracker use several threads
 };
 
 inline const arhost_intrinsics test_camera = intrinsics_of({480, 360}, 450, 455, 243.2, 176.9);
@@ -83,7 +83,7 @@ TEST_P(FiducialTracker, RecoversTheRenderedPose) {
             bias += cv::Point2d(found.corners_px[k][0], found.corners_px[k][1]) - corners[k];
         }
     }
-    // Would show an offset of half a pixel: pixel centres are at integers.
+    // Fails if the tracker does not put pixel centres at integers: the bias would then be half a pixel.
     EXPECT_LT(cv::norm(bias) / (4.0 * static_cast<double>(poses.size())), 0.03);
 }
 
@@ -95,7 +95,7 @@ TEST_P(FiducialTracker, FacingTagHasXRightYUpAndZTowardsTheViewer) {
     EXPECT_NEAR(upright[0].mt[13], 30, 1);
     EXPECT_NEAR(upright[0].mt[14], -400, 2);
     EXPECT_LT(upright[0].corners_px[0][0], upright[0].corners_px[1][0]); // top-left is left of top-right
-    EXPECT_LT(upright[0].corners_px[0][1], upright[0].corners_px[3][1]); // and above bottom-left
+    EXPECT_LT(upright[0].corners_px[0][1], upright[0].corners_px[3][1]); // top-left is above bottom-left
 
     for (const double turn : {90.0, 180.0, 270.0}) {
         const auto turned = track(picture_of({{tag(3), 100, pose_of(0, 0, 400, 0, 0, turn)}}), {{3, 100}});
@@ -105,7 +105,7 @@ TEST_P(FiducialTracker, FacingTagHasXRightYUpAndZTowardsTheViewer) {
 }
 
 TEST_P(FiducialTracker, CorrectsLensDistortion) {
-    // The lens moves the corners by up to 10 px and bends the edges by up to a pixel.
+    // The distortion moves the corners by up to 10 px and bends the edges by up to 1 px.
     arhost_intrinsics lens = test_camera;
     lens.distortion = ARHOST_DISTORTION_BROWN;
     lens.coefficient_count = 4;
@@ -149,7 +149,8 @@ TEST_P(FiducialTracker, ReportsOnlyListedMarkersInTheirListedOrder) {
     EXPECT_THAT(ids({{586, 70}, {7}, {2, 80}}), testing::ElementsAre(586, 2));
     EXPECT_THAT(ids({{7}, {9}}), testing::IsEmpty());
     for (const auto &marker : track(picture, {{2, 80}, {5, 60}, {586, 70}}))
-        EXPECT_NEAR(marker.mt[14], -500, 2); // each with its own side
+        EXPECT_NEAR(marker.mt[14], -500,
+                    2); // correct only if the tracker uses the side length listed for this marker
 }
 
 TEST_P(FiducialTracker, ReportsAMarkerOnceIfItIsSeenTwice) {

@@ -79,7 +79,7 @@ TEST_P(PlanarPoseThroughLens, RecoversTheKnownPoseFromExactCorners) {
 
 TEST(PlanarPose, FacingMarkerHasXRightYUpAndZTowardsTheViewer) {
     const auto camera = intrinsics_of({640, 480}, 600, 600, 320, 240);
-    // 60 px wide, its centre 30 px right of and 60 px above the principal point.
+    // The square is 60 px wide; its centre is 30 px to the right of the principal point and 60 px above it.
     const auto found = planar_pose({{{320, 150}, {380, 150}, {380, 210}, {320, 210}}}, Lens(camera), 100);
     ASSERT_TRUE(found);
     const Mt expected{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 50, 100, -1000, 1};
@@ -141,7 +141,7 @@ TEST(PlanarPose, FarMarkerIsAmbiguousWithAnAlternativeTiltedTheOtherWay) {
     ASSERT_TRUE(far && far->alternative);
     EXPECT_GT(far->ambiguity, 0.5);
     EXPECT_LE(far->ambiguity, 1);
-    EXPECT_LT(far->best.mt[9] * far->alternative->mt[9], 0); // the y of the normal
+    EXPECT_LT(far->best.mt[9] * far->alternative->mt[9], 0); // the y components of the two normals
 
     auto near_corners = corners_of(pose_of(0, 0, 300, 40), camera, side_mm);
     near_corners[0] += cv::Point2d(0.1, -0.05);
@@ -153,20 +153,21 @@ TEST(PlanarPose, ReturnsNothingForDegenerateCorners) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
     const Corners degenerate[] = {
         {{{10, 10}, {20, 20}, {30, 30}, {40, 40}}},       // collinear
-        {{{10, 10}, {50, 10}, {30, 10}, {10, 50}}},       // three of them collinear
-        {{{10, 10}, {10, 10}, {10, 10}, {10, 10}}},       // one point
+        {{{10, 10}, {50, 10}, {30, 10}, {10, 50}}},       // three corners are collinear
+        {{{10, 10}, {10, 10}, {10, 10}, {10, 10}}},       // all corners coincide
         {{{10, 10}, {50, 50}, {50, 10}, {10, 50}}},       // self-intersecting
         {{{10, 10}, {50, 10}, {20, 20}, {10, 50}}},       // not convex
         {{{nan, 10}, {50, 10}, {50, 50}, {10, 50}}},      //
         {{{10, 10}, {50, infinite}, {50, 50}, {10, 50}}}, //
-        {{{50, 10}, {10, 10}, {10, 50}, {50, 50}}},       // mirrored: the back face
+        {{{50, 10}, {10, 10}, {10, 50}, {50, 50}}},       // wrong orientation: shows the back face
     };
     for (const Corners &corners : degenerate)
         EXPECT_FALSE(planar_pose(corners, lens, side_mm));
 }
 
 TEST(PlanarPose, ReturnsNothingWhereTheDistortionCannotBeInverted) {
-    // r·(1 − 0.5 r²) has its maximum 0.544 at r = 0.816: no ray reaches a pixel further out.
+    // The distorted radius r·(1 − 0.5 r²) has its maximum 0.544 at r = 0.816; no ray reaches pixels beyond that
+    // radius.
     const auto camera = intrinsics_of({640, 480}, 300, 300, 319.5, 239.5, ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0});
     EXPECT_TRUE(planar_pose({{{300, 220}, {340, 220}, {340, 260}, {300, 260}}}, Lens(camera), side_mm));
     EXPECT_FALSE(planar_pose({{{580, 220}, {620, 220}, {620, 260}, {580, 260}}}, Lens(camera), side_mm));
@@ -189,9 +190,9 @@ TEST(PlanarPose, AnyQuadrilateralGivesAValidPoseOrNone) {
         EXPECT_TRUE(found->ambiguity >= 0 && found->ambiguity <= 1);
         for (const auto &pose : {found->best, found->alternative.value_or(found->best)}) {
             expect_orthonormal(pose.mt);
-            EXPECT_LT(pose.mt[14], 0); // in front of the camera
+            EXPECT_LT(pose.mt[14], 0); // the marker is in front of the camera
             const double facing = pose.mt[8] * pose.mt[12] + pose.mt[9] * pose.mt[13] + pose.mt[10] * pose.mt[14];
-            EXPECT_LT(facing, 0); // and its front faces the camera
+            EXPECT_LT(facing, 0); // the marker's front faces the camera
             EXPECT_LE(found->best.reprojection_px, pose.reprojection_px);
         }
         const auto again = planar_pose(corners, lens, side_mm);
@@ -208,7 +209,7 @@ TEST(Lens, RejectsAnInvalidCalibration) {
     for (const auto &camera : {three_coefficients, fisheye_of_five, unknown_model, no_focal_length})
         try {
             Lens lens(camera);
-            ADD_FAILURE() << "accepted";
+            ADD_FAILURE() << "the invalid input was accepted";
         } catch (const arhost::Failure &failure) {
             EXPECT_EQ(failure.status(), ARHOST_STATUS_ERROR_CONFIGURATION);
             EXPECT_THAT(failure.what(), testing::HasSubstr("calibration"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Markers as drawn by AprilTag's and OpenCV's libraries.
+// Markers drawn by the AprilTag library and by OpenCV.
 #pragma once
 
 #include "rendered_marker.hpp"

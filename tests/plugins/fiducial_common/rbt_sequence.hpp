@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A tracker's accuracy on a real sequence with known poses (../shared/data/markers/rbt_sequence).
+// Measures a tracker's accuracy on a real sequence with known poses (../shared/data/markers/rbt_sequence).
 #pragma once
 
 #include "tracker_support.hpp"
@@ -30,7 +30,8 @@ inline double mean(const std::vector<double> &values) {
 
 class RbtSequence {
 public:
-    using Frames = std::vector<std::map<int, arhost_marker>>; // a tracker's results, by frame and id
+    using Frames =
+        std::vector<std::map<int, arhost_marker>>; // for each frame, the markers that the tracker found, by id
 
     RbtSequence() {
         const auto folder = shared_data("markers/rbt_sequence");
@@ -46,12 +47,12 @@ public:
         ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
     }
 
-    // `ms` receives the time of each frame in milliseconds.
+    // Runs the tracker on the sequence. Appends the tracking time of each frame, in ms, to `ms` if it is not null.
     Frames run(Tracker &tracker, std::vector<double> *ms = nullptr) const {
         std::vector<Listed> listed;
         for (int id : ids_)
             listed.push_back({id, side_mm});
-        // cam.json; the sequence is rectified.
+        // Intrinsics from the sequence's cam.json; the images are already undistorted.
         const auto camera =
             intrinsics_of({640, 480}, 607.178466796875, 607.2342529296875, 321.39129638671875, 241.91822814941406);
         if (tracker.start(camera, listed) != ARHOST_STATUS_OK)
@@ -71,9 +72,9 @@ public:
     }
 
     struct Accuracy {
-        int listed = 0, found = 0;     // detections in the reference, and those found by the tracker
+        int listed = 0, found = 0;     // tags in the reference; number of these that the tracker found
         std::vector<double> corner_px; // distance of each corner from the reference
-        std::vector<double> distance;  // relative error of each tag's distance
+        std::vector<double> distance;  // relative error of each tag's distance from the camera
         double found_fraction() const { return static_cast<double>(found) / listed; }
     };
     Accuracy accuracy(const Frames &frames) const {
@@ -86,7 +87,8 @@ public:
                 if (marker == frames[k].end())
                     continue;
                 ++result.found;
-                // Row and column, pixel centres at +0.5, counter-clockwise from the bottom left.
+                // The reference lists the corners counter-clockwise from the bottom left, each as row and column;
+                // its pixel centres are at +0.5.
                 for (int corner = 0; corner < 4; ++corner) {
                     const auto &at = reference["tag_corners"][3 - corner];
                     result.corner_px.push_back(corner_distance_px(
@@ -99,7 +101,7 @@ public:
         return result;
     }
 
-    // Distances in px between the corners that both trackers found.
+    // Returns the distances, in px, between the corners in `a` and `b` of each marker that both trackers found.
     static std::vector<double> disagreement_px(const Frames &a, const Frames &b) {
         std::vector<double> distances;
         for (std::size_t k = 0; k < a.size(); ++k)
@@ -115,7 +117,7 @@ public:
 private:
     static constexpr double side_mm = 95.5;
 
-    // The board layout is described in ../shared/data/README.md.
+    // Returns the distance from the camera to a tag's centre. See ../shared/data/README.md for the board's layout.
     static double distance_mm(const nlohmann::json &camera_from_board, int id) {
         const double x = 47.75 + 120.0 * (id / 4), y = 47.75 + 120.0 * (id % 4);
         std::array<double, 3> centre;

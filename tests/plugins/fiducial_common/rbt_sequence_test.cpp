@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy of both trackers with default options on a real sequence.
+// Tests the accuracy of both trackers on a real sequence, with default options.
 #include "rbt_sequence.hpp"
 
 #include <gtest/gtest.h>

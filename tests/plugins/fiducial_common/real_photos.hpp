@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Photos from ../shared/data/markers with known tag36h11 tags.
+// Tests of trackers with photos from ../shared/data/markers that show known tag36h11 tags.
 #pragma once
 
 #include "tracker_support.hpp"
@@ -13,7 +13,7 @@
 
 namespace arhost::test {
 
-// The markers of a photo, by id.
+// Returns the markers that the tracker finds in a photo, by id.
 inline std::map<int, arhost_marker> markers_in(Tracker &tracker, const std::filesystem::path &file,
                                                const std::vector<Listed> &listed) {
     const cv::Mat picture = read_grey(file);
@@ -32,14 +32,15 @@ inline std::vector<Listed> ids_to(int count) {
     return listed;
 }
 
-// The intersection of the diagonals: the centre of the print.
+// Returns the pixel at the print's centre: the intersection of the diagonals.
 inline cv::Point2d centre_px(const arhost_marker &marker) {
     const auto corner = [&](int i) { return cv::Point2d(marker.corners_px[i][0], marker.corners_px[i][1]); };
     const cv::Point2d a = corner(2) - corner(0), b = corner(3) - corner(1);
     return corner(0) + (corner(1) - corner(0)).cross(b) / a.cross(b) * a;
 }
 
-// Twelve tags of 53 mm (apriltag_photo): their poses, and their corners within ViSP's tolerance of 0.5 px.
+// Checks the poses and corners of the twelve tags of 53 mm in apriltag_photo. The corners may differ by 0.5 px, the
+// tolerance that ViSP uses.
 inline void expect_april_tag_photo(Tracker &tracker) {
     const auto folder = shared_data("markers/apriltag_photo");
     const auto photo = read_grey(folder / "AprilTag.png");
@@ -56,13 +57,13 @@ inline void expect_april_tag_photo(Tracker &tracker) {
         std::string title;
         std::getline(corners >> std::ws, title);
         ASSERT_EQ(title, "36h11_id:_" + std::to_string(marker.id));
-        for (int k = 3; k >= 0; --k) { // counter-clockwise from the bottom left; pixel centres at +0.5
+        for (int k = 3; k >= 0; --k) { // the file's order is counter-clockwise from the bottom left
             double row = 0, column = 0;
             corners >> row >> column;
-            EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}), 0.5);
+            EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}), 0.5); // its pixel centres are at +0.5
         }
         std::getline(poses >> std::ws, title);
-        double t[3], u[3]; // translation in metres, rotation vector; OpenCV's camera axes
+        double t[3], u[3]; // translation in metres and rotation vector, in OpenCV's camera axes
         poses >> t[0] >> t[1] >> t[2] >> u[0] >> u[1] >> u[2];
         const double sign[3] = {1, -1, -1};
         cv::Matx33d truth, measured;
@@ -78,7 +79,8 @@ inline void expect_april_tag_photo(Tracker &tracker) {
     }
 }
 
-// A clipboard with 30 tags of about 25 px, 320×240, and five views of a hallway.
+// Checks that the tracker finds all 30 tags, each about 25 px wide, in four photos of a clipboard (320×240), and the
+// one tag in each of five photos of a hallway.
 inline void expect_swatbotics_photos(Tracker &tracker) {
     const auto folder = shared_data("markers/swatbotics");
     for (const char *name : {"clipboard02.png", "clipboard04.png", "clipboard05.png", "clipboard06.png"})
@@ -92,7 +94,7 @@ inline void expect_swatbotics_photos(Tracker &tracker) {
     }
 }
 
-// Tag centres from AprilTags.jl, with pixel centres at +0.5.
+// Compares the tags' centres with those that AprilTags.jl computes; its pixel centres are at +0.5.
 inline void expect_julia_photo(Tracker &tracker) {
     std::vector<cv::Point2d> expected{{176.1, 404.5}, {216.1, 134.0}, {130.1, 412.0}};
     const auto found = markers_in(tracker, shared_data("markers/julia/tagtest.jpg"), ids_to(30));

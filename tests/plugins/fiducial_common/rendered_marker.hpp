@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders printed markers at known poses. Each pixel is the mean of several rays, without resampling, so that edges
-// lie exactly at their projection.
+// Renders printed markers at known poses. Each pixel is the mean of several rays and is not resampled, so that edges
+// are exactly at their projections.
 #pragma once
 
 #include "tracker_support.hpp"
@@ -15,12 +15,12 @@
 
 namespace arhost::test {
 
-// A square sheet of cells, 255 white and 0 black, the first row at its top.
+// A square sheet of cells: 255 is white, 0 is black, row 0 is the top row.
 struct Print {
     cv::Mat_<uint8_t> cells;
-    int corner_cells; // side of the centred square between the corners, in cells
+    int corner_cells; // side, in cells, of the centred square whose corners a tracker reports
 
-    // With a quiet zone `cells_wide` wide.
+    // Returns the print with an additional white margin (quiet zone) of `cells_wide` cells.
     Print with_margin(int cells_wide) const {
         Print wider{{}, corner_cells};
         cv::copyMakeBorder(cells, wider.cells, cells_wide, cells_wide, cells_wide, cells_wide, cv::BORDER_CONSTANT,
@@ -34,11 +34,11 @@ struct Print {
     }
 };
 
-// A marker's pose as arhost_marker.mt has it: GL eye space, column-major, mm.
+// A marker's pose in the convention of arhost_marker.mt: in OpenGL eye space, column-major, in mm.
 using Mt = std::array<double, 16>;
 
-// Centre at (x, y, −distance), rotated about the camera's x, then y, then z axis (degrees). All 0: upright, facing
-// the camera.
+// Returns the pose of a marker whose centre is at (x, y, −distance) and that is rotated about the camera's x axis,
+// then its y axis, then its z axis (in degrees). Without a rotation, the marker is upright and faces the camera.
 inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x = 0, double about_y = 0,
                   double about_z = 0) {
     const auto rotation_about = [](int axis, double degrees) {
@@ -60,7 +60,7 @@ inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x =
     return mt;
 }
 
-// The pixel of a point on the marker (x right, y up, mm), as defined in arhost/camera.h.
+// Projects a point of the marker (x to the right, y up, in mm) to a pixel, with the formulas of arhost/camera.h.
 inline cv::Point2d pixel_of(const Mt &mt, const arhost_intrinsics &camera, double x_mm, double y_mm) {
     const auto eye = [&](int row) { return mt[row] * x_mm + mt[4 + row] * y_mm + mt[12 + row]; };
     const double x = eye(0) / -eye(2), y = -eye(1) / -eye(2);
@@ -81,7 +81,7 @@ inline cv::Point2d pixel_of(const Mt &mt, const arhost_intrinsics &camera, doubl
     return {camera.fx * xd + camera.cx, camera.fy * yd + camera.cy};
 }
 
-// The four corners in the order of arhost/tracker.h.
+// Returns the pixels of the marker's corners, in the order that arhost/tracker.h defines.
 inline std::array<cv::Point2d, 4> corners_of(const Mt &mt, const arhost_intrinsics &camera, double side_mm) {
     const double h = side_mm / 2;
     return {pixel_of(mt, camera, -h, h), pixel_of(mt, camera, h, h), pixel_of(mt, camera, h, -h),
@@ -94,7 +94,8 @@ struct Placed {
     Mt mt;
 };
 
-// Paper is 220, ink 30, and the background 140. Undistorted cameras only.
+// Renders markers with grey values of 220 for paper, 30 for ink and 140 for the background. The camera must have no
+// lens distortion.
 inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed> &markers, int rays_per_side = 6) {
     std::vector<cv::Matx33d> marker_from_pixel;
     for (const Placed &placed : markers) {
@@ -130,7 +131,7 @@ inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed>
     return picture;
 }
 
-// Normally distributed noise, reproducible by its seed.
+// Adds normally distributed noise; the same seed gives the same noise.
 inline void add_noise(cv::Mat &picture, double sigma, uint64_t seed) {
     cv::Mat noise(picture.size(), CV_16S);
     cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0, sigma);

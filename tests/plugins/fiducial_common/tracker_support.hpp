@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Frames, cameras and the loaded plugin for tests and benchmarks of trackers.
+// Provides tests and benchmarks of trackers with frames, cameras and the plugin under test.
 #pragma once
 
 #include <plugin_under_test.hpp>
@@ -33,7 +33,7 @@ inline arhost_intrinsics intrinsics_of(cv::Size size, double fx, double fy, doub
     return camera;
 }
 
-// An undistorted camera, for tests that check only corners.
+// Returns a camera without lens distortion, for tests that check only corners.
 inline arhost_intrinsics plain_camera(cv::Size size) {
     return intrinsics_of(size, size.width, size.width, (size.width - 1) / 2.0, (size.height - 1) / 2.0);
 }
@@ -45,7 +45,7 @@ inline cv::Mat read_grey(const std::filesystem::path &file) {
     return grey;
 }
 
-// A frame as a tracker receives it, with padded rows.
+// A grey frame with padded rows, as a tracker may receive it.
 class GreyFrame {
 public:
     explicit GreyFrame(const cv::Mat &picture) : format_(layout(picture.size())), slot_(format_.byte_size) {
@@ -71,7 +71,7 @@ private:
         format.width = static_cast<uint32_t>(size.width);
         format.height = static_cast<uint32_t>(size.height);
         if (!arhost_frame_layout(&format))
-            throw std::runtime_error("invalid frame size");
+            throw std::runtime_error("the frame size is invalid");
         return format;
     }
     arhost_frame_format format_;
@@ -85,7 +85,7 @@ struct Listed {
 
 using Options = std::map<std::string, std::string>;
 
-// A tracker plugin instance, from create to destroy.
+// A tracker plugin's instance: created in the constructor, destroyed in the destructor.
 class Tracker {
 public:
     explicit Tracker(const std::string &plugin, const Options &options = {}) : plugin_(plugin) {

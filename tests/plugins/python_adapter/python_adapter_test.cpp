@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs scripts in the real arhost: what they receive, and how their errors are reported.
+// Runs Python scripts in the real arhost. Checks the data that the scripts receive and how their errors are reported.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,8 @@ protected:
     }
 };
 
-// The counting plugins with one component replaced; six frames.
+// Returns a configuration of the counting plugins for six frames, in which the line that starts with `prefix` is
+// replaced with `replacement`.
 std::string chain(const std::string &prefix, const std::string &replacement) {
     std::istringstream lines(counting("lockstep", "frames: 6", "", ""));
     std::string result;
@@ -76,7 +77,8 @@ class Tracker:
 )"),
               0)
         << run.output();
-    // rt_counter encodes the pose's frame number in the image; sink_counter compares it with the frame's own.
+    // rt_counter draws the frame number of the pose into the image; sink_counter compares it with the number of the
+    // frame.
     EXPECT_EQ(run.stats()["frames"]["augmented"], 6);
     const auto lines = counted(run);
     ASSERT_EQ(lines.size(), 6u);
@@ -205,7 +207,7 @@ TEST_F(PythonAdapter, WarnsIfAScriptKeepsAnArray) {
     EXPECT_THAT(run.output(), HasSubstr("'track' kept an array"));
 }
 
-// Reported before the run at the component's line in the configuration, without a retry.
+// arhost reports them before the run, with the configuration line of the component, and does not retry.
 TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
     const std::string two = std::string(idle_tracker) + "class U(T): pass\n";
     for (const auto &[script, message] :

@@ -9,7 +9,7 @@
 namespace arhost::raytracer_common {
 namespace {
 
-// A rotation about z with a scale per axis, mirrored if `mirror` is −1, then a translation.
+// Scales each axis differently, rotates about z and translates. If `mirror` is −1, also mirrors.
 struct Transform {
     float numbers[12];
     explicit Transform(float mirror) : numbers{0, 2 * mirror, 0, -3, 0, 0, 0, 0, 0.5f, 10, 20, 30} {}
@@ -45,8 +45,8 @@ TEST(Arena, CofactorsOverTheDeterminantAreTheInverse) {
         }
 }
 
-// The transformed tangents of a plane stay perpendicular to its transformed normal, which keeps pointing outwards,
-// even for mirrored objects.
+// For a transformed plane, the transformed normal is perpendicular to the transformed tangents and points outwards,
+// even if the transform mirrors.
 TEST(Arena, NormalsStayPerpendicularAndOutward) {
     for (const float mirror : {1.0f, -1.0f}) {
         const Transform transform(mirror);

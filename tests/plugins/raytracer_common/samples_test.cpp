@@ -46,7 +46,7 @@ TEST(SamplePositions, OfTheSequenceStayEvenlyDistributed) {
             const int row = std::min(static_cast<int>((sample.y + 0.5f) * 8), 7);
             ++cells[static_cast<std::size_t>(8 * row + column)];
         }
-        for (const int count : cells) // 64 each; the standard deviation of random samples would be 8
+        for (const int count : cells) // the mean is 64; the standard deviation of random samples would be 8
             EXPECT_NEAR(count, 64, 4);
     }
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparison with visually verified reference pictures. A pixel whose neighbours have the same alpha class and a
-// similar colour is a probe: its alpha must match exactly, its colour to 1 code. Pixels on edges may fall on either
-// side, since Embree's code differs between processors.
+// Compares pictures with reference pictures, which were verified by eye. A pixel is a probe if all its neighbours
+// have the same alpha and a similar colour. A probe's alpha must match exactly, and its colour must match to within 1
+// code. Of the other pixels, which are at edges, 1 % may differ, because Embree's results differ between processors.
 //
-// After an intended change: ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
+// To update the references after an intended change, run:
+// ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
 #include "scene/loader.hpp"
 #include "scene/motion.hpp"
 #include "tracer.hpp"
@@ -22,7 +23,7 @@ const std::filesystem::path folder = ARHOST_SOURCE_DIRECTORY "/tests/plugins/rt_
 struct View {
     const char *name, *scene;
     std::array<double, 3> eye, look_at, up;
-    std::vector<int> classes; // alpha classes that must have at least 100 probes each
+    std::vector<int> classes; // alpha values; the picture must have at least 100 probes of each
     const char *samples = "1";
     double time_s = 0;
 };
@@ -46,7 +47,7 @@ cv::Mat render(const View &view) {
     for (int y = 0; y < image.rows; ++y)
         for (int x = 0; x < image.cols; ++x) {
             const Pixel p = picture.at(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-            const bool transparent = p[3] == 0; // its colour is undefined
+            const bool transparent = p[3] == 0; // the colour of a transparent pixel is undefined
             for (int i = 0; i < 4; ++i)
                 image.at<cv::Vec4b>(y, x)[i] =
                     transparent ? std::uint8_t{0}
@@ -99,7 +100,7 @@ TEST_P(Golden, MatchesTheReferencePicture) {
         }
     EXPECT_LE(others_off, others / 100);
     for (const int alpha : GetParam().classes)
-        EXPECT_GE(probes[alpha], 100) << "of alpha " << alpha;
+        EXPECT_GE(probes[alpha], 100) << "probes of alpha " << alpha;
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -116,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
         View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}},
         View{"room",
              "tests/plugins/rt_embree/golden/room.yaml",
-             {20, -190, 120}, // outside the room, behind the front wall's back face
+             {20, -190, 120}, // outside the room: the camera sees the front wall's back face
              {5, 0, 22},
              {0, 0, 1},
              {0, 255},

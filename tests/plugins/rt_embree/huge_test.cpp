@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Scenes at the format's limits.
+// Tests very large scenes: ten million triangles, and the largest texture.
 #include "tracer.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ double available_gib() {
 TEST(Huge, TracesTenMillionTriangles) {
     if (available_gib() < 6)
         GTEST_SKIP() << "needs 6 GiB of memory";
-    constexpr unsigned n = 2237; // squares a side
+    constexpr unsigned n = 2237; // squares per side of the sheet
     scene::TriangleMesh mesh;
     mesh.positions.reserve((n + 1) * (n + 1));
     mesh.triangles.reserve(2 * n * n);
@@ -45,7 +45,8 @@ TEST(Huge, TracesTenMillionTriangles) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
     builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(flat(0.5f, 0.5f, 0.5f)));
-    // Triangles are a twentieth of a pixel: without `robust`, one ray in a few hundred passes between two.
+    // A triangle is a twentieth of a pixel wide. Without `robust`, one ray in a few hundred passes between two
+    // adjacent triangles.
     const Picture picture = Tracer(std::move(builder), {{"robust", "true"}}).render(from_above());
     int inside = 0;
     for (int y = 30; y < 120; ++y)
@@ -66,7 +67,7 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     texture.format = ARHOST_TEXEL_RGBA8;
     texture.texels.size = std::size_t{4} * side * side;
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size); // black, alpha 0
-    // White in the last quarter of the last rows, at byte offsets beyond 2^29.
+    // The last quarter of each of the last 2000 rows is white. These texels are at byte offsets beyond 2^29.
     for (std::size_t y = side - 2000; y < side; ++y)
         std::memset(texture.texels.bytes.get() + 4 * (y * side + 3 * side / 4), 0xff, side);
     ArenaBuilder builder;
@@ -77,7 +78,7 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
     builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(material));
     const Picture picture = Tracer(std::move(builder)).render(from_above());
-    EXPECT_EQ(picture.at(140, 120)[0], 255) << "bottom right";
+    EXPECT_EQ(picture.at(140, 120)[0], 255) << "the white area is at the bottom right";
     EXPECT_EQ(picture.at(110, 120)[0], 0);
     EXPECT_EQ(picture.at(140, 60)[0], 0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Textures and environments.
+// Tests textures and environments.
 #include "rich_scene.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -14,7 +14,8 @@ namespace {
 
 using scene::ArenaBuilder;
 
-// A 2×2 texture viewed upright from above: red, green / blue, grey.
+// Renders a square with a 2×2 texture, viewed upright from above. Its top row is red and green, its bottom row is
+// blue and grey.
 Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format format = ARHOST_TEXEL_SRGB8) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
@@ -31,7 +32,8 @@ Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format form
     return Tracer(std::move(builder)).render(from_above());
 }
 
-// Half a pixel off a texel's centre, its neighbours are mixed in.
+// Whether the colours differ by at most 48 codes. The tolerance is for filtering: a pixel that is not exactly at the
+// texel's centre also contains some of the neighbouring texels' colours.
 bool is_nearly(const Pixel &pixel, const Pixel &colour) {
     for (std::size_t c = 0; c < 4; ++c)
         if (std::abs(pixel[c] - colour[c]) > 48)
@@ -46,20 +48,20 @@ TEST(Texture, IsUprightAndLinearised) {
     EXPECT_TRUE(is_nearly(picture.at(70, 44), Pixel{255, 0, 0, 255}));
     EXPECT_TRUE(is_nearly(picture.at(130, 44), Pixel{0, 255, 0, 255}));
     EXPECT_TRUE(is_nearly(picture.at(70, 104), Pixel{0, 0, 255, 255}));
-    EXPECT_NEAR(picture.at(130, 104)[0], 188, 3) << "decoded and encoded again";
+    EXPECT_NEAR(picture.at(130, 104)[0], 188, 3) << "sRGB texel, decoded and encoded again";
     EXPECT_NEAR(of_four_texels(ARHOST_WRAP_REPEAT, 1, ARHOST_TEXEL_RGBA8).at(130, 104)[0],
                 shading::srgb8_exact(188 / 255.0), 3);
 }
 
 TEST(Texture, IsInterpolatedInLinearLight) {
-    // Halfway between red and green.
+    // This pixel is halfway between the red and the green texel.
     const Pixel mixed = of_four_texels(ARHOST_WRAP_CLAMP, 1).at(99, 30);
     EXPECT_NEAR(mixed[0], shading::srgb8_exact(0.5), 2);
     EXPECT_NEAR(mixed[1], shading::srgb8_exact(0.5), 2);
 }
 
 TEST(Texture, RepeatsClampsAndMirrors) {
-    // The left half of the last of three repetitions.
+    // Column 130 is in the left half of the third repetition, column 89 in the left half of the second.
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_REPEAT, 3).at(130, 24), Pixel{255, 0, 0, 255}));
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_CLAMP, 3).at(130, 24), Pixel{0, 255, 0, 255}));
     EXPECT_TRUE(is_nearly(of_four_texels(ARHOST_WRAP_MIRROR, 3).at(89, 24), Pixel{0, 255, 0, 255}));
@@ -89,7 +91,7 @@ TEST(AlphaCutoff, CutOutTexelsWithAlphaBelowTheCutoff) {
         const auto material = builder.add_material(half_a_hole(builder, 0.5f));
         const auto whole = builder.add_material(half_a_hole(builder, 0));
         const auto mesh = builder.add_triangles(textured_square(60, 0));
-        // The same mesh twice, with and without cutoff.
+        // If `instanced`, the same mesh also occurs in a second object, lower and without a cutoff.
         const glm::mat4x3 lower(1, 0, 0, 0, 1, 0, 0, 0, 1, instanced ? 30 : 0, 0, -50);
         builder.add_object("holed", mesh, material, ARHOST_ROLE_VIRTUAL,
                            instanced ? glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 0) : glm::mat4x3(1));
@@ -158,9 +160,9 @@ TEST(RichScene, IsIdenticalForEveryInstructionSet) {
 // ---- Normal textures -------------------------------------------------------------------------------
 
 struct Tilt {
-    glm::vec3 tangent_space; // in the texture
-    glm::vec3 world;         // on the square
-    bool mirrored = false;   // u increases to the left
+    glm::vec3 tangent_space; // the normal stored in the texture
+    glm::vec3 world;         // the equivalent normal on the square
+    bool mirrored = false;   // the texture coordinate u increases to the left
 };
 
 Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
@@ -190,7 +192,8 @@ Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
         mesh.normals.assign(4, glm::normalize(tilt.world));
     }
     glm::mat4x3 place(1);
-    if (turned) // 90° about z, and non-uniformly scaled: tangents and normals transform differently
+    // Rotates by 90° about z and scales each axis differently. Tangents and normals therefore transform differently.
+    if (turned)
         place = glm::mat4x3(0, 2, 0, -2, 0, 0, 0, 0, 0.5f, 0, 0, 0);
     builder.add_object("square", builder.add_triangles(std::move(mesh)), builder.add_material(material),
                        ARHOST_ROLE_VIRTUAL, place);
@@ -209,8 +212,8 @@ TEST(NormalTexture, MatchesEquivalentVertexNormals) {
 }
 
 TEST(NormalTexture, RotatesWithItsObject) {
-    // After the rotation, the texture's right is world +y and its up −x. The tilt is applied in world space, so it is
-    // not scaled with the object, unlike a vertex normal.
+    // The rotated texture's right is world +y and its up is world −x. Unlike a vertex normal, the texture's normal is
+    // applied in world space and is therefore not affected by the object's scaling.
     const Tilt tilt{{0, -0.6f, 0.8f}, {}};
     const auto turned = lit_square(tilt, true, true).pixels();
     const auto expected = lit_square({{0.6f, 0, 0.8f}, {}}, true, false).pixels();
@@ -236,7 +239,7 @@ TEST(Environment, LightsByItsIrradianceWithFewBrightTexels) {
     add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
     builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(diffuse(0.5f, 0.5f, 0.5f)));
     const Picture picture = Tracer(std::move(builder), {{"light_samples", "256"}}).render(from_above());
-    // kd/π ∫ L cos θ dω over an eighth of the half space: 0.5/π · 4 · (2π/8) · ½.
+    // The expected value is kd/π ∫ L cos θ dω over one eighth of the hemisphere: 0.5/π · 4 · (2π/8) · ½ = 0.25.
     double sum = 0;
     for (const Pixel &pixel : picture.pixels())
         sum += shading::srgb_decode(pixel[0] / 255.0);
@@ -245,7 +248,7 @@ TEST(Environment, LightsByItsIrradianceWithFewBrightTexels) {
 
 TEST(Environment, IsReflectedInTheRightDirection) {
     ArenaBuilder builder;
-    // Blue towards +x, red towards −x.
+    // The environment is blue towards +x and red towards −x.
     add_environment(builder, [](std::uint32_t x) { return x < 4 ? glm::vec3(1, 0, 0) : glm::vec3(0, 0, 1); });
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(mirror(1)));
     const Picture picture = Tracer(std::move(builder)).render(from_above());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Large surfaces through the origin, viewed and lit from nearby.
+// Scenes with large surfaces that pass through the origin. The camera and the light are near the origin, so rounding
+// errors could make the surface shadow itself.
 #pragma once
 
 #include "scene/motion.hpp"
@@ -13,20 +14,20 @@
 
 namespace arhost::test {
 
-// How it gets its size and position.
+// How a surface gets its size and position.
 enum class Grown { BUILT, MOVED, SCALED, SCALED_IN_MOTION, MORPHED };
 
 struct LargeSurface {
     const char *name;
     bool is_sphere;
-    double size_mm; // the sphere's radius, half the square's side
+    double size_mm; // the sphere's radius, or half the square's side
     Grown grown = Grown::BUILT;
 };
 inline std::ostream &operator<<(std::ostream &stream, const LargeSurface &surface) {
     return stream << surface.name;
 }
 
-// 20 m: a wall of a scanned hall.
+// Realistic scenes have surfaces of up to 20 m, such as the wall of a scanned hall.
 inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
                                               {"Sphere20m", true, 1e4},
                                               {"Sphere200m", true, 1e5},
@@ -42,7 +43,7 @@ inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
                                               {"SquareThatGrowsTo200m", false, 1e5, Grown::SCALED_IN_MOTION},
                                               {"SquareThatMorphsTo200m", false, 1e5, Grown::MORPHED}};
 
-// Columns: two tangents of the surface at the origin, and its normal.
+// Returns the surface's axes at the origin as columns: two tangents and the normal.
 inline glm::dmat3 surface_axes() {
     const glm::dvec3 out = glm::normalize(glm::dvec3(0.31, -0.42, 0.85)),
                      right = glm::normalize(glm::cross(out, glm::dvec3(0.2, 0.9, 0.1)));
@@ -99,7 +100,8 @@ inline arhost_camera camera_at_surface() {
     return camera({eye.x, eye.y, eye.z}, {0, 0, 0}, {axes[1].x, axes[1].y, axes[1].z});
 }
 
-// A plate of 20 × 20 × 1 mm on a level floor with a low lamp on its left: the shadow is 5.8 mm long.
+// Returns a scene with a plate of 20 × 20 × 1 mm on a horizontal floor of `side_mm`. A low lamp is far to the left of
+// the plate, so the plate's shadow is on its right and 5.8 mm long.
 inline scene::ArenaBuilder plate_on_floor(float side_mm) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
@@ -113,7 +115,7 @@ inline scene::ArenaBuilder plate_on_floor(float side_mm) {
     return builder;
 }
 
-// Shadow 3 mm from the plate, light on the other side.
+// Whether the plate's shadow is on its right, and the floor on its left is lit.
 inline bool has_its_shadow(const Picture &picture) {
     return picture.at(125, 74)[0] == 0 && picture.at(74, 74)[0] > 150;
 }
@@ -121,7 +123,8 @@ inline arhost_camera camera_over_plate() {
     return camera({0, 0, 100}, {0, 0, 0}, {0, 1, 0});
 }
 
-// The surface fills the picture and should be fully lit.
+// Renders the surface, which fills the picture and should be fully lit, and returns the number of pixels that are
+// not.
 inline int pixels_out_of_light(const LargeSurface &surface, const std::string &plugin, const Options &options = {}) {
     Tracer tracer(scene_with(surface), options, plugin);
     const arhost_camera camera = camera_at_surface();

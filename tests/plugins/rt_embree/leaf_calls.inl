@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Calls every leaf function of arhost/shading/ with arguments from an array. Included in a namespace that includes
-// the leaf files; Float is a scalar or a packet.
+// Calls every leaf function of arhost/shading/ with arguments from an array. This file must be included inside a
+// namespace that already includes the leaf files. That namespace defines Float, which is a scalar or a packet.
 
-// Arguments and results of leaf functions consist of Floats, except Bool.
+// The number of Floats in a parameter or result type of a leaf function. All these types consist of Floats except
+// Bool, which is passed as one Float.
 template <class T> constexpr int numbers_of = sizeof(T) / sizeof(Float);
 template <> constexpr int numbers_of<Bool> = 1;
 
@@ -32,7 +33,7 @@ void call(Result (*f)(Parameters...), const Float *arguments, Float *results) {
     call(f, arguments, results, Types<Parameters...>{});
 }
 
-// A bit per argument value, set where a Vec3 begins.
+// Returns a bit mask of the argument array: bit i is set if a Vec3 begins at index i.
 template <class Result, class... Parameters> constexpr unsigned vectors_of(Result (*)(Parameters...)) {
     unsigned vectors = 0;
     int at = 0;

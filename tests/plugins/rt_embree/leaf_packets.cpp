@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once per instruction set (ARHOST_ISA) with the kernel's options. Includes no standard library headers,
-// whose functions could be linked into code for other processors.
+// This file is compiled once per instruction set (ARHOST_ISA), with the kernel's options. It must not include headers
+// of the standard library: the linker could use their inline functions, compiled for this instruction set, in code
+// for other processors.
 #include "leaf_packets.hpp"
 
 #include "kernel/packet.hpp"

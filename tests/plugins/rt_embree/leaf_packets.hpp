@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The kernel's leaf functions on packets of 16 lanes, per instruction set.
+// Calls leaf functions with packets of 16 lanes. There is one call_leaf per instruction set of the kernel.
 #pragma once
 
 namespace rt_embree {
@@ -10,7 +10,7 @@ struct alignas(64) Packet {
     float lane[packet_lanes];
 };
 
-// `number`: index into leaf_functions of leaf_calls.inl.
+// `number` is an index into the array leaf_functions of leaf_calls.inl.
 using CallLeaf = void (*)(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 
 namespace base {

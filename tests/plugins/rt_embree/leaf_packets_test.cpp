@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Packet and scalar versions of the leaf functions give the same results.
+// Checks that the packet versions of the leaf functions give the same results as the scalar versions.
 #include "leaf_packets.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -33,7 +33,7 @@ void PrintTo(const InstructionSet &set, std::ostream *stream) {
     *stream << set.name;
 }
 
-// The instruction sets that the kernel is compiled for.
+// Returns the instruction sets for which the kernel is compiled.
 std::vector<InstructionSet> instruction_sets() {
     std::vector<InstructionSet> sets{{"base", true, base::call_leaf}};
 #ifdef ARHOST_LEAF_PACKETS_avx2
@@ -49,7 +49,7 @@ std::vector<InstructionSet> instruction_sets() {
 
 class LeafPackets : public testing::TestWithParam<InstructionSet> {};
 
-// Random numbers between 0 and 1, unit vectors.
+// Fills the arguments with random values: unit vectors where `vectors` has a bit set, else numbers between 0 and 1.
 void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &random) {
     std::uniform_real_distribution<float> number(0.05f, 0.95f);
     for (int lane = 0; lane < packet_lanes; ++lane)
@@ -70,7 +70,8 @@ void fill(Packet (&arguments)[max_arguments], unsigned vectors, std::mt19937 &ra
 TEST_P(LeafPackets, MatchTheScalarFunctions) {
     if (!GetParam().is_supported)
         GTEST_SKIP() << "this processor does not support " << GetParam().name;
-    // The error of turn_of, 2e-6 turns, is amplified by the fisheye's ninth power; the others are more exact.
+    // Set by the fisheye lens, whose ninth power amplifies the error of turn_of (2e-6 turns). The other functions are
+    // more accurate.
     constexpr double tolerance = 1e-4;
     std::mt19937 random(1);
     for (int number = 0; number < static_cast<int>(std::size(leaf_functions)); ++number)
@@ -84,7 +85,8 @@ TEST_P(LeafPackets, MatchTheScalarFunctions) {
                     from[i] = arguments[i].lane[lane];
                 leaf_functions[number].call(from, to);
                 const double size = std::hypot(to[0], to[1], to[2]);
-                // Its results are far below 1 and computed without cancellation.
+                // The results of offset_from_surface are far below 1 and free of cancellation, so only their relative
+                // error counts.
                 const double absolute =
                     leaf_functions[number].name == std::string_view("offset_from_surface") ? 0 : 1;
                 for (int i = 0; i < max_results; ++i)

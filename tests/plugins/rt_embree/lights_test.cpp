@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// All light types over a white plane, compared with the formulas.
+// Compares the brightness of a white plane under each type of light with the light's formula.
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>
@@ -36,7 +36,7 @@ arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity)
     return lamp;
 }
 
-// A ball over a catcher: pixel counts by alpha.
+// Renders a ball over a catcher and returns the number of pixels for each alpha.
 std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
     ArenaBuilder builder;
     builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),

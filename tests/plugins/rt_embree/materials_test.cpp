@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Metals, glass and rough surfaces, compared with the formulas.
+// Compares renderings of metals, glass and rough surfaces with the formulas of these materials.
 #include "tracer.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -49,7 +49,8 @@ void add_ball(ArenaBuilder &builder, const arhost_material &material) {
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(material));
 }
 
-// Cosine of the angle of incidence of a pixel's ray on that ball: t² + 2 b t + c = 0.
+// Returns the cosine of the angle at which a pixel's ray hits the ball of add_ball(), or nothing if the ray misses.
+// The distance t of the hit solves t² + 2 b t + c = 0.
 std::optional<double> cosine_on_ball(int x, int y) {
     const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, y) - eye);
     const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 60 * 60);
@@ -77,7 +78,7 @@ TEST(Metal, FollowsSchlick) {
 TEST(Glass, ConservesEnergy) {
     for (const char *mode : {"tree", "path"}) {
         arhost_material glass = clear_glass();
-        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // the environment's radiance, for rays that end inside the glass
+        set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // rays cut off inside the glass get the environment's radiance
         ArenaBuilder builder = in_a_room_of_light(0.5f);
         builder.settings.max_depth = std::string(mode) == "tree" ? 12 : 60;
         add_ball(builder, glass);
@@ -95,7 +96,7 @@ TEST(Glass, ConservesEnergy) {
 }
 
 TEST(Glass, RefractsBySnellsLaw) {
-    // A slab over a floor that is black for y < 7 and white for y > 7.
+    // The scene is a glass slab over a floor that is black for y < 7 and white for y > 7.
     constexpr double top = 40, bottom = 10, index = 1.5;
     ArenaBuilder builder = in_a_room_of_light(0);
     builder.settings.ambient = glm::vec3(1);
@@ -159,10 +160,11 @@ TEST(Glass, ShowsItsCutoffColourForCutOffRays) {
         cutoff);
     EXPECT_EQ(with([](arhost_material &, ArenaBuilder &builder) { builder.settings.max_depth = 0; }), cutoff);
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 1; }), cutoff);
-    // At normal incidence, 4 % is reflected on entering and 4 % of the rest on leaving: only these rays are cut off.
+    // At normal incidence, the surface reflects 4 % of the light that enters and 4 % of the rest when it leaves. Only
+    // these reflected rays are cut off.
     const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
     EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
-    // Those rays have at most 4 % throughput, the others at least 92 %.
+    // The reflected rays have a throughput of at most 4 %, all other rays of at least 92 %.
     EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 0.05f; }), thin);
 }
 
@@ -188,7 +190,7 @@ TEST(Glass, ReflectanceFollowsTheMaterialsExponentWithinItsLimits) {
 }
 
 TEST(Glass, LimitsReflectionAndRefractionDepthSeparately) {
-    // Straight through the ball: 4 % is reflected on entering and at each exit surface.
+    // The ray goes through the ball's centre. At each surface, the fraction r is reflected and t is transmitted.
     constexpr double r = 0.04, t = 0.96, all = 60;
     for (const auto &[reflection_depth, refraction_depth, arriving] : {std::array{all, 0.0, r},
                                                                        {all, 1, r}, // no ray exits
@@ -222,7 +224,8 @@ TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
         add_ball(builder, glass);
         return builder;
     };
-    // One sample per pixel, in linear light: several would be averaged sRGB-encoded, which darkens noise.
+    // Uses one sample per pixel and averages in linear light. With several samples, the plugin would average sRGB
+    // codes, which darkens noise.
     const auto mean = [&](const char *mode) {
         double sum = 0;
         for (const Pixel &pixel : Tracer(scene(), {{"glass", mode}}).render(from_the_side()).pixels())
@@ -230,7 +233,7 @@ TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
                 sum += shading::srgb_decode(pixel[i] / 255.0);
         return sum / (3 * 200 * 150);
     };
-    EXPECT_NEAR(mean("path") / mean("tree"), 1, 0.03) << "3000 pixels of noise";
+    EXPECT_NEAR(mean("path") / mean("tree"), 1, 0.03) << "the tolerance covers the noise of about 3000 glass pixels";
 }
 
 TEST(Glass, ShadowAlphaOnACatcherIs77AndOfOpaqueObjects153) {
@@ -323,10 +326,11 @@ TEST(Rough, WhiteMetalLosesOnlyMaskedLight) {
         ArenaBuilder builder = in_a_room_of_light(0.5f);
         add_ball(builder, metal);
         const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
-        double mean = 0; // of the central pixels
+        double mean = 0; // mean code of the 25 central pixels
         for (std::uint32_t i = 0; i < 25; ++i)
             mean += picture.at(98 + i % 5, 72 + i / 5)[0] / 25.0;
-        // At normal incidence, sampled facet normals have tan² θ = α² v/(1 − v) for uniform v; the ray leaves at 2θ.
+        // A microfacet normal is sampled at the angle θ to the surface normal, with tan² θ = α² v/(1 − v) for uniform
+        // v. At normal incidence, the reflected ray leaves at the angle 2θ.
         double sum = 0;
         constexpr int n = 10000;
         for (int i = 0; i < n; ++i) {
@@ -360,7 +364,7 @@ TEST(Rough, PlasticPlaneMatchesTheGltfFormulas) {
             for (int i = 0; i < 3; ++i) {
                 const double base = plastic.diffuse[i], f0 = 0.04 * 0.75 + base * 0.25;
                 const double fresnel = f0 + (1 - f0) * std::pow(1 - glm::dot(v, h), 5);
-                // Lamp intensities include Lambert's factor π.
+                // The unit of light intensities includes the factor π, so that Lambert's term has no 1/π.
                 const double value = 0.9 * l.z * ((1 - fresnel) * base * 0.75 + fresnel * visibility * a2 / (d * d)) +
                                      plastic.emission[i];
                 ASSERT_TRUE(is_code_of(picture.at(x, y)[i], value, 1e-3)) << x << " " << y;

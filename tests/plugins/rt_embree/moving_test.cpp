@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Moved and deformed objects look like static ones at the same place.
+// Checks that moved and deformed objects look the same as static objects of the same shape and place.
 #include "bvh_quality.hpp"
 #include "embree_scene.hpp"
 #include "scene/motion.hpp"
@@ -27,7 +27,7 @@ ArenaBuilder with_floor_and_light() {
     return builder;
 }
 
-// A sheet of n×n squares over the floor, in waves.
+// Returns a wavy sheet of n×n squares above the floor.
 scene::TriangleMesh sheet(float height, unsigned n = 40) {
     scene::TriangleMesh mesh;
     for (unsigned y = 0; y <= n; ++y)
@@ -49,7 +49,7 @@ Picture at_time(ArenaBuilder builder, double time_s, const arhost_camera &view =
     EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
     Picture picture(view.intrinsics);
-    for (const double t : {0.0, 0.9, time_s}) { // also via other times
+    for (const double t : {0.0, 0.9, time_s}) { // earlier frames must not affect the picture
         const arhost_motion motion = evaluator.at(t);
         picture = Picture(view.intrinsics);
         EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_STATUS_OK);
@@ -63,10 +63,11 @@ void expect_alike(const Picture &a, const Picture &b) {
     for (std::size_t i = 0; i < these.size(); ++i)
         for (std::size_t c = 0; c < 4; ++c)
             different += std::abs(these[i][c] - those[i][c]) > 1;
-    EXPECT_LE(different, 20) << "of 120000 values: rounding at edges";
+    EXPECT_LE(different, 20) << "of 120000 values; rounding may change a few at edges";
 }
 
-// A square with vertex normals that faces the camera and the only light, which shines straight down.
+// The functions below build a square with vertex normals. It faces the camera and the only light, which shines
+// straight down.
 constexpr float albedo = 0.8f;
 arhost_material white() {
     return diffuse(albedo, albedo, albedo);
@@ -95,7 +96,8 @@ rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
 
 } // namespace
 
-// Static catchers have a separate BVH, others are in the common one: the picture is the same.
+// Static catchers have a separate BVH; moving and instanced catchers are in the BVH of all objects. The picture must
+// not depend on this.
 TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
     const auto scene = [](const glm::mat4x3 &place, bool moves, float raised) {
         ArenaBuilder builder = with_floor_and_light();
@@ -107,7 +109,7 @@ TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
             p += glm::vec3(30, 10, raised);
         builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_ROLE_CATCHER,
                            place, moves ? Motion{.moves = true, .node = node} : Motion{});
-        // Enough triangles to enable the catchers' BVH.
+        // This sheet has enough triangles for the plugin to build a separate BVH for catchers.
         builder.add_object("sheet", builder.add_triangles(sheet(10)), builder.add_material(shiny(0.5f, 0.4f, 30)));
         return builder;
     };
@@ -152,12 +154,13 @@ TEST(Moving, MeshFollowsItsMorphTargets) {
     expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
-// Lambert: brightness drops to cos 60°, and would not change without rotated normals.
+// The skin rotates the square by 60°. By Lambert's law, its brightness drops by the factor cos 60°. If the normals
+// were not rotated, the brightness would not change.
 TEST(Moving, SkinRotatesNormals) {
     const auto turning = [] {
         ArenaBuilder builder = under_the_sun();
         const std::uint32_t joint = builder.add_node({.animated = true, .morph_weights = {}});
-        const float sine = std::sin(glm::radians(30.0f)), cosine = std::cos(glm::radians(30.0f)); // of half the angle
+        const float sine = std::sin(glm::radians(30.0f)), cosine = std::cos(glm::radians(30.0f)); // half of 60°
         builder.add_channel({.node = joint,
                              .target = ARHOST_CHANNEL_ROTATION,
                              .times = {0, 1},
@@ -174,10 +177,11 @@ TEST(Moving, SkinRotatesNormals) {
     EXPECT_TRUE(is_code_of(before.at(100, 75)[1], albedo));
     EXPECT_TRUE(is_code_of(after.at(100, 75)[1], albedo * 0.5));
     EXPECT_EQ(before.alpha(100, 75 - 30), 255);
-    EXPECT_EQ(after.alpha(100, 75 - 30), 0) << "its half side is foreshortened to 40 mm · cos 60°";
+    EXPECT_EQ(after.alpha(100, 75 - 30), 0) << "half of the square's side is foreshortened to 40 mm · cos 60°";
 }
 
-// Positions do not change. Halfway through the morph, normals are tilted by 60°: offset 0.5 · 2 tan 60°.
+// The morph target changes only normals. Halfway through the morph, the normal's offset is 0.5 · 2 tan 60°, which
+// tilts the normal by 60°.
 TEST(Moving, MorphTargetTiltsNormals) {
     const auto leaning = [] {
         ArenaBuilder builder = under_the_sun();
@@ -206,7 +210,7 @@ TEST(BvhQuality, IsUnaffectedByTranslationScalingAndSlightDeformation) {
     EXPECT_LT(quality.degradation(view_of(sheet(5))), 1.3);
 }
 
-// glTF meshes without a skin can move and deform at once.
+// A glTF mesh without a skin can move and deform at the same time.
 TEST(Moving, MeshCanMoveAndDeform) {
     ArenaBuilder both = with_floor_and_light();
     both.settings.duration_s = 1;
@@ -217,7 +221,7 @@ TEST(Moving, MeshCanMoveAndDeform) {
     const scene::TriangleMesh waves = sheet(16);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
-        mesh.positions[i].x -= 500; // out of view unless moved
+        mesh.positions[i].x -= 500; // the mesh is out of view unless its node moves it back
         there.positions[i].x += 20;
     }
     const arhost_material blue = diffuse(0.2f, 0.4f, 0.8f);
@@ -228,7 +232,7 @@ TEST(Moving, MeshCanMoveAndDeform) {
     expect_alike(at_time(std::move(both), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
-// Tiles without objects are skipped, so bounds must follow the deformation.
+// The plugin skips tiles that the bounds of no object overlap, so the bounds must follow the deformation.
 TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     constexpr float left = -60, right = 60;
     ArenaBuilder deforming = under_the_sun(), still = under_the_sun();
@@ -246,7 +250,7 @@ TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
 }
 
-// A sheet whose strips are shifted lengthwise, each further than the previous one.
+// Returns a wavy sheet whose vertices are shifted along x in strips, each strip further than the previous one.
 scene::TriangleMesh sheared(float amount, unsigned n = 40) {
     scene::TriangleMesh mesh = sheet(4, n);
     for (glm::vec3 &p : mesh.positions)
@@ -264,7 +268,7 @@ TEST(BvhQuality, DegradesWhenNeighboursSeparate) {
     EXPECT_NEAR(quality.degradation(view_of(torn)), 1, 1e-9);
 }
 
-// A deforming sheet of 80,000 triangles, of which BvhQuality uses a sample.
+// The mesh has 80,000 triangles; for a mesh of this size, BvhQuality measures only a sample of the triangles.
 TEST(BvhQuality, TriggersRebuilds) {
     scene::TriangleMesh mesh = sheet(4, 200);
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
@@ -289,7 +293,7 @@ TEST(BvhQuality, TriggersRebuilds) {
     std::vector<std::uint64_t> rebuilds;
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         std::vector<glm::vec3> positions = sheared(amount, 200).positions;
-        positions.resize(vertices + 2); // Embree reads past the last vertex
+        positions.resize(vertices + 2); // Embree may read beyond the last vertex
         const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
         rebuilds.push_back(scene.rebuilds());
@@ -297,7 +301,7 @@ TEST(BvhQuality, TriggersRebuilds) {
     EXPECT_EQ(rebuilds, (std::vector<std::uint64_t>{0, 1, 1, 2}));
 }
 
-// A new BVH would be no better.
+// After random displacement, a rebuilt BVH would not be better than the refitted one.
 TEST(BvhQuality, IsUnaffectedByRandomDisplacement) {
     scene::TriangleMesh mesh = sheet(4);
     rt_embree::BvhQuality quality;

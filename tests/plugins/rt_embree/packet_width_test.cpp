@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Results do not depend on Embree's packet width, which differs between processors.
+// Checks that results do not depend on the width of Embree's ray packets, which differs between processors.
 #include "embree.hpp"
 #include "embree_scene.hpp"
 
@@ -12,7 +12,7 @@ using namespace rt_embree;
 
 namespace {
 
-// Every third ray is invalid and filled with NaN, which must be ignored.
+// Every third ray is invalid: it is filled with NaN, and the intersection functions must ignore it.
 bool is_valid(int lane) {
     return lane % 3 != 1;
 }
@@ -20,7 +20,7 @@ bool is_valid(int lane) {
 class PacketWidth : public testing::TestWithParam<int> {
 protected:
     PacketWidth() : device_(rtcNewDevice("threads=1")), scene_(rtcNewScene(device_.get())) {
-        // A triangle that covers the rays with x < 8.
+        // The scene is a triangle that the rays with x < 8 hit.
         const GeometryHandle triangle(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
         auto *vertices = static_cast<float *>(rtcSetNewGeometryBuffer(triangle.get(), RTC_BUFFER_TYPE_VERTEX, 0,
                                                                       RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3));

@@ -54,7 +54,7 @@ TEST(RayTable, OffCentreSamplesProjectToTheirPositions) {
         const RayTable table(in, true, threads);
         const Rays rays = table.rays();
         const int step = 16 * rays.dimensions;
-        // The first tile's blocks; lane 0 of a block is its top left pixel.
+        // Checks all blocks of the first tile. Lane 0 of a block is the block's top left pixel.
         for (int number = 0; number < 64; ++number) {
             const float *block = rays.blocks + number * rays.block_size();
             const double x = number % 8 * 4, y = number / 8 * 4;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Textures, environments, alpha cutoff, and a scene that combines all features.
+// Builds textures, environments, materials with an alpha cutoff, and a scene that combines all features.
 #pragma once
 
 #include "tracer.hpp"
@@ -24,7 +24,7 @@ inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, cons
     return texture;
 }
 
-// An environment of 8×4 texels; `colour(column)` gives their colour.
+// Adds an environment map of 8×4 texels. `colour(column)` returns the colour of a column's texels.
 template <class Colour> void add_environment(ArenaBuilder &builder, Colour colour) {
     constexpr std::uint32_t width = 8, height = 4;
     scene::Texture texture;
@@ -53,11 +53,11 @@ template <class Colour> void add_environment(ArenaBuilder &builder, Colour colou
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size);
     std::memcpy(texture.texels.bytes.get(), texels.data(), texture.texels.size);
     environment.texture = builder.add_texture("sky", std::move(texture));
-    environment.environment_from_world = glm::mat3(1, 0, 0, 0, 0, -1, 0, 1, 0); // z is up
+    environment.environment_from_world = glm::mat3(1, 0, 0, 0, 0, -1, 0, 1, 0); // the map's up direction is world +z
     builder.environment = std::move(environment);
 }
 
-// A material that is opaque on the left half of its texture and transparent on the right one.
+// Returns a material whose texture is opaque on the left half and transparent on the right half.
 inline arhost_material half_a_hole(ArenaBuilder &builder, float cutoff) {
     scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
     texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
@@ -72,7 +72,7 @@ inline scene::TriangleMesh textured_square(float half_side, float z) {
     return mesh;
 }
 
-// Uses random numbers, ray queues, textures and transcendental functions.
+// Returns a scene that exercises random numbers, ray queues, textures and transcendental functions.
 inline ArenaBuilder rich_scene() {
     ArenaBuilder builder;
     builder.settings.max_depth = 6;

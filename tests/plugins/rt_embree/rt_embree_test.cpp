@@ -29,7 +29,7 @@ ArenaBuilder one_sphere(glm::vec4 sphere, const arhost_material &material = flat
     return builder;
 }
 
-// At the origin, looking along +z with −y up: world axes equal the camera's OpenCV axes.
+// Returns a camera at the origin that looks along +z, with −y up, so that the world axes equal OpenCV's camera axes.
 arhost_camera opencv_axes(const arhost_intrinsics &in) {
     return camera({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, in);
 }
@@ -54,7 +54,8 @@ Silhouette measured(const Picture &picture) {
     return s;
 }
 
-// The sphere's tangent cone, projected by OpenCV, as a polygon (area and centroid: Bourke 1988).
+// Returns the expected silhouette of a sphere: samples the sphere's tangent cone, projects it with OpenCV, and
+// computes area and centroid of the resulting polygon (Bourke 1988).
 Silhouette expected(const arhost_intrinsics &in, glm::dvec3 centre, double radius) {
     const glm::dvec3 axis = glm::normalize(centre);
     const glm::dvec3 a = glm::normalize(glm::cross(axis, glm::dvec3(0, 1, 0))), b = glm::cross(axis, a);
@@ -153,7 +154,7 @@ TEST(Alpha, IsZeroInLight153InShadowAnd255OnObjects) {
 TEST(Alpha, ShadowIsWhereTheLightIsBlocked) {
     const arhost_camera view = from_the_side();
     const Picture picture = Tracer(sphere_over_catcher()).render(view);
-    // The ray from the light through the ball's centre hits the floor at t = 200 / 175.
+    // The line from the light through the ball's centre hits the floor at the parameter t = 200 / 175.
     const glm::dvec3 from(60, -20, 200), hit = from + (glm::dvec3(0, 0, 25) - from) * (200.0 / 175);
     const glm::dvec3 w = glm::normalize(glm::dvec3(0, -150, 110)), u(1, 0, 0), v = glm::cross(w, u);
     const glm::dvec3 d = hit - glm::dvec3(0, -150, 110);
@@ -170,11 +171,11 @@ TEST(Alpha, CatcherFacingAwayIsInvisible) {
     EXPECT_GT(counts.at(255), 300) << "the ball is visible through the floor";
 }
 
-// A mirror ball in a room of inward-facing catchers.
+// The scene is a mirror ball in a closed room whose walls are catchers that face inwards.
 TEST(Alpha, InwardFacingCatchersAreInvisibleFromOutsideButReflected) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
-    builder.settings.background = glm::vec3(0, 0, 1); // visible nowhere: the room is closed
+    builder.settings.background = glm::vec3(0, 0, 1); // must not be visible, because the room is closed
     scene::TriangleMesh room = cube(100);
     for (auto &triangle : room.triangles)
         std::swap(triangle[1], triangle[2]);
@@ -182,10 +183,10 @@ TEST(Alpha, InwardFacingCatchersAreInvisibleFromOutsideButReflected) {
                        ARHOST_ROLE_CATCHER);
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 30}}), builder.add_material(mirror(1)));
     Tracer tracer(std::move(builder));
-    for (const double distance : {350.0, 90.0}) { // outside, inside
+    for (const double distance : {350.0, 90.0}) { // outside the room and inside
         const Picture picture = tracer.render(camera({0, -distance, 0}, {0, 0, 0}, {0, 0, 1}));
         EXPECT_EQ(picture.alpha(2, 2), 0) << distance;
-        EXPECT_EQ(picture.alphas().size(), 2u) << "transparent, and the ball";
+        EXPECT_EQ(picture.alphas().size(), 2u) << "only the ball is opaque; all else is transparent";
         EXPECT_EQ(picture.alpha(99, 74), 255);
         for (const int x : {90, 99, 108}) {
             EXPECT_TRUE(is_code_of(picture.at(static_cast<std::uint32_t>(x), 74)[0], 0.5)) << distance;
@@ -213,7 +214,8 @@ TEST(Alpha, OfShadowsIsSetByTheScene) {
 }
 
 TEST(Alpha, OnlyTheFirstCatcherAlongARayReceivesTheShadow) {
-    // The shadow falls on the upper floor, and through it on the lower one, which the upper one hides.
+    // The ball's shadow falls on both floors, because the upper floor does not block light. Seen from the camera, the
+    // upper floor hides the lower floor.
     ArenaBuilder builder = sphere_over_catcher();
     const double with_upper_only = Tracer(std::move(builder)).render(from_the_side()).alphas().at(153);
     builder = sphere_over_catcher();
@@ -232,10 +234,10 @@ TEST(Alpha, VirtualObjectBehindACatcherIsVisible) {
 
 TEST(Alpha, SeveralLightsShareTheShadowByIrradiance) {
     ArenaBuilder builder = sphere_over_catcher();
-    builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong, no falloff
+    builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong as the other light, without falloff
     const Picture picture = Tracer(std::move(builder)).render(from_the_side());
     const auto counts = picture.alphas();
-    // With only one light blocked, about 2/3 or 1/3 of 153, depending on the cosines.
+    // Where only one light is blocked, alpha is about 2/3 or 1/3 of 153. The cosines change it slightly.
     int strong = 0, weak = 0, both = 0;
     for (const auto &[alpha, count] : counts) {
         strong += alpha > 96 && alpha < 110 ? count : 0;
@@ -263,7 +265,7 @@ TEST(Alpha, LightBehindACatcherCastsNoShadowOnIt) {
 TEST(Alpha, OccluderHidesObjectsAndShadowsBehindIt) {
     ArenaBuilder builder = sphere_over_catcher();
     const arhost_camera view = from_the_side();
-    // A screen in front of the camera that covers the left half of the picture.
+    // The occluder is a screen in front of the camera that covers the left half of the picture.
     builder.add_object(
         "screen",
         builder.add_triangles(
@@ -278,7 +280,7 @@ TEST(Alpha, OccluderHidesObjectsAndShadowsBehindIt) {
                 ASSERT_EQ(with.alpha(x, y), 0);
                 hidden += without.alpha(x, y) != 0;
             } else if (x > 101) {
-                ASSERT_EQ(with.alpha(x, y), without.alpha(x, y)) << "it casts no shadow on the catcher";
+                ASSERT_EQ(with.alpha(x, y), without.alpha(x, y)) << "an occluder casts no shadow on the catcher";
             }
         }
     EXPECT_GT(hidden, 300);
@@ -357,7 +359,7 @@ TEST(Light, CatchersAndOccludersShadowObjects) {
 }
 
 TEST(Light, SurfacesDoNotShadowThemselves) {
-    // Far from the origin, where floats are coarse, and at grazing light.
+    // The plane is far from the origin, where the rounding errors of floats are large, and the light is grazing.
     ArenaBuilder builder;
     builder.add_object("plane", builder.add_triangles(square(2000)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
                        ARHOST_ROLE_VIRTUAL,
@@ -396,7 +398,7 @@ TEST(Mirror, ShowsWhatTheReflectedRayHits) {
                 return glm::dot(to, along) > 0 ? glm::length(to - along * glm::dot(to, along)) : 1e9;
             };
             if (distance_of_ball(eye, d) < 62 || std::abs(hit.x) > 395 || std::abs(hit.y) > 395)
-                continue; // the ball itself, or outside the mirror
+                continue; // the primary ray hits the ball or misses the mirror
             const double distance = distance_of_ball(hit, reflected);
             const Pixel pixel = picture.at(x, y);
             if (distance < 59.5) {
@@ -412,7 +414,7 @@ TEST(Mirror, ShowsWhatTheReflectedRayHits) {
 }
 
 TEST(Mirror, ReflectsTheBackgroundWhichIsOtherwiseTransparent) {
-    // Primary rays that miss are transparent, whatever the background.
+    // Pixels whose primary ray hits nothing are transparent, regardless of the background colour.
     const Picture picture = Tracer(one_sphere({0, 0, 300, 30}, mirror(1))).render(opencv_axes(pinhole()));
     EXPECT_EQ(picture.at(0, 0), nothing_alpha);
     EXPECT_EQ(picture.at(99, 74), (Pixel{255, 255, 255, 255})) << "the default background is white";
@@ -431,7 +433,7 @@ TEST(Mirror, ConservesEnergy) {
 }
 
 TEST(Mirror, TracesAtMostMaxDepthBounces) {
-    // Two parallel mirrors of reflectivity 0.5; the ray escapes after five bounces.
+    // The ray bounces between two parallel mirrors of reflectivity 0.5 and escapes after five bounces.
     const auto brightness = [](std::uint32_t max_depth) {
         ArenaBuilder builder;
         builder.settings.max_depth = max_depth;
@@ -442,7 +444,8 @@ TEST(Mirror, TracesAtMostMaxDepthBounces) {
             "above",
             builder.add_triangles({{{-1000, -100, 100}, {1000, -100, 100}, {0, 250, 100}}, {}, {}, {{0, 2, 1}}}),
             half);
-        // 45° down from (0, −150, 50): floor at y = −100, ceiling at 0, floor at 100, ceiling at 200, floor at 300.
+        // The ray starts at (0, −150, 50) and goes down at 45°. It hits the floor at y = −100, 100 and 300 and the
+        // ceiling at y = 0 and 200.
         arhost_intrinsics in = pinhole(1, 1);
         return Tracer(std::move(builder)).render(camera({0, -150, 50}, {0, -149, 49}, {0, 0, 1}, in)).at(0, 0)[0];
     };
@@ -454,7 +457,7 @@ TEST(Mirror, TracesAtMostMaxDepthBounces) {
 
 TEST(Mirror, ShowsCatchersWithTheirMaterialAndTheShadowsOnThem) {
     ArenaBuilder builder = sphere_over_catcher();
-    // Upright behind the ball, facing the camera.
+    // The mirror stands upright behind the ball and faces the camera.
     builder.add_object(
         "mirror",
         builder.add_triangles(
@@ -538,7 +541,7 @@ TEST(Samples, AccumulateWhileTheCameraIsStatic) {
     EXPECT_LT(distance(last), 0.1);
     EXPECT_GT(distance(first), 5 * distance(last));
     EXPECT_NE(render(other), last);
-    EXPECT_EQ(render(still), first) << "accumulation restarts";
+    EXPECT_EQ(render(still), first) << "the accumulation must restart";
 }
 
 TEST(Samples, StopChangingTheImageAtTheAccumulationLimit) {
@@ -584,7 +587,8 @@ TEST(Samples, CompositeToTheMeanOfPerSampleComposites) {
                     double mean = 0;
                     for (const Picture &single : singles)
                         mean += over(single.at(x, y), channel, background) / count;
-                    // Rounding by half a code each of the alpha, the colour and the single images.
+                    // The tolerance is the sum of three rounding errors of half a code: of the alpha, of the colour
+                    // and of the single images.
                     ASSERT_NEAR(over(all.at(x, y), channel, background), mean, 1.5) << x << " " << y;
                 }
 }
@@ -658,7 +662,8 @@ TEST(Equivalence, IsIdenticalForEveryInstructionSet) {
     EXPECT_EQ(base.size(), 200u * 150u);
 }
 
-// Fraction of pixels that differ by more than rounding; silhouettes may shift by a pixel.
+// Returns the fraction of pixels that differ by more than rounding. It is small but not 0 if silhouettes shift by a
+// pixel.
 double fraction_of_differing_pixels(const Picture &a, const Picture &b) {
     const auto p = a.pixels(), q = b.pixels();
     int differ = 0;
@@ -693,7 +698,7 @@ TEST(Equivalence, InstancesLookLikeWorldSpaceVertices) {
         builder.settings.ambient = glm::vec3(0.1f);
         scene::TriangleMesh mesh = cube(1);
         for (const glm::vec3 &p : mesh.positions)
-            mesh.normals.push_back(glm::normalize(p)); // smooth
+            mesh.normals.push_back(glm::normalize(p)); // smooth shading
         if (baked)
             for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
                 mesh.positions[i] = glm::vec3(m * glm::vec4(mesh.positions[i], 1));
@@ -704,7 +709,7 @@ TEST(Equivalence, InstancesLookLikeWorldSpaceVertices) {
         builder.add_light(light(100, -100, 200, 0.8f));
         return Tracer(std::move(builder)).render(from_the_side());
     };
-    // Normals are normalized before or after interpolation: differences of a code.
+    // Baked normals are normalized before interpolation, those of instances after it, so colours may differ slightly.
     const Picture baked = build(true), instanced = build(false);
     EXPECT_GT(baked.alphas().at(255), 500);
     EXPECT_LT(std::abs(baked.alphas().at(255) - instanced.alphas().at(255)), 5);
@@ -767,7 +772,8 @@ TEST(Region, ContainsAllAlphaTightly) {
 }
 
 TEST(Region, SkippedTilesAreEmpty) {
-    // Objects in many places, some behind the camera and some intersecting its plane, compared per pixel.
+    // Spheres are in many places; some are behind the camera, some intersect the plane through the camera. Compares
+    // each pixel with the exact result.
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);
     const std::uint32_t material = builder.add_material(flat(1, 1, 1));
@@ -807,7 +813,7 @@ TEST(Sizes, OddImageSizesAreWrittenExactly) {
                                         .render(opencv_axes(pinhole(width, height, 20)));
             EXPECT_EQ(picture.alpha(width / 2, height / 2), 255) << width << "x" << height;
             for (const Pixel &pixel : picture.pixels())
-                ASSERT_NE(pixel[3], 0xa5) << "not written";
+                ASSERT_NE(pixel[3], 0xa5) << "the plugin did not write this pixel";
         }
 }
 
@@ -827,7 +833,7 @@ TEST(UnusualScenes, DegenerateTrianglesAreHarmless) {
     EXPECT_LT(counts.at(255), 3500);
 }
 
-// Their normals underflow in single precision, and Embree aborts on invalid rays.
+// The normals of such small triangles underflow in single precision; rays with invalid directions make Embree abort.
 TEST(UnusualScenes, FacetsTooSmallForTheirNormalsAreRendered) {
     for (const float side : {1e-12f, 1e-16f, 1e-20f})
         for (const bool glass : {false, true}) {
@@ -859,7 +865,7 @@ TEST(UnusualScenes, NormalsThatCancelOutFallBackToTheFacet) {
     ArenaBuilder builder;
     builder.add_object("plane", builder.add_triangles(mesh), builder.add_material(diffuse(1, 1, 1)));
     builder.add_light(light(0, 0, 150, 0.5f));
-    // NaN would come out black.
+    // A NaN in the shading would make pixels black.
     const int ambient = arhost::shading::srgb8_exact(0.2);
     for (const Pixel &pixel : Tracer(std::move(builder)).render(from_above()).pixels()) {
         ASSERT_EQ(pixel[3], 255);
@@ -875,7 +881,7 @@ TEST(UnusualScenes, CameraInsideAnObjectSeesItsInside) {
 }
 
 TEST(UnusualScenes, CameraInsideGlassSeesThroughIt) {
-    // From the centre of a ball, rays leave undeflected.
+    // Rays from the centre of a ball leave it without refraction.
     for (const char *mode : {"tree", "path"}) {
         ArenaBuilder builder;
         builder.settings.background = glm::vec3(0.5f);

@@ -14,7 +14,7 @@ TEST(ThreadPool, ProcessesEachItemOncePerCall) {
     for (unsigned threads : {1u, 2u, 5u}) {
         ThreadPool pool(threads);
         EXPECT_EQ(pool.thread_count(), threads);
-        std::vector<int> done(997, 0); // each written by one thread, read after the round
+        std::vector<int> done(997, 0); // one thread writes each element; all are read after the round
         for (int round = 1; round <= 200; ++round) {
             pool.for_each(done.size(), [&](std::size_t i, std::size_t) { ++done[i]; });
             for (int count : done)

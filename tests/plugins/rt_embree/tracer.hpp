@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A scene, a camera and the plugin under test.
+// Provides tests of ray tracers with scenes, cameras and the plugin under test.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -45,7 +45,7 @@ inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> loo
     return c;
 }
 
-// An image with padding and guard bytes that must not be written.
+// An image with row padding and guard bytes, which the plugin must not write.
 class Picture {
 public:
     explicit Picture(const arhost_intrinsics &in)
@@ -65,7 +65,7 @@ public:
                 all.push_back(at(x, y));
         return all;
     }
-    // Pixel counts by alpha.
+    // Returns the number of pixels for each alpha.
     std::map<int, int> alphas() const {
         std::map<int, int> counts;
         for (const Pixel &pixel : pixels())
@@ -88,7 +88,7 @@ private:
     GuardedBuffer buffer_;
 };
 
-// The arena is in read-only memory: writing to it crashes.
+// A plugin and its scene. The scene's arena is in read-only memory, so a plugin that writes to it crashes.
 class Tracer {
 public:
     explicit Tracer(scene::ArenaBuilder builder, const Options &options = {}, const std::string &plugin = "rt_embree")
@@ -144,13 +144,13 @@ private:
     bool started_ = false;
 };
 
-// Materials and meshes.
 inline void set3(float (&to)[3], float x, float y, float z) {
     to[0] = x;
     to[1] = y;
     to[2] = z;
 }
-inline arhost_material flat(float r, float g, float b) { // constant colour without lights; needs ambient 1
+inline arhost_material flat(float r, float g,
+                            float b) { // constant colour if the scene has no lights and its ambient light is 1
     arhost_material material = scene::make_material(ARHOST_MATERIAL_DIFFUSE);
     set3(material.ambient, r, g, b);
     return material;
@@ -179,7 +179,7 @@ inline arhost_light light(float x, float y, float z, float intensity, arhost_fal
     set3(light.intensity, intensity, intensity, intensity);
     return light;
 }
-// A square in the plane z = `z`, front face up.
+// Returns a square at the height `z`; its front face is up.
 inline scene::TriangleMesh square(float half_side, float z = 0) {
     const float s = half_side;
     return {{{-s, -s, z}, {s, -s, z}, {s, s, z}, {-s, s, z}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
@@ -194,11 +194,12 @@ inline scene::TriangleMesh cube(float half_side) {
     return mesh;
 }
 
-// From above at an angle, looking at the origin.
+// Returns a camera that looks obliquely down at the origin.
 inline arhost_camera from_the_side(const arhost_intrinsics &in = pinhole()) {
     return camera({0, -150, 110}, {0, 0, 0}, {0, 0, 1}, in);
 }
-// Straight down on the plane z = 0 from 200 mm, and the point where a pixel's ray hits it.
+// from_above() returns a camera 200 mm above the plane z = 0 that looks straight down. on_the_floor() returns the
+// point of that plane which a pixel of this camera shows.
 inline arhost_camera from_above() {
     return camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0});
 }
@@ -206,13 +207,14 @@ inline glm::dvec3 on_the_floor(int x, int y) {
     return {x - 99.5, -(y - 74.5), 0};
 }
 
-// Whether `code` is the sRGB code of a value with a relative error up to `tolerance`.
+// Whether `code` is the sRGB code of a value within the relative error `tolerance` of `linear`.
 inline ::testing::AssertionResult is_code_of(int code, double linear, double tolerance = 2e-5) {
     const int low = shading::srgb8_exact(linear * (1 - tolerance)),
               high = shading::srgb8_exact(linear * (1 + tolerance));
     if (code >= low && code <= high)
         return ::testing::AssertionSuccess();
-    return ::testing::AssertionFailure() << code << " is not the code of " << linear << ", " << low;
+    return ::testing::AssertionFailure()
+           << "code " << code << ", but the linear value " << linear << " has the code " << low;
 }
 
 } // namespace arhost::test

@@ -14,7 +14,7 @@ constexpr std::uint32_t height = 1080;
 using Milliseconds = Bands::Milliseconds;
 constexpr Milliseconds max_time(100);
 
-// The band heights of an image whose rows take `ms_of_row`.
+// Simulates an image whose rows take `ms_of_row` milliseconds each. Returns the heights of its bands.
 std::vector<std::uint32_t> bands_of_image(Bands &bands, const std::function<double(std::uint32_t row)> &ms_of_row) {
     std::vector<std::uint32_t> sizes;
     for (std::uint32_t first = 0; first < height; first += sizes.back()) {
@@ -57,7 +57,7 @@ TEST(Bands, AreNeverMoreThanDoubled) {
         bands_of_image(bands, [](std::uint32_t row) { return row < 500 ? 0.001 : 20.0; });
     for (std::size_t i = 1; i < sizes.size(); ++i)
         EXPECT_LE(sizes[i], 2 * sizes[i - 1]);
-    EXPECT_EQ(bands.rows(), Bands::unit) << "at 20 ms per row";
+    EXPECT_EQ(bands.rows(), Bands::unit) << "rows of 20 ms each";
 }
 
 TEST(Bands, AreMultiplesOfTheUnitForAnyTime) {

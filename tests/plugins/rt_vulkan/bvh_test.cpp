@@ -32,19 +32,19 @@ bool contains(const Node &node, const Box &box) {
     return true;
 }
 
-// Checks a subtree, and returns its depth.
+// Checks the subtree below the node `at`, adds its boxes to `found`, and returns its depth.
 int check_node(const Bvh &bvh, std::span<const Box> boxes, std::uint32_t max_leaf_size,
                std::set<std::uint32_t> &found, std::uint32_t at = 0) {
     const Node &node = bvh.nodes[at];
     if (node.count) {
         EXPECT_LE(node.count, max_leaf_size);
         for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-            EXPECT_TRUE(found.insert(bvh.order[i]).second) << "in two leaves";
+            EXPECT_TRUE(found.insert(bvh.order[i]).second) << "box " << bvh.order[i] << " is in two leaves";
             EXPECT_TRUE(contains(node, boxes[bvh.order[i]]));
         }
         return 0;
     }
-    EXPECT_GT(node.first, at) << "children come after their parents";
+    EXPECT_GT(node.first, at) << "a child must come after its parent";
     int depth = 0;
     for (const std::uint32_t child : {node.first, node.first + 1}) {
         Box box;
@@ -76,7 +76,8 @@ TEST(Bvh, ContainsEachBoxOnceWithinItsNodes) {
 }
 
 TEST(Bvh, RespectsTheDepthLimit) {
-    // Exponentially spaced boxes: the SAH alone would split off leaves one by one.
+    // The boxes are spaced exponentially. Without a depth limit, the SAH would separate them one by one, which gives
+    // a very deep BVH.
     std::vector<Box> boxes;
     float at = 1;
     for (int i = 0; i < 100; ++i, at *= 1.8f)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Copies of this machine's Vulkan driver manifests, for tests to change.
+// Copies this machine's Vulkan driver manifests, so that tests can delete or duplicate them.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace arhost::test {
 
-// Copies all driver manifests to `folder`; returns their list for VK_DRIVER_FILES.
+// Copies all driver manifests to `folder`. Returns the paths of the copies as a value for VK_DRIVER_FILES.
 inline std::string copy_drivers(const std::filesystem::path &folder) {
     namespace fs = std::filesystem;
     fs::create_directories(folder);

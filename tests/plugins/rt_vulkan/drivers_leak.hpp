@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Disables leak checks; include in one file of a program. Mesa's drivers leak, and are unloaded when leaks are
-// reported, so that suppressions cannot name them.
+// Disables AddressSanitizer's leak checker; to be included in one source file of a program. Mesa's drivers leak
+// memory. Suppressions cannot name these drivers, because they are already unloaded when the leaks are reported.
 #pragma once
 
 #if defined(__SANITIZE_ADDRESS__)

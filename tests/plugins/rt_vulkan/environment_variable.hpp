@@ -7,7 +7,7 @@
 
 namespace arhost::test {
 
-// Sets a variable, and restores it on destruction.
+// Sets an environment variable and restores its previous value on destruction.
 class EnvironmentVariable {
 public:
     EnvironmentVariable(const char *name, const std::string &value) : name_(name) {

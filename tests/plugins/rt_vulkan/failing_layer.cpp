@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A Vulkan layer that injects failures. ARHOST_TEST_VULKAN_FAILS, read at each such call, names the failure:
-//   submit:N    a device's Nth vkQueueSubmit loses the device
-//   wait:N      its Nth vkWaitForFences completes the work and loses the device
-//   allocate:N  its Nth vkAllocateMemory and all later ones are out of memory
-//   pipelines:N creating its Nth ray tracing pipeline and all later ones fails
-//   device-with:EXTENSION  opening the device with that extension fails
-//   lacks:FUNCTION  devices do not have that function
-// With ARHOST_TEST_VULKAN_IS_A_GPU=query or =pipeline, all devices claim to be discrete GPUs without the extensions
-// of later paths. With ARHOST_TEST_VULKAN_IS_OLD=all, all devices support Vulkan 1.0 only; with =first, the first one
-// queried.
+// A Vulkan layer that injects failures. The environment variable ARHOST_TEST_VULKAN_FAILS selects the failure. The
+// layer reads it at each call that can fail; N counts the calls on one device, from 1:
+//   submit:N    The Nth vkQueueSubmit reports that the device is lost, without submitting the work.
+//   wait:N      The Nth vkWaitForFences waits for the work and then reports that the device is lost.
+//   allocate:N  The Nth and all later calls of vkAllocateMemory report that the device is out of memory.
+//   pipelines:N The Nth and all later calls that create a ray tracing pipeline fail.
+//   device-with:EXTENSION  vkCreateDevice fails if it enables EXTENSION.
+//   lacks:FUNCTION  vkGetDeviceProcAddr returns NULL for FUNCTION.
+//
+// Two more variables change what the devices report about themselves:
+//   ARHOST_TEST_VULKAN_IS_A_GPU=query     All devices are discrete GPUs that do not support the path "pipeline".
+//   ARHOST_TEST_VULKAN_IS_A_GPU=pipeline  All devices are discrete GPUs.
+//   ARHOST_TEST_VULKAN_IS_OLD=all         All devices support only Vulkan 1.0.
+//   ARHOST_TEST_VULKAN_IS_OLD=first       The device that is queried first supports only Vulkan 1.0.
 #include <vulkan/vk_layer.h>
 
 #include <cstdint>
@@ -24,7 +28,8 @@ namespace {
 struct NextInstance {
     VkInstance handle;
     PFN_vkGetInstanceProcAddr get;
-    // Loaded at creation: later, loaders may return the first layer's.
+    // Functions of the next layer. They are looked up when the instance is created, because a later look-up may
+    // return the functions of the topmost layer.
     PFN_vkDestroyInstance destroy;
     PFN_vkGetPhysicalDeviceProperties2 get_properties;
     PFN_vkEnumerateDeviceExtensionProperties list_extensions;
@@ -38,7 +43,8 @@ struct NextDevice {
 };
 
 std::mutex mutex;
-std::map<void *, NextInstance> instances; // by dispatch key: the first word of all handles of an instance
+std::map<void *, NextInstance>
+    instances; // the key is the first word of each handle, which is the same for all handles of an instance
 std::map<void *, NextDevice> devices;
 
 void *key_of(const void *handle) {
@@ -57,7 +63,7 @@ template <class Function> Function next(const NextDevice &device, const char *na
     return reinterpret_cast<Function>(device.get(device.handle, name));
 }
 
-// Whether the `count`th call of `what` should fail.
+// Whether the call number `count` of the kind `what` must fail, according to ARHOST_TEST_VULKAN_FAILS.
 bool fails(const char *what, std::uint64_t count) {
     const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
     const std::string prefix = std::string(what) + ":";
@@ -70,11 +76,11 @@ bool fails_with(const char *extension) {
     return failure && failure == std::string("device-with:") + extension;
 }
 
-// The loader's link in a create info's chain, which leads to the next layer or the driver.
+// Finds the structure in the create info's chain in which the loader passes the link to the next layer or the driver.
 template <class Link> Link *link_of(const void *chain, VkStructureType type) {
     for (auto *info = static_cast<const Link *>(chain); info; info = static_cast<const Link *>(info->pNext))
         if (info->sType == type && info->function == VK_LAYER_LINK_INFO)
-            return const_cast<Link *>(info); // the layer interface requires layers to advance it
+            return const_cast<Link *>(info); // mutable, because each layer must advance the link
     return nullptr;
 }
 
@@ -149,7 +155,8 @@ VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice handle, std::uint32_t co
     NextDevice &device = devices.at(key_of(handle));
     if (device.lost)
         return VK_ERROR_DEVICE_LOST;
-    // The driver does not know of the loss: wait, so that nothing in use is destroyed.
+    // Only simulates the loss, so the device continues to work. Waits for it, so that the caller does not destroy
+    // objects in use.
     const VkResult result =
         next<PFN_vkWaitForFences>(device, "vkWaitForFences")(handle, count, fences, all, timeout_ns);
     device.lost = fails("wait", ++device.waits);

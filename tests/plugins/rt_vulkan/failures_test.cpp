@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Device loss and out of memory at start and in mid-run, injected by failing_layer.cpp.
+// Tests how rt_vulkan and arhost handle a lost device and a lack of memory, at start and while rendering.
+// failing_layer.cpp injects these failures.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
 #include "drivers_leak.hpp"
@@ -23,7 +24,7 @@ constexpr auto lost = "Vulkan reports that the device is lost (VK_ERROR_DEVICE_L
 constexpr auto out_of_memory =
     "Vulkan reports that the device is out of memory (VK_ERROR_OUT_OF_DEVICE_MEMORY, -2); use smaller meshes";
 
-// The failure to inject (failing_layer.cpp); "": none.
+// Selects the failure that failing_layer.cpp injects; "" selects none.
 void inject_failure(const std::string &when) {
     ::setenv("ARHOST_TEST_VULKAN_FAILS", when.c_str(), 1);
 }
@@ -35,7 +36,8 @@ protected:
              {"ARHOST_TEST_VULKAN_FAILS", "ARHOST_TEST_VULKAN_IS_A_GPU", "VK_LAYER_PATH", "VK_INSTANCE_LAYERS"})
             ::unsetenv(name);
     }
-    // Affects all later instances. Older loaders lack VK_ADD_LAYER_PATH.
+    // Enables the layer for all Vulkan instances that are created later. Sets VK_LAYER_PATH, because older loaders do
+    // not support VK_ADD_LAYER_PATH.
     static void enable_layer() {
 #ifdef ARHOST_FAILING_LAYER_DIRECTORY
         ::setenv("VK_LAYER_PATH", ARHOST_FAILING_LAYER_DIRECTORY, 1);
@@ -48,7 +50,7 @@ protected:
 #define ARHOST_REQUIRE_LAYER() ARHOST_REQUIRE_VULKAN()
 constexpr auto layer_folder = ARHOST_FAILING_LAYER_DIRECTORY;
 #else
-#define ARHOST_REQUIRE_LAYER() GTEST_SKIP() << "needs <vulkan/vk_layer.h>, which these Vulkan headers lack"
+#define ARHOST_REQUIRE_LAYER() GTEST_SKIP() << "needs the header <vulkan/vk_layer.h>, which is not installed"
 constexpr auto layer_folder = "";
 #endif
 
@@ -70,13 +72,13 @@ protected:
         picture_.emplace(small_);
         return tracer_->try_render(from_the_side(small_), *picture_);
     }
-    // The plugin's log of `call`, which must return `status`.
+    // Runs `call`, checks that it returns `status`, and returns the messages that it adds to the plugin's log.
     template <class Call> std::string log_of(arhost_status status, Call call) {
         const std::size_t before = tracer_->plugin().log().size();
         EXPECT_EQ(call(), status);
         return tracer_->plugin().log().substr(before);
     }
-    // The plugin works again without the failure.
+    // Checks that the plugin works again when no failure is injected.
     void expect_recovery() {
         inject_failure("");
         ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
@@ -85,7 +87,7 @@ protected:
     }
 
     const arhost_intrinsics small_ = pinhole(48, 36, 48);
-    std::optional<Tracer> tracer_; // its destruction must not hang or crash, either
+    std::optional<Tracer> tracer_; // also tests destruction after a failure, which must neither hang nor crash
     std::optional<Picture> picture_;
 
     ScratchFolder folder_;
@@ -93,10 +95,10 @@ protected:
 INSTANTIATE_TEST_SUITE_P(Paths, FailingDevice, testing::Values("plain", "query", "pipeline"),
                          [](const auto &info) { return info.param; });
 
-// Some drivers announce ray tracing on GPUs without hardware for it.
+// Some drivers report ray tracing extensions on GPUs without ray tracing hardware.
 TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
     if (GetParam() == "plain")
-        GTEST_SKIP() << "no path precedes it";
+        GTEST_SKIP() << "no path precedes the path 'plain'";
     inject_failure(GetParam() == "query" ? "device-with:VK_KHR_ray_query" : "pipelines:1");
     ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", GetParam().c_str(), 1);
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
@@ -106,7 +108,7 @@ TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
     EXPECT_THAT(tracer.plugin().log(), AllOf(HasSubstr("path '" + GetParam() + "' failed, trying '" + next + "'"),
                                              HasSubstr("path " + next + ", ")));
     EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
-    // A path requested by name has no fallback.
+    // A path that is selected by name has no fallback.
     tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }),
                 HasSubstr("that this is unsupported"));
@@ -139,7 +141,7 @@ TEST_P(FailingDevice, LossInMidRunIsReported) {
         inject_failure(when);
         EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost)) << when;
         EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost))
-            << "it stays lost";
+            << "the device must stay lost";
     }
     expect_recovery();
 }
@@ -151,7 +153,7 @@ TEST_P(FailingDevice, LossAtTheFirstImageEndsCleanly) {
     tracer_.reset();
 }
 
-// Once for each allocation of start, which fails along with all later ones.
+// start() allocates memory several times. In each round, one of these allocations and all later ones fail.
 TEST_P(FailingDevice, OutOfMemoryAtStartIsReported) {
     int nth = 1;
     for (;; ++nth) {
@@ -167,7 +169,7 @@ TEST_P(FailingDevice, OutOfMemoryAtStartIsReported) {
     expect_recovery();
 }
 
-// The first image allocates its target.
+// Memory for the image is allocated when the first image is rendered.
 TEST_P(FailingDevice, OutOfMemoryInMidRunIsReported) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
     inject_failure("allocate:1");
@@ -176,7 +178,7 @@ TEST_P(FailingDevice, OutOfMemoryInMidRunIsReported) {
     EXPECT_EQ(render(), ARHOST_STATUS_OK) << "memory is available again";
     inject_failure("allocate:1");
     EXPECT_EQ(tracer_->try_render(from_the_side(small_), *picture_), ARHOST_STATUS_OK)
-        << "nothing is allocated per frame";
+        << "later images must not allocate memory";
     expect_recovery();
 }
 
@@ -202,7 +204,7 @@ TEST_F(OldDevice, IsRefusedIfSelected) {
 TEST_F(OldDevice, IsSkippedWithAReasonIfAnotherIsUsable) {
     const std::string once = copy_drivers(folder_.path() / "a"), again = copy_drivers(folder_.path() / "b");
     if (once.empty())
-        GTEST_SKIP() << "no driver manifests in the known folders";
+        GTEST_SKIP() << "found no Vulkan driver manifests on this machine";
     const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "first"),
         drivers("VK_DRIVER_FILES", once + ":" + again), old_name("VK_ICD_FILENAMES", once + ":" + again);
     PluginUnderTest plugin("rt_vulkan");
@@ -215,12 +217,12 @@ TEST_F(OldDevice, IsSkippedWithAReasonIfAnotherIsUsable) {
 class FailingRun : public LayeredTest, public testing::Test {
 protected:
     static constexpr int frames = 120;
-    // After start and some tens of frames; likewise after each restart.
+    // The 50th submission comes some tens of frames after start. Each restarted worker fails there as well.
     static constexpr auto in_mid_run = "submit:50";
 
     void SetUp() override {
 #if defined(__SANITIZE_ADDRESS__)
-        GTEST_SKIP() << "leaks of drivers would fail the worker";
+        GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and the worker would fail";
 #endif
         ARHOST_REQUIRE_LAYER();
     }
@@ -240,7 +242,7 @@ protected:
         lines_ = counted(run_, "out/counted.txt");
         EXPECT_THAT(lines_, SizeIs(frames)) << run_.output();
         for (std::size_t i = 0; i < lines_.size(); ++i)
-            EXPECT_EQ(lines_[i].sequence, i) << "out of order";
+            EXPECT_EQ(lines_[i].sequence, i) << "frames are missing or out of order";
         return status;
     }
     int overlaid() const {
@@ -253,7 +255,7 @@ protected:
 
     ArhostRun run_;
     std::vector<CountedLine> lines_;
-    // Frames between failures do not reset the count.
+    // With proven_after_frames: 1000, the frames between two failures do not reset the count of consecutive failures.
     const std::string quarantine_after_two_failures_ =
         "restart: {proven_after_frames: 1000, quarantine_after: 2, first_delay_ms: 1}\n";
 };
@@ -268,12 +270,12 @@ TEST_F(FailingRun, RestartsWithoutLosingAnOverlay) {
 TEST_F(FailingRun, FallsBackIfRestartsDoNotHelp) {
     EXPECT_EQ(run(in_mid_run, ", fallback: rt_embree", quarantine_after_two_failures_), 0) << run_.output();
     EXPECT_THAT(run_.output(), AllOf(HasSubstr(lost), HasSubstr("falling back to rt_embree")));
-    EXPECT_EQ(restarts(), 2) << "including the fallback's start";
+    EXPECT_EQ(restarts(), 2) << "one restart of rt_vulkan, and the start of the fallback";
     EXPECT_EQ(overlaid(), frames);
     const auto crashes = run_.stats()["crashes"];
     ASSERT_THAT(crashes, SizeIs(2));
     for (const auto &crash : crashes) {
-        EXPECT_GT(crash["frame"], 0) << "in mid-run";
+        EXPECT_GT(crash["frame"], 0) << "the crash must not be at start";
         EXPECT_THAT(crash["how"].get<std::string>(), testing::StartsWith("device lost; "));
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A run whose Vulkan driver disappears: the fallback ray tracer takes over.
+// Tests a run in which the Vulkan driver disappears and the worker of rt_vulkan is killed. The fallback ray tracer
+// must take over.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
 #include "two_tracers.hpp"
@@ -21,7 +22,7 @@ class LostDriver : public testing::Test {
 protected:
     void SetUp() override {
 #if defined(__SANITIZE_ADDRESS__)
-        GTEST_SKIP() << "leaks of drivers would fail the worker";
+        GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and the worker would fail";
 #endif
         ARHOST_REQUIRE_VULKAN();
     }
@@ -40,7 +41,7 @@ protected:
             ::setenv("VK_ICD_FILENAMES", list_.c_str(), 1);
         });
     }
-    // Frames with an overlay that have reached the output.
+    // Returns the number of frames with an overlay that the sink has received.
     std::ptrdiff_t overlaid() const {
         const auto lines =
             run_.exists("out/counted.txt") ? counted(run_, "out/counted.txt") : std::vector<CountedLine>();
@@ -51,7 +52,7 @@ protected:
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         fs::remove_all(drivers_);
         ASSERT_GT(run_.worker("rt_vulkan"), 0) << run_.output();
-        ::kill(run_.worker("rt_vulkan"), SIGKILL); // as after a device loss
+        ::kill(run_.worker("rt_vulkan"), SIGKILL); // the host restarts the worker, as it does after a device loss
     }
 
     ArhostRun run_;
@@ -70,11 +71,12 @@ TEST_F(LostDriver, FallsBackInMidRun) {
     EXPECT_THAT(run_.output(), HasSubstr("falling back to rt_embree"));
     const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));
     EXPECT_EQ(stats["frames"]["composited"], frames);
-    EXPECT_GE(stats["frames"]["augmented"], frames - 5) << "only the frames of the switch lack an overlay";
+    EXPECT_GE(stats["frames"]["augmented"], frames - 5)
+        << "at most 5 frames may lack an overlay while the host switches to the fallback";
     EXPECT_GE(overlaid(), frames - 5);
     const nlohmann::json &device = stats["stages"]["device"], &all = stats["stages"]["raytracer"];
     EXPECT_GE(device["count"], 20) << stats["stages"];
-    EXPECT_LT(device["count"], all["count"]) << "the fallback reports no device time";
+    EXPECT_LT(device["count"], all["count"]) << "the fallback must not report a device time";
     EXPECT_GT(device["p50_ms"], 0.0);
     EXPECT_LE(device["max_ms"], all["max_ms"]);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders many images of alternating scenes through the plugin, and measures what leaks.
+// Renders many images of alternating scenes with rt_vulkan, and measures memory and file descriptors to detect leaks.
 #pragma once
 
 #include "scene/loader.hpp"
@@ -21,10 +21,10 @@ namespace arhost::test {
 
 struct LongRun {
     struct State {
-        double memory_mib;    // resident
-        std::ptrdiff_t files; // open file descriptors
+        double memory_mib;    // resident memory of this process
+        std::ptrdiff_t files; // number of open file descriptors
     };
-    std::vector<State> states; // after each scene, with the plugin stopped
+    std::vector<State> states; // measured each time the plugin has been stopped
     std::string log;
 
     std::size_t validation_messages() const {
@@ -35,7 +35,8 @@ struct LongRun {
     }
 };
 
-// Returns freed memory to the system first, as fragmentation is not a leak.
+// Measures the current state. First returns freed memory to the operating system, so that memory which malloc keeps
+// is not mistaken for a leak.
 inline LongRun::State current_state() {
     ::malloc_trim(0);
     std::size_t pages = 0, resident = 0;
@@ -45,8 +46,9 @@ inline LongRun::State current_state() {
         std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator())};
 }
 
-// Starts `changes` times with the next scene, each time for `images` small images near the dissertation's marker.
-// Throws with the plugin's log if it fails.
+// Starts the plugin, renders `images` small images and stops the plugin; repeats this `changes` times, each time with
+// the next of `scenes`. The camera moves near the position of the dissertation's marker. If a call fails, throws
+// std::runtime_error with the plugin's log.
 inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int changes, int images,
                         const Options &options) {
     PluginUnderTest plugin("rt_vulkan");
@@ -61,7 +63,7 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
     const auto &functions = plugin.functions<arhost_raytracer>();
     const arhost_intrinsics intrinsics = pinhole(48, 36, 48);
     constexpr std::size_t slots = 3, page = 4096;
-    // Page-aligned like the host's, so that the device can write to them directly.
+    // The image slots are page-aligned like those of the host, so that the device can write to them directly.
     const std::size_t size = 2 * page;
     const std::unique_ptr<std::uint8_t, decltype(&std::free)> memory(
         static_cast<std::uint8_t *>(std::aligned_alloc(page, slots * size)), &std::free);

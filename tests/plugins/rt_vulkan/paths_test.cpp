@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The hardware paths give the plain path's images, for each scene from far and near.
+// Checks that the hardware ray tracing paths "query" and "pipeline" give the same images as the path "plain". Each
+// scene is viewed from far and from near.
 #include "scene_views.hpp"
 
 namespace arhost::test {
@@ -27,11 +28,11 @@ TEST_P(PathImages, MatchThePlainPath) {
         keep(got, name);
         const Likeness like = likeness(got, expected);
         std::cout << name << ": " << like << std::endl;
-        // Devices differ in which of two adjacent or coplanar facets they hit.
+        // Where two triangles are adjacent or coplanar, devices differ in which of them a ray hits.
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
         if (traced.plugin().log().find("llvmpipe") != std::string::npos) {
-            EXPECT_EQ(like.squares, 0) << like; // it evaluates expressions as written
+            EXPECT_EQ(like.squares, 0) << like; // llvmpipe does not reorder floating-point operations
         } else if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
             EXPECT_GE(like.psnr(), 45) << like;
         }
@@ -43,7 +44,8 @@ TEST_P(PathImages, MatchThePlainPath) {
 constexpr auto name_of = [](const auto &info) {
     return std::get<0>(info.param) + "_" + name_of_view(std::get<1>(info.param));
 };
-// All roles and material models; motion and deformation. rt_vulkan_test.cpp tests cut-outs and lights on each path.
+// These two scenes contain all roles and material models, motion and deformation. rt_vulkan_test.cpp tests alpha
+// cutoffs and lights on each path.
 INSTANTIATE_TEST_SUITE_P(Sample, PathImages,
                          testing::Combine(testing::Values("query", "pipeline"), scenes_named({"classes", "moving"})),
                          name_of);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The plugin on this machine's device, and its messages if there is none.
+// Tests rt_vulkan on this machine's Vulkan device, and its error messages if the machine has no device.
 #include "drivers_leak.hpp"
 #include "environment_variable.hpp"
 #include "large_surfaces.hpp"
@@ -54,7 +54,7 @@ template <class Call> std::string refusal(arhost_status status, Call call) {
         EXPECT_EQ(failure.status(), status) << failure.what();
         return failure.what();
     }
-    ADD_FAILURE() << "no failure was thrown";
+    ADD_FAILURE() << "expected a Failure, but none was thrown";
     return "";
 }
 
@@ -120,11 +120,12 @@ TEST_F(RichScene, AccumulatedMatchesRtEmbree) {
     const Likeness like = likeness(got, expected);
     EXPECT_EQ(like.alphas_off, 0) << like;
     EXPECT_GE(like.psnr(), 45) << like;
-    // Another camera restarts the accumulation; so does the first one afterwards.
+    // Each change of the camera restarts the accumulation, including a change back to the first camera.
     ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_STATUS_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     EXPECT_EQ(got.pixels(), first);
-    // So does an image cancelled in the middle: the second one is still traced in bands.
+    // A cancelled image restarts the accumulation as well. The second image after a start is still traced in bands,
+    // so it can be cancelled after the first band.
     ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
     ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
     vulkan.plugin().cancel(1);
@@ -151,7 +152,7 @@ arhost_camera moving_camera(const arhost_intrinsics &intrinsics = small) {
 const std::string moving_scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
 const auto all_paths = testing::Values("plain", "query", "pipeline");
 
-// The arguments of a Renderer for a path.
+// Holds the objects that are needed to construct a Renderer for a path.
 struct RendererParts {
     explicit RendererParts(const std::string &path)
         : device(rt_vulkan::choose_device(instance.devices(), "auto")),
@@ -205,7 +206,7 @@ TEST_P(EachPath, CancelsAnImageAndContinues) {
         const arhost_motion motion = evaluator.at(time_s);
         return tracer.try_render(moving_camera(), picture, &motion);
     };
-    tracer.plugin().cancel(1); // after the first band
+    tracer.plugin().cancel(1); // cancels after the first band
     EXPECT_EQ(rendered(0.7), ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while tracing the image"));
     EXPECT_EQ(picture.pixels(), untouched);
@@ -223,7 +224,8 @@ TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
     for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
         const arhost_intrinsics in = pinhole(96, height, 96);
         const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &arena.scene(), &in};
-        // The first image always uses bands, as its time is unknown; the second may.
+        // Renders three images and returns the third. The first image always uses bands, because its time is not yet
+        // known; the second may use them.
         const auto third = [&](rt_vulkan::Bands::Milliseconds max_band_time) {
             rt_vulkan::Settings settings;
             settings.max_band_time = max_band_time;
@@ -234,7 +236,8 @@ TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
                 const int checks = parts.logging.cancel_checks;
                 drawn = renderer.render(from_the_side(in), picture.image());
                 const int expected = max_band_time.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
-                EXPECT_TRUE(image < 2 || parts.logging.cancel_checks - checks == expected) << "one check per band";
+                EXPECT_TRUE(image < 2 || parts.logging.cancel_checks - checks == expected)
+                    << "expected one cancellation check per band";
             }
             EXPECT_TRUE(picture.only_pixels_written());
             return std::tuple(picture.pixels(), drawn.x, drawn.y, drawn.width, drawn.height);
@@ -249,7 +252,7 @@ TEST_P(EachPath, IsLogged) {
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
 }
 
-// Including images that rebuild acceleration structures.
+// Some of these images also rebuild acceleration structures, which counts as device time.
 TEST_P(EachPath, ReportsTheDeviceTimeIfTheStructHasTheField) {
     LoggingHost logging;
     const Host host(&logging.host);
@@ -277,7 +280,7 @@ TEST_P(EachPath, ReportsTheDeviceTimeIfTheStructHasTheField) {
     EXPECT_TRUE(picture.info.has_region);
 }
 
-// After many refits and rebuilds.
+// Compares images after many refits and several rebuilds of the acceleration structures.
 TEST_P(EachPath, FollowsMotion) {
     const arhost_intrinsics tiny = pinhole(48, 36, 48);
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan"),
@@ -285,7 +288,7 @@ TEST_P(EachPath, FollowsMotion) {
     ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.plugin().log();
     ASSERT_EQ(embree.start(tiny), ARHOST_STATUS_OK);
     scene::MotionEvaluator evaluator(tracer.scene());
-    constexpr int frames = 130; // more than two rebuild intervals
+    constexpr int frames = 130; // includes more than two rebuild intervals
     for (int frame = 0; frame < frames; ++frame) {
         const arhost_motion motion = evaluator.at(0.1 * frame);
         Picture got(tiny), expected(tiny);
@@ -322,12 +325,12 @@ TEST_P(EachPath, RendersSeveralScenesInTurn) {
 
 // ---- Image memory ----------------------------------------------------------------------------------
 
-// The device writes directly to page-aligned memory, such as slots; padding stays untouched.
+// The device can write directly to page-aligned memory, such as the host's slots. It must not write the row padding.
 TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     ARHOST_REQUIRE_VULKAN();
     RendererParts parts("plain");
     if (!parts.device.imports_host_memory)
-        GTEST_SKIP() << parts.device.name << " lacks VK_EXT_external_memory_host";
+        GTEST_SKIP() << parts.device.name << " does not support VK_EXT_external_memory_host";
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
     const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
@@ -342,10 +345,9 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory};
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
     if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
-        GTEST_SKIP() << parts.device.name
-                     << " does not import such memory"; // AMD's Linux driver refuses shared memory
+        GTEST_SKIP() << parts.device.name << " does not import shared memory"; // such as AMD's Linux driver
     EXPECT_TRUE(renderer.wrote_in_place());
-    const arhost_image elsewhere = copied.image(); // 64 bytes aligned
+    const arhost_image elsewhere = copied.image(); // aligned to 64 bytes only
     renderer.render(view, elsewhere);
     EXPECT_FALSE(renderer.wrote_in_place());
     EXPECT_TRUE(copied.only_pixels_written());
@@ -358,11 +360,11 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     }
     for (std::size_t i = size; i < pages; ++i)
         touched += memory[i] != 0xa5;
-    EXPECT_EQ(differ, 0u) << "rows";
-    EXPECT_EQ(touched, 0u) << "bytes outside the image";
+    EXPECT_EQ(differ, 0u) << "number of rows that differ";
+    EXPECT_EQ(touched, 0u) << "number of changed bytes outside the image";
     munmap(memory, pages);
 
-    // The region is the bounding box of alpha above 0.
+    // The region must be the bounding box of the pixels whose alpha is not 0.
     rt_vulkan::Rectangle tight{small.width, small.height, 0, 0};
     std::uint32_t x1 = 0, y1 = 0;
     for (std::uint32_t y = 0; y < small.height; ++y)
@@ -423,7 +425,8 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     EXPECT_EQ(chosen("2"), "Little GPU");
     EXPECT_EQ(chosen("LLVMPIPE"), "llvmpipe (LLVM 15)");
     EXPECT_EQ(chosen("little"), "Little GPU");
-    EXPECT_EQ(chosen("15"), "llvmpipe (LLVM 15)") << "a part of the name, as no device has this number";
+    EXPECT_EQ(chosen("15"), "llvmpipe (LLVM 15)")
+        << "no device has the number 15, so it is matched with a part of the name";
     devices[2].name = "Big GPU Ti";
     EXPECT_EQ(chosen("big gpu"), "Big GPU") << "a whole name takes precedence over a part";
     devices[2].name = "Little GPU";
@@ -435,12 +438,12 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
             << none;
     EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
     devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 13;
-    EXPECT_EQ(chosen("auto"), "Little GPU") << "the big one lacks buffers";
-    EXPECT_EQ(chosen("big"), "Big GPU") << "refused at start";
+    EXPECT_EQ(chosen("auto"), "Little GPU") << "'Big GPU' supports too few storage buffers";
+    EXPECT_EQ(chosen("big"), "Big GPU") << "a device selected by name is checked only at start";
     devices[2].properties.apiVersion = VK_API_VERSION_1_0;
     EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)");
     devices[0].queue_family = VK_QUEUE_FAMILY_IGNORED;
-    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "the first if none is usable";
+    EXPECT_EQ(chosen("auto"), "llvmpipe (LLVM 15)") << "without a usable device, the first one is chosen";
 }
 
 TEST(Path, IsChosenFromThoseTheDeviceSupports) {
@@ -477,7 +480,7 @@ TEST(Device, UnknownNameIsRefused) {
 
 TEST(Device, IsListedByTheHost) {
 #if defined(__SANITIZE_ADDRESS__)
-    GTEST_SKIP() << "leaks of drivers would fail the worker";
+    GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and arhost would fail";
 #endif
     ARHOST_REQUIRE_VULKAN();
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
@@ -523,8 +526,8 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     ARHOST_REQUIRE_VULKAN();
     const ScratchFolder folder;
     const EnvironmentVariable caches("XDG_CACHE_HOME", folder.path().string());
-    Tracer tracer(scene::ArenaBuilder(), {}, "rt_vulkan"); // empty, so that the shader compiles quickly
-    const auto files = [&] {                               // Mesa's own caches are there, too
+    Tracer tracer(scene::ArenaBuilder(), {}, "rt_vulkan"); // with an empty scene, the shader compiles quickly
+    const auto files = [&] {                               // without Mesa's own caches, which are in the same folder
         std::vector<std::filesystem::path> files;
         for (const auto &entry : std::filesystem::directory_iterator(folder.path()))
             if (entry.path().filename().string().starts_with("rt_vulkan"))
@@ -536,18 +539,18 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
     const auto file = files()[0];
     EXPECT_THAT(file.filename(), testing::ResultOf([](const auto &name) { return name.string(); },
                                                    testing::ContainsRegex("^rt_vulkan-[0-9a-f]{32}.pipelines$")))
-        << "one per device";
+        << "the name must identify the device";
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
-    std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1); // too large to read
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
+    std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1); // larger than the plugin's limit
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(std::filesystem::file_size(file), size) << "rewritten";
+    EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::remove(file);
-    std::filesystem::create_directory(file); // rename() cannot replace it
+    std::filesystem::create_directory(file); // rename() cannot replace a folder
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    EXPECT_EQ(files(), std::vector{file}) << "no temporary file is left";
+    EXPECT_EQ(files(), std::vector{file}) << "a temporary file was left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
     EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
     EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
@@ -579,7 +582,8 @@ TEST_F(Validation, ReportsAMissingUsageFlag) {
     const VkCommandBuffer commands = submission.new_commands();
     submission.begin(commands);
     const std::int32_t zeros[4] = {};
-    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros); // lacks TRANSFER_DST
+    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros,
+                                         zeros); // invalid: the buffer lacks the usage TRANSFER_DST
     submission.end(commands);
     EXPECT_THAT(logging.text, HasSubstr("Vulkan validation: "));
 }
@@ -612,11 +616,11 @@ INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
 TEST_P(ValidationOfPath, ReportsNothing) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    for (int frame = 0; frame < 5; ++frame) { // first in bands; at once from the third at the latest
+    for (int frame = 0; frame < 5; ++frame) { // the first image is traced in bands, the third and later ones at once
         Picture picture(small);
         EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
     }
-    tracer.render(from_the_side(pinhole(65, 47, 65))); // restarts with another size
+    tracer.render(from_the_side(pinhole(65, 47, 65))); // restarts the plugin with another image size
     EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
 }
@@ -660,7 +664,8 @@ TEST_F(InvalidInput, CamerasAreRefused) {
     EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({1e13, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_STATUS_ERROR_INVALID_ARGUMENT) << "other intrinsics";
+    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
+        << "the camera's intrinsics must be those of start";
     Picture other(pinhole(72, 96));
     EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// All scenes and camera positions of the image comparisons.
+// Lists the scenes and camera positions of the image comparisons.
 #pragma once
 
 #include "scene/loader.hpp"
@@ -20,7 +20,7 @@
 namespace arhost::test {
 
 struct View {
-    std::string name, scene; // scene: relative to the project's root
+    std::string name, scene; // `scene` is a path relative to the project's root
     std::string samples = "1";
     double time_s = 0;
 };
@@ -30,7 +30,8 @@ inline std::ostream &operator<<(std::ostream &stream, const View &view) {
 
 inline const arhost_intrinsics small = pinhole(128, 96, 128);
 
-// Looks at the dissertation's marker; `nearness` 1 is far.
+// Returns a camera that looks at the position of the dissertation's marker. Its distance is proportional to
+// `nearness`; 1 is far.
 inline arhost_camera camera_for(const arhost_scene &scene, double nearness, const arhost_intrinsics &size) {
     const double back = -330 * nearness, up = 150 * nearness;
     return scene.axes == ARHOST_AXES_Z_UP ? camera({25 * nearness, back, up}, {0, 0, 50}, {0, 0, 1}, size)
@@ -43,7 +44,7 @@ inline std::filesystem::path file_of(const View &view) {
     return std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
 }
 
-// Writes the picture for inspection, if ARHOST_KEEP_PICTURES=FOLDER.
+// If the environment variable ARHOST_KEEP_PICTURES names a folder, writes the picture there for inspection.
 inline void keep(const Picture &picture, const std::string &name) {
     const char *folder = std::getenv("ARHOST_KEEP_PICTURES");
     if (!folder)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders the same image by rt_vulkan and rt_embree, and measures the difference.
+// Renders the same image with rt_vulkan and rt_embree, and measures the difference.
 #pragma once
 
 #include "tracer.hpp"
@@ -13,11 +13,12 @@
 
 namespace arhost::test {
 
-// Mesa 25's lavapipe takes half a minute to optimize one of the shaders, too long for small pictures.
+// Reduces lavapipe's shader optimization: with Mesa 25, optimizing one of the shaders takes half a minute, much
+// longer than tracing the small pictures of the tests.
 inline const bool compiles_quickly =
     ::setenv("GALLIVM_PERF", "nopt", 0) == 0 && ::setenv("LP_NATIVE_VECTOR_WIDTH", "128", 0) == 0;
 
-// Why rt_vulkan cannot be created with `path` on this machine; "" if it can.
+// Returns "" if rt_vulkan can be created with `path` on this machine, else the plugin's error message.
 inline std::string no_vulkan(const std::string &path = "auto") {
     PluginUnderTest plugin("rt_vulkan");
     return plugin.create({{"path", path}}) == ARHOST_STATUS_OK ? "" : plugin.log();
@@ -28,17 +29,18 @@ inline std::string no_vulkan(const std::string &path = "auto") {
 
 struct Likeness {
     int pixels = 0, alphas_off = 0;
-    int alphas_off_inside = 0; // where the reference's alpha is uniform within a pixel's distance
-    int inside = 0;            // pixels of alpha 255 with such neighbours, compared by PSNR
-    int colours_off = 0;       // of those inside, by more than 2 codes
-    double squares = 0;        // sum of their squared differences over all channels, in codes
+    // A pixel is "inside" if all its neighbours in the reference have the same alpha, to within 1 code.
+    int alphas_off_inside = 0; // inside pixels whose alpha differs
+    int inside = 0;            // inside pixels of alpha 255, whose colours are compared
+    int colours_off = 0;       // inside pixels whose colour differs by more than 2 codes
+    double squares = 0; // squared colour differences in codes², summed over the inside pixels and all channels
 
-    // dB; infinite if equal.
+    // Returns the PSNR of the inside pixels in dB; infinite if their colours are equal.
     double psnr() const {
         return squares > 0 ? 10 * std::log10(255.0 * 255.0 * 3 * inside / squares)
                            : std::numeric_limits<double>::infinity();
     }
-    // Merges several pictures.
+    // Adds the counts of another picture.
     Likeness &operator+=(const Likeness &other) {
         pixels += other.pixels;
         alphas_off += other.alphas_off;
@@ -50,12 +52,13 @@ struct Likeness {
     }
 };
 inline std::ostream &operator<<(std::ostream &stream, const Likeness &like) {
+    // tools/likeness parses this text.
     return stream << like.pixels << " px, " << like.alphas_off << " alphas off (" << like.alphas_off_inside
                   << " of them inside), " << like.psnr() << " dB over " << like.inside << " px inside, "
                   << like.colours_off << " colours off";
 }
 
-// Border pixels are not inside.
+// Compares two pictures. Pixels at the border of the picture do not count as inside.
 inline Likeness likeness(const Picture &got, const Picture &reference) {
     Likeness like;
     for (std::uint32_t y = 0; y < got.height; ++y)
@@ -66,7 +69,7 @@ inline Likeness likeness(const Picture &got, const Picture &reference) {
                 for (std::uint32_t u = x - 1; is_inside && u <= x + 1; ++u)
                     is_inside = std::abs(reference.alpha(u, v) - b[3]) <= 1;
             ++like.pixels;
-            // One code is a rounding difference of means.
+            // A difference of one code is a rounding error of the mean over several samples.
             const bool off = std::abs(a[3] - b[3]) > 1;
             like.alphas_off += off;
             like.alphas_off_inside += off && is_inside;
@@ -83,7 +86,7 @@ inline Likeness likeness(const Picture &got, const Picture &reference) {
     return like;
 }
 
-// `options` must be valid for both plugins.
+// Renders a picture with `plugin`. Callers pass the same `options` to both plugins, so both must support them.
 inline Picture picture_by(const std::string &plugin, scene::ArenaBuilder scene, const arhost_camera &view,
                           const Options &options = {}) {
     return Tracer(std::move(scene), options, plugin).render(view);

@@ -20,14 +20,14 @@ std::vector<std::uint8_t> bytes_of(const std::string &text) {
     return {text.begin(), text.end()};
 }
 
-// The message and status of the Failure that `call` throws.
+// Returns the status and message of the Failure that `call` throws.
 template <class Call> std::pair<arhost_status, std::string> failure_of(Call &&call) {
     try {
         call();
     } catch (const Failure &failure) {
         return {failure.status(), failure.what()};
     }
-    return {ARHOST_STATUS_OK, "nothing was thrown"};
+    return {ARHOST_STATUS_OK, "no Failure was thrown"};
 }
 
 } // namespace
@@ -70,7 +70,7 @@ TEST(Files, ParentFoldersAreCreated) {
     const test::ScratchFolder folder;
     make_parent_folders(folder.path() / "a/b/c.txt");
     EXPECT_TRUE(std::filesystem::is_directory(folder.path() / "a/b"));
-    make_parent_folders("c.txt"); // in the working directory: no folder to create
+    make_parent_folders("c.txt"); // a file in the working directory needs no folder
 }
 
 TEST(Files, AFileInPlaceOfAFolderIsNamed) {
@@ -133,7 +133,7 @@ TEST(Files, CheckChangesNothing) {
     std::ofstream(file) << "old";
     check_can_write(file);
     EXPECT_EQ(std::filesystem::file_size(file), 3u);
-    std::filesystem::create_symlink("far.txt", link); // to a missing file
+    std::filesystem::create_symlink("far.txt", link); // now points to a missing file
     check_can_write(link);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
     EXPECT_FALSE(std::filesystem::exists(target));

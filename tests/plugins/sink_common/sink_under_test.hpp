@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Drives a sink like the worker, with test pictures and fault injection.
+// Calls a sink's functions like the worker does. Also provides test pictures and fault injection.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -27,11 +27,11 @@
 
 namespace arhost::test {
 
-// A BGR8 picture in memory that faults on a write, and on a read past the last pixel.
+// A BGR8 picture in protected memory: writing to it, or reading past its last pixel, causes a segmentation fault.
 class Picture {
 public:
-    // Soft gradients that drift with `number`, and `number` in binary as black and white squares of 8 px
-    // along the top, if the picture is at least 128 px wide. `stride` 0: rows without padding.
+    // Paints smooth gradients that move with `number`. If the picture is at least 128 px wide, also draws `number` in
+    // binary, as black and white squares of 8 px along the top edge. If `stride` is 0, rows have no padding.
     Picture(int width, int height, std::uint64_t number, int stride = 0)
         : width_(width), height_(height), stride_(stride ? stride : 3 * width) {
         const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
@@ -92,7 +92,8 @@ inline arhost_record make_record(std::uint64_t sequence) {
     return record;
 }
 
-// A camera for pictures of that size, with numbers that are not exactly representable.
+// Returns a camera for pictures of this size. Its numbers need many decimal digits, to test that sinks do not round
+// them.
 inline arhost_intrinsics make_intrinsics(int width, int height) {
     arhost_intrinsics intrinsics{};
     intrinsics.struct_size = sizeof intrinsics;
@@ -109,14 +110,14 @@ inline arhost_intrinsics make_intrinsics(int width, int height) {
     return intrinsics;
 }
 
-// A sink from start to end. Destroying it without `stop` simulates a kill within one process.
+// A sink plugin under test. Destroying it without calling `stop` simulates that its worker was killed.
 class SinkUnderTest {
 public:
     SinkUnderTest(const std::string &id, const std::map<std::string, std::string> &options) : plugin_(id) {
         created_ = plugin_.create(options);
     }
 
-    bool knows_camera = true; // start() passes the intrinsics
+    bool knows_camera = true; // whether start() passes the intrinsics to the sink
 
     arhost_status created() const { return created_; }
     arhost_status start(int width, int height, std::uint64_t first_sequence = 0, double fps = 30) {
@@ -167,8 +168,9 @@ private:
     int width_ = 0, height_ = 0;
 };
 
-// Runs a sink in a separate process from `first_sequence` on and kills it after at least `frames` acknowledged
-// frames. Returns the number of the first unacknowledged frame, where the host would continue.
+// Runs a sink in a child process, beginning at frame `first_sequence`, and kills the process after the sink has
+// acknowledged at least `frames` frames. Returns the number of the first unacknowledged frame, at which the host
+// would continue.
 inline std::uint64_t write_until_killed(const std::string &id, const std::map<std::string, std::string> &options,
                                         int width, int height, std::uint64_t first_sequence, std::uint64_t frames,
                                         arhost_record (*record)(std::uint64_t) = make_record) {
@@ -200,7 +202,7 @@ inline std::uint64_t write_until_killed(const std::string &id, const std::map<st
     return first_sequence + acknowledged;
 }
 
-// Simulates a full disk: no file grows past `bytes`.
+// Simulates a full disk: as long as this object exists, no file can grow beyond `bytes`.
 class FileSizeLimit {
 public:
     explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -220,7 +222,8 @@ private:
     rlimit before_{};
 };
 
-// A read-only folder; root temporarily becomes nobody.
+// Creates a folder in which this process cannot write. If it runs as root, it is user `nobody` until destruction,
+// because permissions do not limit root.
 class UnwritableFolder {
 public:
     explicit UnwritableFolder(const std::filesystem::path &path) : path_(path) {
@@ -250,7 +253,7 @@ inline std::string read_text(const std::filesystem::path &file) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// The names in a folder, hidden ones too, sorted.
+// Returns the sorted names of all files in a folder, including hidden files.
 inline std::vector<std::string> names_in(const std::filesystem::path &folder) {
     std::vector<std::string> names;
     for (const auto &entry : std::filesystem::directory_iterator(folder))

@@ -37,14 +37,14 @@ protected:
         options["path"] = path(name).string();
         return SinkUnderTest("sink_images", options);
     }
-    // A whole run over frames [first, end) after a restart at `first`.
+    // Starts the sink at frame `first`, writes the frames [first, end) and stops it.
     void run(SinkUnderTest &&s, std::uint64_t first, std::uint64_t end) const {
         ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(first, end), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
         EXPECT_EQ(s.log(), "");
     }
-    // Frames [0, end), then a kill.
+    // Writes the frames [0, end), then simulates a kill.
     void run_and_die(SinkUnderTest &&s, std::uint64_t end) const {
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(0, end), ARHOST_STATUS_OK) << s.log();
@@ -56,7 +56,7 @@ protected:
 
 } // namespace
 
-// Numbered images
+// ---- Numbered images -------------------------------------------------------------------------------
 
 TEST_F(SinkImages, EveryFrameBecomesANumberedPngOfTheSamePixels) {
     run(sink("f_%03d.png"), 0, 3);
@@ -81,7 +81,7 @@ TEST_F(SinkImages, AnImageIsCompleteWhenItsFrameIsAcknowledged) {
 
 TEST_F(SinkImages, ARestartGivesTheSameBytesAsARunWithoutOne) {
     run_and_die(sink("%d.png"), 5);
-    run(sink("%d.png"), 4, 8); // the last frame before the kill was not acknowledged
+    run(sink("%d.png"), 4, 8); // repeats frame 4, whose acknowledgement was lost
     run(sink("whole_%d.png"), 0, 8);
     for (int i = 0; i < 8; ++i)
         EXPECT_EQ(read_text(path(std::to_string(i) + ".png")),
@@ -94,7 +94,7 @@ TEST_F(SinkImages, SurvivesAKillAtAnyMoment) {
     for (const std::uint64_t frames : {1, 5, 2})
         next = write_until_killed("sink_images", {{"path", path("%d.png").string()}}, width, height, next, frames);
     run(sink("%d.png"), next, next + 1);
-    EXPECT_EQ(names().size(), next + 1); // and no temporary file
+    EXPECT_EQ(names().size(), next + 1); // no temporary file is left
     for (std::uint64_t i = 0; i <= next; ++i)
         EXPECT_TRUE(shows(path(std::to_string(i) + ".png"), i)) << i;
 }
@@ -136,7 +136,7 @@ TEST_F(SinkImages, AcceptsOddSizesAndPaddedRowsWithoutTouchingOtherBytes) {
     }
 }
 
-// One image
+// ---- One image -------------------------------------------------------------------------------------
 
 TEST_F(SinkImages, APathWithoutNumberHoldsTheLastFrame) {
     run(sink("demo.png"), 0, 5);
@@ -147,7 +147,7 @@ TEST_F(SinkImages, APathWithoutNumberHoldsTheLastFrame) {
 TEST_F(SinkImages, TheLastFrameSurvivesAKillWithoutBeingSentAgain) {
     for (std::uint64_t frames = 1; frames < 4; ++frames) {
         run_and_die(sink("demo.png"), frames);
-        run(sink("demo.png"), frames, frames); // no more frames
+        run(sink("demo.png"), frames, frames); // restarted without further frames
         EXPECT_THAT(names(), ElementsAre("demo.png"));
         EXPECT_TRUE(shows(path("demo.png"), frames - 1)) << frames;
     }
@@ -169,7 +169,7 @@ TEST_F(SinkImages, AKeptButUnacknowledgedFrameIsNotTheLast) {
 
 TEST_F(SinkImages, AKillAfterTheEndKeepsTheImage) {
     run(sink("demo.png"), 0, 3);
-    run(sink("demo.png"), 3, 3); // restarted only to be stopped
+    run(sink("demo.png"), 3, 3); // restarted without further frames
     EXPECT_TRUE(shows(path("demo.png"), 2));
 }
 
@@ -200,7 +200,8 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsDeletedAtTheFirstFrame) {
         std::ofstream(path("demo.png")) << "old";
         SinkUnderTest s = sink("demo.png", {{"frame", frame}});
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_text(path("demo.png")), "old") << "the run may still fail to start";
+        EXPECT_EQ(read_text(path("demo.png")), "old")
+            << "start must not change the file, because the run may still fail to start";
         ASSERT_EQ(s.write(0, 1), ARHOST_STATUS_OK);
         if (frame == std::string("-1")) {
             ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
@@ -213,7 +214,7 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsDeletedAtTheFirstFrame) {
     }
 }
 
-// Errors
+// ---- Errors ----------------------------------------------------------------------------------------
 
 TEST_F(SinkImages, ConflictingOptionsAreRefused) {
     struct Case {
@@ -258,7 +259,7 @@ TEST_F(SinkImages, AFullDiskFailsWhenKeepingTheLastFrame) {
         EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_FALSE(std::filesystem::exists(path("demo.png")));
-    run(sink("demo.png"), 1, 1); // with free space, a restart finishes it
+    run(sink("demo.png"), 1, 1); // when the disk has free space, a restart finishes the image
     EXPECT_TRUE(shows(path("demo.png"), 0));
     EXPECT_THAT(names(), ElementsAre("demo.png"));
 }

@@ -19,8 +19,8 @@ namespace {
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A frame with two markers, a camera and the truth, with numbers that are not exactly representable and differ per
-// frame.
+// Returns the record of a frame with two markers, a camera and the true pose. Its numbers differ per frame and need
+// many decimal digits, to test that the sink does not round them.
 arhost_record full_record(std::uint64_t sequence) {
     arhost_record record = make_record(sequence);
     const double seed = 1.0 / (3.0 + static_cast<double>(sequence));
@@ -71,7 +71,7 @@ std::vector<std::string> keys_of(const Json &json) {
     return keys;
 }
 
-// A number by its path in the JSON, also in nested arrays.
+// Converts a C array, which may be nested, to a JSON array.
 template <class Array> Json array(const Array &values) {
     Json json = Json::array();
     for (const auto &value : values) {
@@ -87,7 +87,7 @@ class SinkPoses : public testing::Test {
 protected:
     std::filesystem::path log() const { return folder_.path() / "log.jsonl"; }
     SinkUnderTest sink() const { return SinkUnderTest("sink_poses", {{"path", log().string()}}); }
-    // What one uninterrupted run writes for frames [0, end).
+    // Returns the log that an uninterrupted run writes for the frames [0, end).
     std::string uninterrupted(std::uint64_t end) const {
         const auto path = folder_.path() / "whole.jsonl";
         SinkUnderTest whole("sink_poses", {{"path", path.string()}});
@@ -101,7 +101,7 @@ protected:
         for (; first < end; ++first)
             ASSERT_EQ(sink.write(picture, full_record(first)), ARHOST_STATUS_OK) << sink.log();
     }
-    // The line of one record.
+    // Returns the line that the sink writes for one record.
     std::string line_of(const arhost_record &record) const {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
@@ -189,7 +189,7 @@ TEST_F(SinkPoses, NonFiniteNumbersAreNull) {
 
 TEST_F(SinkPoses, AnInvalidFamilyNameDoesNotCorruptTheLine) {
     arhost_record record = full_record(0);
-    std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // no NUL
+    std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // without a terminating NUL
     std::memcpy(record.markers[0].family, "a\"\\\n\xff", 5);
     record.marker_count = 1;
     EXPECT_EQ(Json::parse(line_of(record))["markers"][0]["family"],
@@ -221,7 +221,8 @@ TEST_F(SinkPoses, AFreshRunReplacesAnOlderLogAtItsFirstFrame) {
     std::ofstream(log()) << "something else\n";
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(log()), "something else\n") << "the run may still fail to start";
+    EXPECT_EQ(read_text(log()), "something else\n")
+        << "start must not change the file, because the run may still fail to start";
     write(s, 0, 2);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_text(log()), uninterrupted(2));
@@ -250,7 +251,7 @@ TEST_F(SinkPoses, APartialLineIsRemovedAfterAKill) {
     for (std::size_t size = third + 1; size < whole.size(); size += 7) {
         std::ofstream(log(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
         SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // even if the host considers the frame written
+        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // although the host considers frame 2 written
         EXPECT_EQ(read_text(log()), whole.substr(0, third)) << "cut at " << size;
     }
 }
@@ -294,7 +295,8 @@ TEST_F(SinkPoses, ARestartWithoutTheOldLogGivesAWarning) {
 TEST_F(SinkPoses, CreatesMissingFolders) {
     SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "a/b/log.jsonl").string()}});
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl")) << "there was no frame yet";
+    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"))
+        << "the log must not be created before the first frame";
     write(s, 0, 1);
     EXPECT_TRUE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"));
 }
@@ -305,12 +307,12 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(log());
     {
-        const FileSizeLimit limit(before.size() + 100); // the next line fits only partly
+        const FileSizeLimit limit(before.size() + 100); // only a part of the next line fits
         EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(log()), before);
     EXPECT_THAT(s.log(), HasSubstr("4 cannot write '" + log().string() + "': File too large"));
-    write(s, 2, 4); // continues when there is space again
+    write(s, 2, 4); // continues when the disk has free space again
     EXPECT_EQ(read_text(log()), uninterrupted(4));
 }
 

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// Cameras with numbers that are not exactly representable; every fourth frame has none.
+// Returns a record with a random camera, whose numbers need many decimal digits. Every fourth frame has no camera.
 arhost_record camera_record(std::uint64_t sequence) {
     arhost_record record = make_record(sequence);
     if (sequence % 4 == 3)
@@ -44,7 +44,7 @@ protected:
         for (; first < end; ++first)
             ASSERT_EQ(sink.write(picture, camera_record(first)), ARHOST_STATUS_OK) << sink.log();
     }
-    // What one uninterrupted run writes for frames [0, end).
+    // Returns the file that an uninterrupted run writes for the frames [0, end).
     std::string uninterrupted(const std::string &format, std::uint64_t end) const {
         const auto path = folder_.path() / "whole.trajectory";
         SinkUnderTest whole = sink(format, path);
@@ -53,7 +53,7 @@ protected:
         EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
         return read_text(path);
     }
-    // Writes just these frames.
+    // Writes only these frames, as if the others had been dropped.
     void write_frames(const std::string &format, const std::vector<std::uint64_t> &frames) const {
         SinkUnderTest s = sink(format);
         ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
@@ -139,7 +139,7 @@ TEST_F(SinkTrajectory, InFormatDissertationLineNumbersAreFrameNumbers) {
     write_frames("dissertation", {1, 2, 3, 6, 9});
     const Trajectory trajectory = read_trajectory(file());
     EXPECT_EQ(trajectory.end(), 10u);
-    EXPECT_THAT(numbers_of(trajectory), testing::ElementsAre(1, 2, 6, 9)); // 3 has no camera
+    EXPECT_THAT(numbers_of(trajectory), testing::ElementsAre(1, 2, 6, 9)); // frame 3 has no camera
     EXPECT_NEAR(trajectory.frames[6].view->eye_mm[0], camera_record(6).camera.eye[0], 1e-3);
 }
 
@@ -182,7 +182,8 @@ TEST_P(SinkTrajectoryInEachFormat, AFreshRunReplacesAnOlderFileAtItsFirstFrame) 
     std::ofstream(file()) << "something else\n";
     SinkUnderTest s = sink(GetParam());
     ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(file()), "something else\n") << "the run may still fail to start";
+    EXPECT_EQ(read_text(file()), "something else\n")
+        << "start must not change the file, because the run may still fail to start";
     write(s, 0, 2);
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 2));
 }
@@ -241,12 +242,12 @@ TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
     write(s, 0, 2);
     const std::string before = read_text(file());
     {
-        const FileSizeLimit limit(before.size() + 20); // the next line fits only partly
+        const FileSizeLimit limit(before.size() + 20); // only a part of the next line fits
         EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(file()), before);
     EXPECT_THAT(s.log(), HasSubstr("cannot write '" + file().string() + "': File too large"));
-    write(s, 2, 4); // continues when there is space again
+    write(s, 2, 4); // continues when the disk has free space again
     EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 4));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Reads a film back: its frames as BGR, converted according to the film's tags, and their numbers.
+// Reads a video file that sink_video wrote. Converts its frames to BGR according to the file's colour tags, and reads
+// the frame numbers that Picture has drawn.
 #pragma once
 
 #include "sink_under_test.hpp"
@@ -23,11 +24,11 @@ namespace arhost::test {
 
 struct FilmFrame {
     int width, height;
-    std::int64_t time; // in units of 1/fps
+    std::int64_t time; // presentation time in units of 1/fps
     std::vector<std::uint8_t> bgr;
 
     const std::uint8_t *pixel(int x, int y) const { return &bgr[3 * (static_cast<std::size_t>(y) * width + x)]; }
-    // The number that Picture draws along the top.
+    // Reads the number that Picture draws along the top edge.
     std::uint64_t number() const {
         std::uint64_t bits = 0;
         for (int i = 0; i < Picture::squares; ++i)
@@ -73,11 +74,11 @@ inline FilmFrame to_bgr(const AVFrame &frame) {
                              1 << 16);
     std::uint8_t *planes[] = {out.bgr.data()};
     const int strides[] = {3 * frame.width};
-    // swscale may write past a row: convert into a larger buffer, then copy.
-    std::vector<std::uint8_t> roomy(out.bgr.size() + 64);
-    planes[0] = roomy.data();
+    // swscale may write past the end of a row. Therefore the frame is converted into a larger buffer and then copied.
+    std::vector<std::uint8_t> padded(out.bgr.size() + 64);
+    planes[0] = padded.data();
     sws_scale(sws.get(), frame.data, frame.linesize, 0, frame.height, planes, strides);
-    std::copy_n(roomy.begin(), out.bgr.size(), out.bgr.begin());
+    std::copy_n(padded.begin(), out.bgr.size(), out.bgr.begin());
     return out;
 }
 
@@ -88,7 +89,7 @@ inline Film read_film(const std::filesystem::path &path) {
     const auto close = [](AVFormatContext *p) { avformat_close_input(&p); };
     const std::unique_ptr<AVFormatContext, decltype(close)> owner(format, close);
     if (avformat_find_stream_info(format, nullptr) < 0 || format->nb_streams != 1)
-        throw std::runtime_error(path.string() + " is no film");
+        throw std::runtime_error(path.string() + " is not a video file with one stream");
     const AVStream &stream = *format->streams[0];
     const AVCodecParameters &parameters = *stream.codecpar;
     const AVCodec *decoder = avcodec_find_decoder(parameters.codec_id);
@@ -98,7 +99,7 @@ inline Film read_film(const std::filesystem::path &path) {
     codec->thread_count = 1;
     codec->err_recognition = AV_EF_EXPLODE;
     if (avcodec_open2(codec.get(), decoder, nullptr) < 0)
-        throw std::runtime_error("no decoder");
+        throw std::runtime_error("cannot open the decoder");
 
     Film film{decoder->name,
               stream.avg_frame_rate,
@@ -121,7 +122,7 @@ inline Film read_film(const std::filesystem::path &path) {
     };
     while (av_read_frame(format, packet.get()) >= 0) {
         if (avcodec_send_packet(codec.get(), packet.get()) < 0)
-            throw std::runtime_error("a broken packet in " + path.string());
+            throw std::runtime_error(path.string() + " contains a damaged packet");
         take();
         av_packet_unref(packet.get());
     }

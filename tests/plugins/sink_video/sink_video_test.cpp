@@ -23,7 +23,7 @@ std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end) {
 }
 
 struct Difference {
-    double psnr_db, bias[3]; // bias: mean of film − frame, of B, G and R
+    double psnr_db, bias[3]; // bias: mean of (film − frame) for B, G and R
 };
 
 Difference compare(const FilmFrame &film, const Picture &frame) {
@@ -50,14 +50,14 @@ protected:
     SinkUnderTest sink(std::map<std::string, std::string> options = {}) const {
         return SinkUnderTest("sink_video", with_path(std::move(options)));
     }
-    // A whole run over frames [first, end) after a restart at `first`.
+    // Starts the sink at frame `first`, writes the frames [first, end) and stops it.
     void run(SinkUnderTest &&s, std::uint64_t first, std::uint64_t end, double fps = 30) const {
         ASSERT_EQ(s.start(width, height, first, fps), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(first, end), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
         EXPECT_EQ(s.log(), "");
     }
-    // Frames [first, end) and then a kill.
+    // Starts the sink at frame `first`, writes the frames [first, end), then simulates a kill.
     void run_and_die(std::uint64_t first, std::uint64_t end) const {
         SinkUnderTest s = sink();
         ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK) << s.log();
@@ -70,7 +70,7 @@ protected:
 
 } // namespace
 
-// The film
+// ---- The film --------------------------------------------------------------------------------------
 
 TEST_F(SinkVideo, HasEveryFrameOnceInOrder) {
     run(sink(), 0, 40);
@@ -132,7 +132,7 @@ TEST_F(SinkVideo, OddSizesArePaddedByRepeatingTheEdge) {
     }
 }
 
-TEST_F(SinkVideo, ReadsNoByteOutsideTheFrame) { // Picture faults there
+TEST_F(SinkVideo, ReadsNoByteOutsideTheFrame) { // reading past the end of a Picture crashes
     for (const int w : {64, 128, 336, 1024})
         for (const int h : {16, 64}) {
             SinkUnderTest s = sink({{"preset", "ultrafast"}});
@@ -161,7 +161,8 @@ TEST_F(SinkVideo, FrameNumbersAreRecoveredAtHighAndLowRates) {
         ASSERT_EQ(s.write(0, 50), ARHOST_STATUS_OK);
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_EQ(read_film(path()).numbers(), numbers(0, 50)) << fps;
-        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3) << fps; // MP4 stores whole ms
+        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3)
+            << fps; // MP4 stores the duration in whole milliseconds
     }
 }
 
@@ -181,7 +182,7 @@ TEST_F(SinkVideo, DroppedFramesKeepTheirDuration) {
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     const Film film = read_film(path());
     EXPECT_THAT(film.numbers(), ElementsAre(3, 4, 9, 10, 20));
-    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // starts with the first frame
+    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // the film starts with the first frame
 }
 
 TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
@@ -211,7 +212,7 @@ TEST_F(SinkVideo, TheIndexIsAtTheStartForStreaming) {
     EXPECT_LT(film.find("moov"), film.find("mdat"));
 }
 
-// Kills and restarts
+// ---- Kills and restarts ----------------------------------------------------------------------------
 
 TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
     for (const std::uint64_t restart : {1, 2, 7, 10}) {
@@ -225,9 +226,9 @@ TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
 TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
     run_and_die(0, 1);
     run_and_die(1, 2);
-    run_and_die(2, 2); // killed before its first frame
+    run_and_die(2, 2); // the sink was killed before it wrote a frame
     run_and_die(2, 9);
-    run_and_die(5, 6); // the host repeated a frame
+    run_and_die(5, 6); // the host repeats frames from 5 on
     run_and_die(6, 6);
     run(sink(), 6, 12);
     const Film film = read_film(path());
@@ -273,7 +274,7 @@ TEST_F(SinkVideo, ATruncatedSegmentIsPlayable) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
     EXPECT_EQ(read_film(segment).numbers(), numbers(0, 6));
     const std::string bytes = read_text(segment);
-    const std::size_t last_frame = bytes.rfind("\x1f\x43\xb6\x75"); // the id of a cluster
+    const std::size_t last_frame = bytes.rfind("\x1f\x43\xb6\x75"); // a Matroska cluster's id
     for (std::size_t size = last_frame; size < bytes.size(); size += 1 + (bytes.size() - last_frame) / 40) {
         std::ofstream(segment, std::ios::binary | std::ios::trunc) << bytes.substr(0, size);
         run(sink(), 5, 7);
@@ -299,18 +300,18 @@ TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeFilm) {
     run(sink(), 8, 8);
     const std::string film = read_text(path());
 
-    // The film is in place; all segments still exist.
+    // Simulates a kill after the film was written, but before its segments were deleted.
     std::ofstream(path(".demo.mp4.from0.mkv")) << first;
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
 
-    // The first segment is deleted.
+    // Simulates a kill after the first segment was deleted.
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
 
-    // All segments are deleted.
+    // Simulates a kill after all segments were deleted.
     run(sink(), 8, 8);
     EXPECT_EQ(read_text(path()), film);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
@@ -359,7 +360,7 @@ TEST_F(SinkVideo, SegmentsWithOtherOptionsAreNotJoined) {
     ASSERT_EQ(s.write(3, 5), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("encoded with different options"));
-    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // nothing is lost
+    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // the segments are kept
 }
 
 TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
@@ -370,7 +371,7 @@ TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
     EXPECT_THAT(s.log(), HasSubstr("3 '" + path().string() + "' was not written, because there were no frames"));
 }
 
-// Errors
+// ---- Errors ----------------------------------------------------------------------------------------
 
 TEST_F(SinkVideo, AnUnknownExtensionIsRefused) {
     for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
@@ -407,7 +408,7 @@ TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderFilm) {
     }
     EXPECT_EQ(read_text(path()), old);
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", "demo.mp4"));
-    run(sink(), 8, 8); // with free space, a restart finishes it
+    run(sink(), 8, 8); // when the disk has free space, a restart finishes the film
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 8));
 }
 

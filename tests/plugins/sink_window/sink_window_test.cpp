@@ -15,7 +15,7 @@ using namespace arhost::test;
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Caches of Mesa and Xlib live as long as the process and are not leaks of the sink.
+// Suppresses reports about Mesa and Xlib. Their caches live as long as the process and are not leaks of the sink.
 extern "C" const char *__lsan_default_suppressions();
 extern "C" const char *__lsan_default_suppressions() {
     return "leak:libX11\nleak:libGL\nleak:_dri.so\nleak:libLLVM\nleak:libxcb\n";
@@ -23,7 +23,8 @@ extern "C" const char *__lsan_default_suppressions() {
 
 namespace {
 
-// Keeps the drivers loaded after the window is closed: the leak checker can name only loaded libraries.
+// Keeps the graphics drivers loaded after the window is closed, because suppressions match only libraries that are
+// still loaded when leaks are reported.
 void keep_libraries() {
     dl_iterate_phdr(
         [](dl_phdr_info *info, std::size_t, void *) {
@@ -35,7 +36,7 @@ void keep_libraries() {
 
 constexpr int screen_width = 640, screen_height = 480;
 
-// The bilinear sample of the frame at a pixel of the window.
+// Returns a bilinear sample of the frame.
 double sampled(const Picture &picture, double x, double y, int channel) {
     x = std::clamp(x, 0.0, picture.width() - 1.0);
     y = std::clamp(y, 0.0, picture.height() - 1.0);
@@ -46,8 +47,9 @@ double sampled(const Picture &picture, double x, double y, int channel) {
            v * ((1 - u) * picture.pixel(x0, y1)[channel] + u * picture.pixel(x1, y1)[channel]);
 }
 
-// The largest difference between a window and the frame that should fill [left, left + width) × … of it,
-// black elsewhere. The border pixels of the image are skipped: rounding there depends on the driver.
+// Returns the largest difference between the window and its expected content: the frame in the rectangle `left`,
+// `top`, `width`, `height`, and black elsewhere. If the frame is scaled, skips the border pixels of the rectangle,
+// whose rounding depends on the driver.
 double worst_difference(const Screenshot &shot, const Picture &picture, int left, int top, int width, int height) {
     double worst = 0;
     for (int y = 0; y < shot.height; ++y)
@@ -72,14 +74,14 @@ class SinkWindow : public testing::Test {
 protected:
     void SetUp() override {
         if (access(xvfb_path, X_OK) != 0)
-            GTEST_SKIP() << "needs Xvfb, which is not installed (Debian's package xvfb)";
+            GTEST_SKIP() << "needs Xvfb, which is not installed (Debian package xvfb)";
         server_.emplace(screen_width, screen_height);
         setenv("DISPLAY", server_->name().c_str(), 1);
         setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
         observer_.emplace(server_->name());
     }
     void TearDown() override {
-        sink_.reset(); // before the server: Xlib exits the process of a client that loses its server
+        sink_.reset(); // before the server, because Xlib terminates a client's process when the connection is lost
         observer_.reset();
         server_.reset();
     }
@@ -89,7 +91,7 @@ protected:
         keep_libraries();
         return *sink_;
     }
-    // Serves the window until `done` or for 20 seconds.
+    // Calls the sink's idle() until `done` returns true; returns false after 20 seconds.
     bool becomes(const std::function<bool()> &done) {
         const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
         while (std::chrono::steady_clock::now() < end) {
@@ -100,7 +102,7 @@ protected:
         }
         return false;
     }
-    // Waits until the window shows the frame in that part and returns the remaining difference.
+    // Waits until the window shows the frame in this rectangle; returns the last worst_difference().
     double difference(const Picture &picture, int left, int top, int width, int height) {
         double worst = 255;
         becomes(
@@ -123,7 +125,8 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
         ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_STATUS_OK) << sink.log();
         EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
     }
-    const Screenshot shot = observer_->screen(); // on the screen, not only in the window's memory
+    const Screenshot shot =
+        observer_->screen(); // the frame must be visible on the screen, not only in the window's buffer
     const XWindowAttributes where = observer_->attributes();
     const Picture picture(320, 200, 300);
     for (int c = 0; c < 3; ++c)
@@ -152,9 +155,9 @@ TEST_F(SinkWindow, KeepsTheAspectRatioWhenResized) {
     SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
     ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
-    observer_->resize(400, 240); // wider: bars at the sides
+    observer_->resize(400, 240); // wider than the frame, which gives bars at the sides
     EXPECT_LE(difference(picture, 40, 0, 320, 240), 2);
-    observer_->resize(160, 400); // higher: bars above and below
+    observer_->resize(160, 400); // higher than the frame, which gives bars above and below
     EXPECT_LE(difference(picture, 0, 140, 160, 120), 2);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A virtual X server for one test, and a client that inspects windows.
+// Starts a virtual X server for one test, and provides an X client that inspects the sink's window.
 #pragma once
 
 #include <X11/Xlib.h>
@@ -39,7 +39,7 @@ public:
             prctl(PR_SET_PDEATHSIG, SIGKILL);
             const int nowhere = open("/dev/null", O_WRONLY);
             dup2(nowhere, STDERR_FILENO);
-            // When it is ready, it writes the display number that it chose to the pipe.
+            // With -displayfd, Xvfb chooses a free display number and writes it to the pipe when it is ready.
             execl(xvfb_path, "Xvfb", "-displayfd", number_fd.c_str(), "-screen", "0", screen.c_str(), "-nolisten",
                   "tcp", nullptr);
             _exit(127);
@@ -72,12 +72,12 @@ struct Screenshot {
     const std::uint8_t *pixel(int x, int y) const { return &bgr[3 * (static_cast<std::size_t>(y) * width + x)]; }
 };
 
-// Inspects the single window on the screen.
+// Connects to the X server as a second client and inspects the only window on the screen.
 class XObserver {
 public:
     explicit XObserver(const std::string &display) : display_(XOpenDisplay(display.c_str())) {
         if (!display_)
-            throw std::runtime_error("cannot connect to " + display);
+            throw std::runtime_error("cannot connect to the X display " + display);
     }
     ~XObserver() { XCloseDisplay(display_); }
     XObserver(const XObserver &) = delete;
@@ -122,7 +122,7 @@ public:
         }
         XSync(display_, False);
     }
-    void close_window() const { // like a window manager
+    void close_window() const { // asks the window to close, as a window manager does
         XEvent event{};
         event.xclient.type = ClientMessage;
         event.xclient.window = find();

@@ -43,13 +43,13 @@ Bytes bytes_of(const cv::Mat &image) {
     return bytes;
 }
 
-// Runs ffmpeg in `folder`; the arguments need no shell quoting.
+// Runs ffmpeg in `folder`. The shell splits `arguments`, so they must not need quoting.
 void ffmpeg(const fs::path &folder, const std::string &arguments) {
     const std::string command = "cd '" + folder.string() + "' && " ARHOST_FFMPEG " -nostdin -v error -y " + arguments;
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
 }
 
-// The frames of a file, as the ffmpeg command decodes them.
+// Decodes a file with the ffmpeg command and returns its frames.
 std::vector<Bytes> reference_frames(const fs::path &file, const std::string &pixel_format, std::size_t frame_bytes) {
     const fs::path raw = file.string() + ".raw";
     ffmpeg(file.parent_path(), "-noautorotate -i " + file.filename().string() +
@@ -73,7 +73,7 @@ cv::Mat colourful(int width, int height, int seed = 0) {
     return image;
 }
 
-// n numbered images; number i shows colourful(…, i).
+// Writes one image for each of `numbers`. Image n is the result of colourful() with the seed n.
 void write_images(const fs::path &folder, const std::vector<int> &numbers, int width = 48, int height = 32) {
     for (const int n : numbers) {
         std::string digits = std::to_string(n);
@@ -86,7 +86,7 @@ std::string pattern_in(const ScratchFolder &folder) {
     return (folder.path() / "image_%04d.png").string();
 }
 
-// A status and a message, compared together.
+// Checks that the source fails to start with this status, and with one error message that contains all of `words`.
 void expect_refusal(const std::map<std::string, std::string> &options, arhost_status status,
                     const std::vector<std::string> &words, arhost_source_setup setup = {}) {
     SourceUnderTest source("source_file");
@@ -94,7 +94,7 @@ void expect_refusal(const std::map<std::string, std::string> &options, arhost_st
     const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
     for (const std::string &word : words)
         EXPECT_THAT(errors, HasSubstr(word));
-    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "one message, not:\n" << errors;
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "expected one error message, got:\n" << errors;
 }
 
 arhost_source_setup from(std::uint64_t sequence) {
@@ -103,10 +103,10 @@ arhost_source_setup from(std::uint64_t sequence) {
     return setup;
 }
 
-// A scratch folder with a short video in it.
+// A short video in a scratch folder.
 class VideoFile {
 public:
-    // `format`: what follows the input in the ffmpeg command.
+    // `format` contains the ffmpeg options for the output file; `picture` names the lavfi source of the pictures.
     VideoFile(const std::string &name, const std::string &format, const std::string &size = "96x64", int frames = 40,
               const std::string &picture = "testsrc2")
         : file_(folder_.path() / name) {
@@ -127,7 +127,7 @@ const char *const h264 = "-c:v libx264 -preset veryfast -g 12 -bf 2 -pix_fmt yuv
 
 } // namespace
 
-// ---- images ----
+// ---- Images ----------------------------------------------------------------------------------------
 
 TEST(ImageSequence, MatchesOpenCvByteForByteOnARealSequence) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
@@ -169,7 +169,7 @@ TEST(ImageSequence, EndsBeforeAMissingFileWithAWarning) {
     write_images(folder.path(), {0, 1, 2, 5});
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
-    EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end
+    EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end status
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("image_0003.png' is missing"));
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to number 5"));
 }
@@ -250,7 +250,7 @@ TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
         EXPECT_EQ(frames[n].info.capture_ns, std::llround(static_cast<double>(n) * 1e9 / 30));
     }
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}}), ARHOST_STATUS_OK);
-    EXPECT_EQ(source.properties().frame_count, 0u) << "endless";
+    EXPECT_EQ(source.properties().frame_count, 0u) << "a loop has no end";
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"frames", "2"}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read_all().size(), 3u);
@@ -258,7 +258,7 @@ TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
 
 TEST(SingleImage, IsDeliveredOnceOrFramesTimes) {
     ScratchFolder folder;
-    const fs::path file = folder.path() / "100%.png"; // an existing file is not a numbered name
+    const fs::path file = folder.path() / "100%.png"; // the name of an existing file is not parsed as a pattern
     cv::imwrite(file.string(), colourful(33, 21));
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_STATUS_OK) << source.log();
@@ -301,7 +301,7 @@ TEST(SingleImage, ConvertsSixteenBitsToEightAndDropsAlpha) {
     EXPECT_EQ(source.read(0).bytes, bytes_of(colour));
 }
 
-// ---- unreadable input ----
+// ---- Unreadable input ------------------------------------------------------------------------------
 
 TEST(Refusal, NamesAMissingFileAndListsTheFolder) {
     ScratchFolder folder;
@@ -381,7 +381,7 @@ TEST(Refusal, ReportsMissingPermission) {
     fs::permissions(file, fs::perms::none);
     fs::permissions(folder.path(), fs::perms::all);
     const bool root = geteuid() == 0;
-    ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // root may read everything
+    ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // permissions do not limit root
     expect_refusal({{"path", file.string()}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "Permission denied"});
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
 }
@@ -418,7 +418,7 @@ TEST(Refusal, ReportsACameraOfAnotherSize) {
                    {"48×32", "calibration is for 640×480"}, setup);
 }
 
-// ---- videos ----
+// ---- Videos ----------------------------------------------------------------------------------------
 
 TEST(Video, PassesPlanarYuvUnchanged) {
     ARHOST_REQUIRE_FFMPEG();
@@ -504,7 +504,7 @@ TEST(Video, OddSizesAndOtherFormatsBecomeBgrWithCorrectColours) {
                "96x64", 96, 64},
           Case{"rgb.mkv", "-c:v ffv1 -pix_fmt bgr0", "96x64", 96, 64}}) {
         SCOPED_TRACE(c.name);
-        // One colour, so that neither the scaler's filter nor chroma siting matters.
+        // The picture has one colour, so the scaler's filter and the chroma siting do not affect it.
         const VideoFile video(c.name, c.codec, c.size, 1, "color=c=0xC86432");
         SourceUnderTest source("source_file");
         ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
@@ -531,7 +531,7 @@ TEST(Video, RgbIsLossless) {
         EXPECT_EQ(source.read(n).bytes, expected.at(n));
 }
 
-// The reference is ffmpeg's rotation.
+// Compares the frames with those that the ffmpeg command rotates.
 TEST(Video, AppliesTheRotationOfItsMetadata) {
     ARHOST_REQUIRE_FFMPEG();
     for (const char *codec : {"-c:v libx264 -pix_fmt yuv420p", "-c:v libx264rgb -qp 0 -pix_fmt rgb24"})
@@ -579,7 +579,7 @@ TEST(Video, ARestartAtAnyFrameGivesTheSameFrames) {
         }
         ASSERT_EQ(source.start(video.options(), from(40)), ARHOST_STATUS_OK);
         EXPECT_EQ(source.read(40).status, ARHOST_STATUS_END);
-        EXPECT_EQ(source.read(39).bytes, whole[39].bytes) << "also back from the end";
+        EXPECT_EQ(source.read(39).bytes, whole[39].bytes) << "reading an earlier frame after the end failed";
         EXPECT_EQ(source.read(2).bytes, whole[2].bytes);
     }
 }
@@ -652,7 +652,8 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
         ASSERT_LT(frames.size(), 38u);
         EXPECT_EQ(frames.back().status, ARHOST_STATUS_END_TRUNCATED);
         const std::size_t good = frames.size() - 1;
-        // The last few may have gaps: pictures that are stored after the cut.
+        // Near the cut, some frames may be missing, because a file may store a frame later than frames that follow
+        // it. Therefore frames are compared by their capture times.
         for (std::size_t n = 0, same = 0; n < good; ++n, ++same) {
             while (whole.at(same).info.capture_ns < frames[n].info.capture_ns)
                 ++same;
@@ -668,7 +669,7 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
 TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
-    ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // its header says 80
+    ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // the header of copied.avi says 80 frames
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_STATUS_OK) << source.log();
     const auto frames = source.read_all();
@@ -679,7 +680,7 @@ TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
 
 TEST(Video, WithoutIndexNamesWhatIsMissing) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264); // its index is at the end
+    const VideoFile video("film.mp4", h264); // the file's index is at its end
     Bytes half = bytes_of(video.file());
     half.resize(half.size() / 2);
     write_bytes(video.file(), half);
@@ -741,7 +742,7 @@ TEST(Video, StopsDecodingWhenCancelled) {
     EXPECT_EQ(source.start(video.options(), from(39)), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-// ---- in real time ----
+// ---- Live mode: frames are delivered in real time --------------------------------------------------
 
 namespace {
 
@@ -805,6 +806,6 @@ TEST(Paced, StopsWaitingWhenCancelled) {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         source.plugin().cancel();
     });
-    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // due after 20 s
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // frame 1 is due after 20 s
     canceller.join();
 }

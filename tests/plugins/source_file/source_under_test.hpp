@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Drives a source like arhost-worker; frames are returned without row padding.
+// Calls a source's functions like arhost-worker does. Returns frames without row padding.
 #pragma once
 
 #include "plugin_under_test.hpp"
@@ -17,7 +17,7 @@ namespace arhost::test {
 struct SourceFrame {
     arhost_status status = 0;
     arhost_frame_info info{};
-    std::vector<std::uint8_t> bytes; // plane after plane, row after row
+    std::vector<std::uint8_t> bytes; // the planes in order, each with its rows in order
 };
 
 class SourceUnderTest {
@@ -25,7 +25,8 @@ public:
     explicit SourceUnderTest(const std::string &id) : plugin_(id), source_(plugin_.functions<arhost_source>()) {}
     ~SourceUnderTest() { stop(); }
 
-    // Creates and starts; returns the first failure.
+    // Creates an instance of the plugin and starts it. Returns the status of the first call that fails, else
+    // ARHOST_STATUS_OK.
     arhost_status start(const std::map<std::string, std::string> &options, arhost_source_setup setup = {}) {
         stop();
         if (const arhost_status status = plugin_.create(options); status != ARHOST_STATUS_OK)
@@ -40,7 +41,8 @@ public:
         if (running_) {
             arhost_frame_format again = properties_.format;
             EXPECT_TRUE(arhost_frame_layout(&again));
-            EXPECT_EQ(again.byte_size, properties_.format.byte_size) << "the format has no plane layout";
+            EXPECT_EQ(again.byte_size, properties_.format.byte_size)
+                << "the source must set the layout of the planes";
             buffer_.emplace(properties_.format.byte_size);
         }
         return status;
@@ -54,7 +56,7 @@ public:
         SourceFrame frame;
         frame.info.struct_size = sizeof frame.info;
         frame.status = source_.read(plugin_.instance(), &buffer, &frame.info);
-        EXPECT_TRUE(buffer_->intact()) << "wrote past the slot at frame " << sequence;
+        EXPECT_TRUE(buffer_->intact()) << "the source wrote beyond the slot at frame " << sequence;
         if (frame.status != ARHOST_STATUS_OK)
             return frame;
         for (std::uint32_t p = 0; p < format.plane_count; ++p) {
@@ -67,7 +69,7 @@ public:
         return frame;
     }
 
-    // Up to and including the first frame whose status is not ARHOST_STATUS_OK.
+    // Reads frames up to and including the first whose status is not ARHOST_STATUS_OK, but at most `at_most`.
     std::vector<SourceFrame> read_all(std::uint64_t from = 0, std::size_t at_most = 1000) {
         std::vector<SourceFrame> frames;
         do
@@ -88,7 +90,7 @@ public:
     PluginUnderTest &plugin() { return plugin_; }
     std::string log() const { return plugin_.log(); }
 
-    // The messages of one severity.
+    // Returns the log messages of one severity.
     std::string log(arhost_severity severity) const {
         std::string found, line;
         for (const char c : plugin_.log()) {

@@ -26,7 +26,8 @@ namespace {
 using arhost::test::GuardedBuffer;
 using arhost::test::PluginUnderTest;
 using Options = std::map<std::string, std::string>;
-using Corners = std::array<cv::Point2d, 4>; // of the upright print: top left, top right, bottom right, bottom left
+using Corners =
+    std::array<cv::Point2d, 4>; // order in the upright print: top left, top right, bottom right, bottom left
 using testing::HasSubstr;
 
 arhost_intrinsics camera_of(int width, int height, double focal, double cx, double cy,
@@ -45,7 +46,7 @@ arhost_intrinsics camera_of(int width, int height, double focal, double cx, doub
     return camera;
 }
 
-// Small, to keep the tests fast.
+// The images are small, to keep the tests fast.
 const std::vector<double> brown4{-0.21, 0.11, 0.0015, -0.001};
 const arhost_intrinsics small_camera = camera_of(640, 480, 560, 330.2, 231.7, ARHOST_DISTORTION_BROWN, brown4);
 const arhost_intrinsics quick_camera = camera_of(320, 240, 280, 164.8, 115.6, ARHOST_DISTORTION_BROWN, brown4);
@@ -96,10 +97,10 @@ public:
                                 format.stride[0])
                             .clone();
         frame.intact = slot.intact();
-        for (uint32_t y = 0; y < format.height; ++y) // row padding and grey plane
+        for (uint32_t y = 0; y < format.height; ++y) // row padding
             for (uint32_t x = 3 * format.width; x < format.stride[0]; ++x)
                 frame.intact &= slot.data()[y * format.stride[0] + x] == 0xa5;
-        for (uint64_t i = format.grey_offset; i < format.byte_size; ++i)
+        for (uint64_t i = format.grey_offset; i < format.byte_size; ++i) // grey plane
             frame.intact &= slot.data()[i] == 0xa5;
         return frame;
     }
@@ -116,7 +117,7 @@ bool same(const cv::Mat &a, const cv::Mat &b) {
     return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0;
 }
 
-// Projects points of the marker's plane (x right, y up, mm) with OpenCV.
+// Projects points of the marker's plane (x to the right, y up, in mm) to pixels with OpenCV.
 std::vector<cv::Point2d> project(const Frame &frame, const arhost_intrinsics &camera,
                                  const std::vector<cv::Point3d> &points) {
     const double *m = frame.info.true_mt;
@@ -144,11 +145,11 @@ Corners true_corners(const Frame &frame, const arhost_intrinsics &camera, double
     return {pixels[0], pixels[1], pixels[2], pixels[3]};
 }
 
-// Intersections of the lines that best fit the four distorted sides: a detector that fits straight lines finds these
-// instead of the true corners.
+// Fits a straight line to each of the four sides, which the lens distorts, and returns the intersections of these
+// lines. A detector that fits straight lines finds these intersections instead of the true corners.
 Corners line_corners(const Frame &frame, const arhost_intrinsics &camera, double side_mm) {
     const auto corners = corner_points(side_mm);
-    std::array<cv::Point3d, 4> lines; // homogeneous
+    std::array<cv::Point3d, 4> lines; // in homogeneous coordinates
     for (int side = 0; side < 4; ++side) {
         std::vector<cv::Point3d> points;
         for (double t = 0.05; t < 0.96; t += 0.05)
@@ -171,7 +172,7 @@ cv::Mat grey_of(const cv::Mat &picture) {
     return grey;
 }
 
-// Detects a tag with AprilTag's library.
+// Detects a tag with the AprilTag library.
 std::optional<Corners> find_april_tag(const cv::Mat &picture, apriltag_family_t *family, int id) {
     cv::Mat grey = grey_of(picture);
     const std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t *)> detector(apriltag_detector_create(),
@@ -186,7 +187,7 @@ std::optional<Corners> find_april_tag(const cv::Mat &picture, apriltag_family_t 
         zarray_get(found, i, static_cast<void *>(&detection));
         if (detection->id != id)
             continue;
-        Corners upright; // the library starts at the bottom left, with pixel centres at +0.5
+        Corners upright; // the library's first corner is the bottom left one; its pixel centres are at +0.5
         for (int k = 0; k < 4; ++k)
             upright[3 - k] = {detection->p[k][0] - 0.5, detection->p[k][1] - 0.5};
         corners = upright;
@@ -210,8 +211,9 @@ std::optional<Corners> find_aruco(const cv::Mat &picture, arhost::aruco::Predefi
     return {};
 }
 
-// Outward offsets in px of the border's edge from its projection, at many points along the four sides: the position
-// that splits the area between black and white codes. Independent of any detector.
+// Measures the position of the border's outer edge without a detector. At many points along the four sides, returns
+// the distance in px, positive outwards, of the edge in the image from its projection. The edge is at the position
+// where a sharp step from black to white would give the same mean grey as the image.
 std::vector<double> edge_offsets(const Frame &frame, const arhost_intrinsics &camera, double side_mm) {
     const cv::Mat grey = grey_of(frame.picture);
     const auto sample = [&](cv::Point2d p) {
@@ -222,7 +224,7 @@ std::vector<double> edge_offsets(const Frame &frame, const arhost_intrinsics &ca
                b * ((1 - a) * at(y + 1, x) + a * at(y + 1, x + 1));
     };
     const auto corners = corner_points(side_mm);
-    std::vector<cv::Point3d> points; // along the sides, each followed by one slightly further
+    std::vector<cv::Point3d> points; // pairs of nearby points on a side
     for (int side = 0; side < 4; ++side)
         for (double t = 0.1; t < 0.91; t += 0.04)
             for (const double further : {0.0, 0.01})
@@ -242,7 +244,7 @@ std::vector<double> edge_offsets(const Frame &frame, const arhost_intrinsics &ca
     return offsets;
 }
 
-// Corner errors over many frames.
+// Mean error and mean offset of the corners over many frames.
 struct Error {
     double mean_px = 0;
     cv::Point2d bias;
@@ -362,7 +364,7 @@ TEST_P(EveryDictionary, IsPrintedUprightAsInOpenCv) {
     ASSERT_TRUE(found);
     const Corners truth = true_corners(frame, quick_camera, 80);
     for (int i = 0; i < 4; ++i)
-        EXPECT_LT(cv::norm((*found)[i] - truth[i]), 1.5) << "corner " << i; // unrefined
+        EXPECT_LT(cv::norm((*found)[i] - truth[i]), 1.5) << "corner " << i; // the detector does not refine corners
 }
 
 TEST(SourceSynthetic, KeepsTheWholeMarkerInViewOnEveryPath) {
@@ -480,11 +482,11 @@ TEST(SourceSynthetic, CardCoversTheMarkerInTheConfiguredFrames) {
     for (const int sequence : {30, 32, 33}) {
         const Frame frame = source.read(sequence);
         EXPECT_FALSE(find_tag36h11(frame.picture)) << sequence;
-        EXPECT_EQ(frame.info.has_truth, 1); // the pose is still known
+        EXPECT_EQ(frame.info.has_truth, 1); // the source still reports the true pose
     }
     Source bare;
     EXPECT_TRUE(same(source.read(15).picture, bare.read(15).picture));
-    EXPECT_FALSE(same(source.read(25).picture, bare.read(25).picture)); // it slides in
+    EXPECT_FALSE(same(source.read(25).picture, bare.read(25).picture)); // the card slides in
 }
 
 TEST(SourceSynthetic, EndsAfterItsFramesEvenIfReadAgain) {
@@ -544,7 +546,8 @@ TEST_P(EverySize, FillsTheFrameAndNothingBeyondIt) {
             const Frame frame = source.read(sequence);
             ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
             EXPECT_TRUE(frame.intact);
-            // All pixels are written: the initial grey, 0xa5 in all channels, is rare.
+            // The slot initially contains 0xa5 in all channels. Few pixels may have this colour if the source writes
+            // all pixels.
             cv::Mat unwritten;
             cv::inRange(frame.picture, cv::Scalar::all(0xa5), cv::Scalar::all(0xa5), unwritten);
             EXPECT_LE(cv::countNonZero(unwritten), 2 + static_cast<int>(frame.picture.total()) / 50);
@@ -553,7 +556,8 @@ TEST_P(EverySize, FillsTheFrameAndNothingBeyondIt) {
 }
 
 TEST(SourceSynthetic, IsBlackWhereNoLightPassesTheLens) {
-    // The image circle lies inside the image: the polynomial is not monotonic beyond 1.2 rad.
+    // The fisheye polynomial is not monotonic beyond 1.2 rad. The circle at this angle is inside the image, so the
+    // pixels beyond it have no ray.
     const arhost_intrinsics camera =
         camera_of(640, 480, 200, 319.5, 239.5, ARHOST_DISTORTION_FISHEYE, {-0.23, 0, 0, 0});
     Source source(Options{{"noise", "0"}}, &camera);
@@ -599,7 +603,7 @@ TEST(SourceSynthetic, WaitsForEachFrameWhenPaced) {
         const Frame frame = source.read(sequence + ahead);
         ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         ahead += frame.info.skipped;
-        // Media time; no frame arrives before it.
+        // capture_ns is the media time, and no frame may arrive before this time.
         EXPECT_EQ(frame.info.capture_ns, std::llround(static_cast<double>(sequence + ahead) * 1e9 / 20));
         EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::nanoseconds(frame.info.capture_ns));
     }
@@ -608,7 +612,7 @@ TEST(SourceSynthetic, WaitsForEachFrameWhenPaced) {
 TEST(SourceSynthetic, SkipsFramesIfTheReaderIsLate) {
     Source source(Options{{"frames", "0"}}, &tiny_camera, true, 100);
     ASSERT_EQ(source.read(0).status, ARHOST_STATUS_OK);
-    std::this_thread::sleep_for(std::chrono::milliseconds(75)); // at least frames 1 to 6 are overdue
+    std::this_thread::sleep_for(std::chrono::milliseconds(75)); // frames 1 to 6, and maybe more, are overdue
     const Frame late = source.read(1);
     EXPECT_GE(late.info.skipped, 5u);
     EXPECT_EQ(late.info.capture_ns, static_cast<int64_t>(1 + late.info.skipped) * 10'000'000);
@@ -621,7 +625,7 @@ TEST(SourceSynthetic, StopsWaitingWhenCancelled) {
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
         source.cancel();
     });
-    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // due after 100 s
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CANCELLED); // frame 1 is due after 100 s
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests without a camera: error messages and damaged pictures. vivid_test.cpp captures.
+// Tests that need no camera: error messages and the decoding of Motion-JPEG, including damaged pictures.
+// vivid_test.cpp tests capturing.
 #include "../source_file/source_under_test.hpp"
 
 #include "jpeg.hpp"
@@ -30,11 +31,11 @@ std::string refusal(const std::map<std::string, std::string> &options, arhost_st
     SourceUnderTest source("source_v4l2");
     EXPECT_EQ(source.start(options), expected) << source.log();
     const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
-    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "one message, not:\n" << errors;
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "expected one error message, got:\n" << errors;
     return errors;
 }
 
-// A smooth picture: red grows to the right, green downwards.
+// Returns a smooth BGR picture in which red increases to the right and green increases downwards.
 Bytes smooth_bgr(int width, int height) {
     Bytes pixels;
     for (int y = 0; y < height; ++y)
@@ -66,7 +67,7 @@ struct Decoded {
     }
 };
 
-// Decodes with the format of `like`, the first picture of the stream.
+// Decodes `jpeg` as a later picture of a stream whose first picture is `like`, which determines the format.
 Decoded decode(const Bytes &jpeg, const Bytes &like) {
     JpegDecoder decoder;
     Decoded result;
@@ -81,7 +82,7 @@ Decoded decode(const Bytes &jpeg, const Bytes &like) {
     return result;
 }
 
-// Without the segments that carry `marker` (0xc4: the Huffman tables).
+// Returns a copy of the JPEG picture without its segments of type `marker`. 0xc4 are the Huffman tables.
 Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
     Bytes result(jpeg.begin(), jpeg.begin() + 2);
     std::size_t at = 2;
@@ -98,7 +99,7 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 
 } // namespace
 
-// ---- messages ----
+// ---- Messages --------------------------------------------------------------------------------------
 
 TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
     const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -129,7 +130,7 @@ TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
     fs::permissions(folder.path() / "video0", fs::perms::none);
     fs::permissions(folder.path(), fs::perms::all);
     const bool root = geteuid() == 0;
-    ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // root may open everything
+    ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // permissions do not limit root
     const std::string text =
         refusal({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
@@ -150,7 +151,7 @@ TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
     EXPECT_EQ(descriptor.needs[1], nullptr);
 }
 
-// ---- Motion-JPEG ----
+// ---- Motion-JPEG -----------------------------------------------------------------------------------
 
 TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
     const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
@@ -159,7 +160,7 @@ TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
     ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_I420);
     EXPECT_EQ(frame.format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
     EXPECT_EQ(frame.format.yuv_range, ARHOST_YUV_RANGE_FULL);
-    // The JFIF formula, applied to the original picture.
+    // The expected values follow from the original picture by the JFIF formula.
     const Bytes pixels = smooth_bgr(96, 64);
     for (std::size_t y = 0; y < 64; ++y)
         for (std::size_t x = 0; x < 96; ++x) {
@@ -238,7 +239,7 @@ TEST(Jpeg, WithChangedSizeOrSubsamplingIsDamaged) {
     EXPECT_THAT(decode(make_jpeg(192, 128, TJSAMP_420), first).fault, HasSubstr("192×128"));
     EXPECT_THAT(decode(make_jpeg(96, 64, TJSAMP_422), first).fault, HasSubstr("subsampling"));
     EXPECT_TRUE(decode(make_jpeg(96, 64, TJSAMP_420), make_jpeg(96, 64, TJSAMP_422)).good)
-        << "all of them convert to BGR";
+        << "both subsamplings are decoded to BGR, so the format stays the same";
 }
 
 TEST(Jpeg, GarbageIsRejected) {
@@ -252,7 +253,7 @@ TEST(Jpeg, GarbageIsRejected) {
     EXPECT_FALSE(JpegDecoder().describe({}, format));
     EXPECT_FALSE(decode(garbage, whole).good);
     EXPECT_FALSE(decode({}, whole).good);
-    // The decoder must not write outside the slot, wherever the damage is.
+    // Wherever a picture is damaged, the decoder must not write outside the slot.
     for (int round = 0; round < 300; ++round) {
         Bytes damaged = whole;
         for (int i = 0; i < 8; ++i)

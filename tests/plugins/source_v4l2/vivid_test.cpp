@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Captures from the kernel's virtual camera `vivid`, and injects its faults. Run it in the VM:
+// Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
 #include "../source_file/source_under_test.hpp"
 
@@ -27,13 +27,13 @@ namespace {
 
 const char *const device = "/dev/video0";
 
-// vivid's control ids; its header is not installed.
+// The ids of vivid's controls. The kernel header that defines them is not installed.
 enum : std::uint32_t {
-    test_pattern = 0x00f0f000,     // 1: 100% colour bars
-    osd_text_mode = 0x00f0f001,    // 2: no text over the picture
-    timestamp_source = 0x00f0f018, // 0: end of frame, 1: start of exposure
-    colorspace = 0x00f0f019,       // 1: Rec. 709, 2: sRGB
-    quantization = 0x00f0f01c,     // 1: full range
+    test_pattern = 0x00f0f000,     // 1 selects 100 % colour bars
+    osd_text_mode = 0x00f0f001,    // 2 disables the text over the picture
+    timestamp_source = 0x00f0f018, // 0 is the end of the frame, 1 the start of exposure
+    colorspace = 0x00f0f019,       // 1 is Rec. 709, 2 is sRGB
+    quantization = 0x00f0f01c,     // 1 is full range
     percentage_of_dropped_buffers = 0x00f0f040,
     disconnect = 0x00f0f041,
     inject_buffer_error = 0x00f0f042,
@@ -53,7 +53,8 @@ protected:
             << device << " is not vivid; run this program with tools/vm/run-in-vm";
         set(test_pattern, 1);
         set(osd_text_mode, 2);
-        // vivid stamps the end of a frame: about 30 ms after it delivers it.
+        // The time stamps must be those of the start of exposure: vivid's time stamps for the end of a frame are
+        // about 30 ms later than the delivery of the frame.
         set(timestamp_source, 1);
         set(colorspace, 2);
         set(quantization, 0);
@@ -73,7 +74,7 @@ protected:
         controls.controls = &control;
         ASSERT_EQ(ioctl(fd_, VIDIOC_S_EXT_CTRLS, &controls), 0) << "control " << std::hex << id;
     }
-    // Small and fast, since the machine is emulated.
+    // Captures small pictures by default, because the virtual machine is emulated and slow.
     arhost_status start(double fps = 60, std::map<std::string, std::string> options = {}, bool live = true) {
         options.try_emplace("device", device);
         if (!options.contains("width")) {
@@ -116,7 +117,7 @@ std::size_t device_mappings() {
     return 0;
 }
 
-// 8-bit YUV to RGB by the formula of the standard.
+// Converts 8-bit YUV to RGB by the formula of ITU-R BT.601 and BT.709; `kr` and `kb` select the standard.
 std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb, bool full) {
     const double luma = full ? y : (y - 16) * 255 / 219;
     const double scale = full ? 1 : 255.0 / 224;
@@ -157,7 +158,7 @@ TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
         EXPECT_EQ(source_.format().yuv_range, c.range);
         const SourceFrame frame = source_.read(0);
         ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-        // White, yellow, cyan, green, magenta, red, blue, black; eight bars over 320 px.
+        // The eight colour bars over 320 px: white, yellow, cyan, green, magenta, red, blue and black.
         const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
                                                          {255, 255, 0},
                                                          {0, 255, 255},
@@ -202,9 +203,9 @@ TEST_F(Vivid, LiveModeDeliversTheNewestFrameAndCountsTheOthers) {
     const std::int64_t asked = monotonic_ns();
     const SourceFrame frame = source_.read(1);
     ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-    EXPECT_GE(frame.info.skipped, 2u) << "the driver had four buffers to fill";
-    // The driver then ran out of buffers; now they are queued again.
-    EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "all older frames were drained";
+    EXPECT_GE(frame.info.skipped, 2u) << "the driver filled its four buffers in the meantime";
+    // The driver then had no free buffer. Reading frame 1 has queued the buffers again.
+    EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "an old frame was delivered";
 }
 
 TEST_F(Vivid, LockstepDeliversEveryFrameInOrder) {
@@ -213,7 +214,8 @@ TEST_F(Vivid, LockstepDeliversEveryFrameInOrder) {
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
     for (std::uint64_t n = 1; n < 4; ++n)
-        EXPECT_LT(source_.read(n).info.capture_ns, asked - 200'000'000) << "the oldest in the driver's queue";
+        EXPECT_LT(source_.read(n).info.capture_ns, asked - 200'000'000)
+            << "expected the oldest frame in the driver's queue";
 }
 
 TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
@@ -229,7 +231,7 @@ TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
         last = frame.info.capture_ns;
     }
     EXPECT_GT(skipped, 5u);
-    // Delivered and lost frames add up to the elapsed time.
+    // At 50 fps, a frame takes 20 ms. The delivered and the skipped frames together must match the elapsed time.
     EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
 }
 
@@ -327,7 +329,7 @@ TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
-    ASSERT_EQ(start(1), ARHOST_STATUS_OK) << source_.log(); // a frame a second
+    ASSERT_EQ(start(1), ARHOST_STATUS_OK) << source_.log(); // one frame per second
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     std::thread canceller([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
@@ -353,7 +355,7 @@ TEST_F(Vivid, ReportsAnUnplugAndReconnects) {
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
     source_.stop();
     EXPECT_EQ(device_mappings(), 0u);
-    // vivid reconnects once all its users have closed it.
+    // vivid reconnects when all programs have closed the device.
     close(fd_);
     fd_ = open(device, O_RDWR | O_CLOEXEC);
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();

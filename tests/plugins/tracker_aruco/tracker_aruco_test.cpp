@@ -12,7 +12,7 @@ using testing::HasSubstr;
 const std::vector<TrackerCase> cases{{"Defaults", "tracker_aruco", {}, {}}};
 INSTANTIATE_TEST_SUITE_P(Aruco, FiducialTracker, testing::ValuesIn(cases), case_name);
 
-// AprilTag's name of the family; empty for other dictionaries.
+// Returns the AprilTag library's name of the dictionary, or "" if it is not an AprilTag family.
 std::string april_tag_family(const std::string &dictionary) {
     const std::string prefix = "DICT_APRILTAG_";
     return dictionary.starts_with(prefix) ? "tag" + dictionary.substr(prefix.size()) : "";
@@ -33,7 +33,7 @@ TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
     Tracker tracker("tracker_aruco", {{"dictionary", dictionary}});
     ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_STATUS_OK) << tracker.log();
-    // AprilTags are drawn by AprilTag's library, the others by OpenCV.
+    // Markers of AprilTag families are drawn by the AprilTag library, other markers by OpenCV.
     const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
         const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
@@ -47,7 +47,7 @@ TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
 
 struct Refinement {
     const char *name;
-    double mean_px, bias_px; // bounds
+    double mean_px, bias_px; // upper bounds of the mean error and the bias
 };
 
 void PrintTo(const Refinement &refinement, std::ostream *out) {
@@ -185,7 +185,7 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     EXPECT_NEAR(markers[0].mt[14], -700, 35); // "d7": 70 cm
 }
 
-// OpenCV's reference corners, which are unrefined and in whole pixels.
+// Compares the corners with OpenCV's reference corners, which are unrefined and rounded to whole pixels.
 void expect_opencv_corners(const std::string &photo, Options dictionary, const std::string &refinement,
                            double tolerance_px) {
     dictionary["corner_refinement"] = refinement;
@@ -217,7 +217,7 @@ TEST(ArucoTracker, FindsTheMarkersOfOpenCvsDocumentation) {
     }
 
     Tracker tracker("tracker_aruco", {{"dictionary_file", file}});
-    std::vector<int> ids; // several occur more than once
+    std::vector<int> ids; // several ids occur more than once
     for (const auto &[id, marker] :
          markers_in(tracker, shared_data("markers/opencv_doc/diamondmarkers.png"), ids_to(35)))
         ids.push_back(id);
