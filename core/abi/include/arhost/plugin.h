@@ -63,10 +63,9 @@ enum {
     ARHOST_STATUS_END_TRUNCATED = 3, /* the source's input is truncated; all readable frames were delivered */
 
     ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* contract violation by the caller */
-    ARHOST_STATUS_ERROR_CONFIGURATION = -2,    /* unusable options, scene or calibration; the call is not retried */
-    ARHOST_STATUS_ERROR_UNSUPPORTED =
-        -3,                      /* valid, but not supported by this plugin or machine; the call is not retried */
-    ARHOST_STATUS_ERROR_IO = -4, /* file or device error */
+    ARHOST_STATUS_ERROR_CONFIGURATION = -2,    /* unusable options, scene or calibration; not retried */
+    ARHOST_STATUS_ERROR_UNSUPPORTED = -3,      /* valid, but unsupported by this plugin or machine; not retried */
+    ARHOST_STATUS_ERROR_IO = -4,               /* file or device error */
     ARHOST_STATUS_ERROR_OUT_OF_MEMORY = -5,
     ARHOST_STATUS_ERROR_DEVICE_LOST = -6, /* camera unplugged, GPU reset; a restart may help */
     ARHOST_STATUS_ERROR_CANCELLED = -7,   /* the call returned early because host->cancelled returned non-zero */
@@ -99,8 +98,8 @@ typedef struct arhost_host {
     const char *version;  /* version of the host, such as "0.1.0" */
     void *context;        /* private to the host */
 
-    /* [any] Logs one message, without a trailing newline. Never blocks: drops the message if the host cannot keep up.
-     */
+    /* [any] Logs one message, without a trailing newline. Never blocks: drops the message if the host cannot
+     * keep up. */
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
     /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`: call it at

@@ -92,10 +92,10 @@ enum {
     ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX specular over Lambert diffuse */
 };
 
-/* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE.
- * The texture's value multiplies the corresponding constant of the material; it counts as 1 on a geometry without
- * texcoords. A model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no emission.
- */
+/* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The
+ * texture's value multiplies the corresponding constant of the material; it counts as 1 on a geometry without
+ * texcoords. A model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no
+ * emission. */
 typedef struct arhost_material {
     arhost_material_model model;
     uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha is compared with alpha_cutoff */
@@ -110,8 +110,7 @@ typedef struct arhost_material {
     /* Metallic-roughness. */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
-    uint32_t
-        normal_texture; /* tangent-space normal, each component 2 · texel − 1: R along +u, G along −v, B outwards */
+    uint32_t normal_texture; /* tangent-space normal = 2 · texel − 1: R along +u, G along −v, B outwards */
     uint32_t emission_texture;
 
     /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
@@ -222,9 +221,9 @@ typedef struct arhost_light {
     float intensity[3];         /* linear RGB; see arhost_falloff */
     float axis_u[3], axis_v[3]; /* mm; half sides, perpendicular to each other and to `direction` */
     float radius;               /* mm */
-    float cosine_inner,
-        cosine_outer; /* cosines of the half angles of a spot light: full intensity inside the inner cone,
-                         0 outside the outer cone, smooth in between; cosine_inner >= cosine_outer */
+    /* Cosines of the half angles of a spot light: full intensity inside the inner cone, 0 outside the outer cone,
+     * smooth in between; cosine_inner >= cosine_outer. */
+    float cosine_inner, cosine_outer;
 } arhost_light;
 
 /* Environment map in equirectangular projection: a unit direction (x, y, z) in environment coordinates, y up, maps to
