@@ -20,10 +20,8 @@ enum {
     ARHOST_PIXEL_FORMAT_RGB8 = 2,  /* 1 plane: R G B */
     ARHOST_PIXEL_FORMAT_BGR8 = 3,  /* 1 plane: B G R */
     ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; even width */
-    ARHOST_PIXEL_FORMAT_NV12 =
-        5, /* 2 planes: Y; interleaved U V with half the width and height. Even width and height */
-    ARHOST_PIXEL_FORMAT_I420 =
-        6 /* 3 planes: Y, U, V; U and V with half the width and height. Even width and height */
+    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y; U V interleaved, subsampled 2×2. Even width and height */
+    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V; U and V subsampled 2×2. Even width and height */
 };
 
 /* R'G'B' to Y'CbCr conversion. Required for YUYV, NV12 and I420, ignored otherwise. */
@@ -60,8 +58,7 @@ typedef struct arhost_frame_format {
     uint64_t byte_size;   /* size of a slot */
 } arhost_frame_format;
 
-/* Computes the fields from `plane_count` on from the fields before them. Returns 0 if these are invalid, otherwise 1.
- */
+/* Computes the fields from `plane_count` on from the fields before it. Returns 1, or 0 if the latter are invalid. */
 static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     const uint64_t w = format->width, h = format->height;
     uint64_t row[ARHOST_MAX_PLANES] = {0, 0, 0};
