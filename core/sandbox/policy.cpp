@@ -14,42 +14,43 @@ namespace fs = std::filesystem;
 
 using PathList = std::initializer_list<const char *>;
 
-// What libraries commonly need. Excludes /home, /tmp, /run and other processes' /proc.
-constexpr PathList system_readable = {"/usr",
-                                      "/lib",
-                                      "/lib32",
-                                      "/lib64",
-                                      "/libx32",
-                                      "/bin",
-                                      "/sbin",
-                                      "/opt",
-                                      "/nix/store",
-                                      "/gnu/store",
-                                      "/etc/ld.so.cache",
-                                      "/etc/ld.so.conf",
-                                      "/etc/ld.so.conf.d",
-                                      "/etc/localtime",
-                                      "/etc/alternatives",
-                                      "/etc/fonts",
-                                      "/etc/OpenCL",
-                                      "/etc/vulkan",
-                                      "/etc/glvnd",
-                                      "/etc/drirc",
-                                      "/etc/python3",
-                                      "/etc/mime.types",
-                                      "/dev/zero", // read-only: mapping it writable makes uncounted shared memory
-                                      "/proc/self",
-                                      "/proc/cpuinfo",
-                                      "/proc/meminfo",
-                                      "/proc/stat",
-                                      "/proc/version",
-                                      "/proc/filesystems",
-                                      "/proc/sys/vm/overcommit_memory",
-                                      "/proc/sys/vm/max_map_count",
-                                      "/proc/sys/kernel/osrelease",
-                                      "/sys/devices/system",
-                                      "/sys/fs/cgroup",
-                                      "/sys/kernel/mm/transparent_hugepage"};
+// Paths that libraries commonly need. Does not include /home, /tmp, /run and the /proc folders of other processes.
+constexpr PathList system_readable = {
+    "/usr",
+    "/lib",
+    "/lib32",
+    "/lib64",
+    "/libx32",
+    "/bin",
+    "/sbin",
+    "/opt",
+    "/nix/store",
+    "/gnu/store",
+    "/etc/ld.so.cache",
+    "/etc/ld.so.conf",
+    "/etc/ld.so.conf.d",
+    "/etc/localtime",
+    "/etc/alternatives",
+    "/etc/fonts",
+    "/etc/OpenCL",
+    "/etc/vulkan",
+    "/etc/glvnd",
+    "/etc/drirc",
+    "/etc/python3",
+    "/etc/mime.types",
+    "/dev/zero", // only readable: a writable mapping would be uncounted shared memory
+    "/proc/self",
+    "/proc/cpuinfo",
+    "/proc/meminfo",
+    "/proc/stat",
+    "/proc/version",
+    "/proc/filesystems",
+    "/proc/sys/vm/overcommit_memory",
+    "/proc/sys/vm/max_map_count",
+    "/proc/sys/kernel/osrelease",
+    "/sys/devices/system",
+    "/sys/fs/cgroup",
+    "/sys/kernel/mm/transparent_hugepage"};
 constexpr PathList system_devices = {"/dev/null", "/dev/full", "/dev/random", "/dev/urandom"};
 
 constexpr PathList gpu_readable = {"/sys/dev",    "/sys/bus/pci", "/sys/class/drm", "/sys/devices",
@@ -83,7 +84,7 @@ void append(std::vector<fs::path> &paths, PathList patterns) {
     }
 }
 
-// The folders in a colon-separated variable.
+// Appends the folders in a colon-separated environment variable.
 void append_folders(std::vector<fs::path> &paths, const char *variable) {
     const char *value = std::getenv(variable);
     std::istringstream list(value ? value : "");
