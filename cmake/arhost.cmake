@@ -65,9 +65,12 @@ function(arhost_add_test name)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run under sanitizers
     return()
   endif()
+  if(ARG_EXHAUSTIVE)
+    set(per_push TEST_FILTER "-Exhaustive/*")
+  endif()
   # LeakSanitizer may crash while scanning thread-locals of libraries loaded with dlopen, such as the image module's.
   set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_FILTER "-Exhaustive/*"
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST ${per_push}
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT}
                        ENVIRONMENT "LSAN_OPTIONS=${lsan_options}"
                        LABELS "${ARG_LABELS}")

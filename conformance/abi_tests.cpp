@@ -76,7 +76,7 @@ void exports(Context &context) {
 
 // ---- Negotiation -----------------------------------------------------------------------------------
 
-// Offers and answers followed by garbage that the plugin must neither interpret nor overwrite.
+// Calls negotiate with structs that are followed by garbage, which the plugin must neither interpret nor overwrite.
 class Exchange {
 public:
     Exchange(Context &context, const arhost_offer &offer, std::uint32_t answer_size) {
@@ -115,7 +115,7 @@ void negotiation(Context &context) {
     const auto expect_accepted = [&](const Exchange &exchange, const char *offer) {
         if (exchange.status != ARHOST_STATUS_OK || exchange.answer().abi_version != version ||
             !exchange.answer().plugin)
-            throw Failure(fmt::format("offered {}, negotiate returned {} and version {}; it must be OK and {}", offer,
+            throw Failure(fmt::format("offered {}, negotiate returned {} and version {}; expected OK and {}", offer,
                                       status_name(exchange.status), exchange.answer().abi_version, version));
     };
     expect_accepted(Exchange(context, {offer_size, version, version}, answer_size), "its version");
@@ -126,22 +126,22 @@ void negotiation(Context &context) {
 
     const Exchange newer(context, {offer_size, version + 1, version + 7}, answer_size);
     if (newer.status != ARHOST_STATUS_ERROR_UNSUPPORTED)
-        throw Failure(fmt::format("offered versions {} to {}, negotiate returned {}; it must be UNSUPPORTED",
+        throw Failure(fmt::format("offered versions {} to {}, negotiate returned {}; expected UNSUPPORTED",
                                   version + 1, version + 7, status_name(newer.status)));
 
     constexpr auto short_offer = static_cast<std::uint32_t>(offsetof(arhost_offer, newest_abi_version));
     const Exchange short_offered(context, {short_offer, version, version}, answer_size);
     if (short_offered.status >= 0)
-        throw Failure(fmt::format("with an offer of {} bytes, which lacks newest_abi_version, negotiate returned {}; "
-                                  "it must return an error",
-                                  short_offer, status_name(short_offered.status)));
+        throw Failure(fmt::format(
+            "with an offer of {} bytes, which lacks newest_abi_version, negotiate returned {}; expected an error",
+            short_offer, status_name(short_offered.status)));
 
     constexpr auto short_answer = static_cast<std::uint32_t>(offsetof(arhost_answer, plugin));
     const Exchange shorter(context, {offer_size, version, version}, short_answer);
     if (shorter.status >= 0)
-        throw Failure(fmt::format(
-            "with an answer of {} bytes, which lacks plugin, negotiate returned {}; it must return an error",
-            short_answer, status_name(shorter.status)));
+        throw Failure(
+            fmt::format("with an answer of {} bytes, which lacks plugin, negotiate returned {}; expected an error",
+                        short_answer, status_name(shorter.status)));
 }
 
 // ---- Descriptor ------------------------------------------------------------------------------------
@@ -160,8 +160,7 @@ void descriptor(Context &context) {
                                                       ARHOST_CAPABILITY_LENS_DISTORTION,
                                                       ARHOST_CAPABILITY_REALTIME_SINK};
     if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
-        throw Failure(fmt::format(
-            "the descriptor's capabilities have the bits {:#x}, which are not defined for its kind", invalid));
+        throw Failure(fmt::format("the capability bits {:#x} are not defined for this kind of plugin", invalid));
     const ipc::Json described = ipc::to_json(d);
     for (const auto &[field, value] : described.items()) {
         const std::string text = value.dump(-1, ' ', false, ipc::Json::error_handler_t::replace);
@@ -180,7 +179,7 @@ void descriptor(Context &context) {
         if (!option->help || !*option->help)
             throw Failure(fmt::format("the option '{}' has no help", option->key));
         if (option->minimum > option->maximum)
-            throw Failure(fmt::format("the option '{}' has a minimum of {}, above its maximum of {}", option->key,
+            throw Failure(fmt::format("option '{}': the minimum {} exceeds the maximum {}", option->key,
                                       option->minimum, option->maximum));
         try {
             if (option->default_value)
@@ -200,7 +199,7 @@ void same_answer(Context &context) {
         const Exchange again(context, {sizeof(arhost_offer), ARHOST_ABI_VERSION, ARHOST_ABI_VERSION}, size);
         if (again.status != ARHOST_STATUS_OK || again.answer().plugin != &plugin)
             throw Failure(
-                fmt::format("{}, negotiate returned {} and a different plugin", when, status_name(again.status)));
+                fmt::format("{}, negotiate returned {} or a different plugin", when, status_name(again.status)));
         const ipc::Json now = ipc::to_json(*plugin.descriptor);
         for (const auto &[key, value] : descriptor.items())
             if (now[key] != value)
@@ -218,7 +217,7 @@ void same_answer(Context &context) {
 
 void unknown_extension(Context &context) {
     if (context.library.plugin().get_extension("arhost.conform.no-such-extension/1"))
-        throw Failure("get_extension returned a pointer for an unknown id; it must return NULL");
+        throw Failure("get_extension returned a pointer for an unknown id; expected NULL");
 }
 
 // ---- Instances -------------------------------------------------------------------------------------
@@ -232,7 +231,7 @@ void longer_options(Context &context) {
     if (context.library.descriptor().option_count < 2)
         throw Skip("it has fewer than two options");
     Instance instance(context.library);
-    instance.create_or_fail({.bytes = 16, .option = false}); // a plugin that steps too short reads garbage as a key
+    instance.create_or_fail({.bytes = 16, .option = false}); // a plugin with the wrong stride reads garbage as a key
 }
 
 void unknown_option(Context &context) {
@@ -245,7 +244,7 @@ void two_instances(Context &context) {
     first.create_or_fail();
     second.create_or_fail();
     if (first.get() == second.get())
-        throw Failure("two instances that exist at the same time have the same pointer");
+        throw Failure("two simultaneous instances have the same pointer");
     first.destroy();
     Instance third(context.library);
     third.create_or_fail();
@@ -274,8 +273,8 @@ void create_repeatedly(Context &context) {
         }
     };
     if (const std::string grown = growth_by(work, allowed_kib); !grown.empty())
-        throw Failure(fmt::format("after {} create and destroy, the process grew {}", count, grown));
-    context.note = fmt::format("{} times", count);
+        throw Failure(fmt::format("after {} create/destroy cycles, the process grew {}", count, grown));
+    context.note = fmt::format("{} create/destroy cycles", count);
 }
 
 void cancelled(Context &context) {
@@ -283,36 +282,34 @@ void cancelled(Context &context) {
     instance.host().cancel();
     const arhost_status status = instance.create();
     if (status != ARHOST_STATUS_OK && status != ARHOST_STATUS_ERROR_CANCELLED)
-        instance.expect_ok("create, after cancellation,", status);
+        instance.expect_ok("after cancellation, create", status);
     if ((status == ARHOST_STATUS_OK) != (instance.get() != nullptr))
-        throw Failure(fmt::format("create returned {} and the instance is{} NULL", status_name(status),
+        throw Failure(fmt::format("create returned {}, but the instance is{} NULL", status_name(status),
                                   instance.get() ? " not" : ""));
 }
 
 constexpr Test tests[] = {
-    {"abi.load", "arhost-worker accepts it: it loads, agrees on the ABI version, and its id is its file's name.", 0,
-     "", 10s, load},
-    {"abi.exports", "It exports no symbol but arhost_entry.", 0, "abi.load", 10s, exports},
-    {"abi.negotiation", "It answers any version range, and longer or shorter structs, as the ABI specifies.", 0,
-     "abi.load", 10s, negotiation},
-    {"abi.descriptor",
-     "Its texts are set, its capabilities are defined for its kind, and its options and defaults are valid.", 0,
-     "abi.load", 10s, descriptor},
+    {"abi.load", "arhost-worker can load it, it supports the ABI version, and its id matches its file name.", 0, "",
+     10s, load},
+    {"abi.exports", "It exports only arhost_entry.", 0, "abi.load", 10s, exports},
+    {"abi.negotiation", "negotiate handles any version range, and longer or shorter structs, as the ABI specifies.",
+     0, "abi.load", 10s, negotiation},
+    {"abi.descriptor", "The descriptor has all texts, only capabilities of its kind, and valid options and defaults.",
+     0, "abi.load", 10s, descriptor},
     {"abi.unknown-extension", "get_extension returns NULL for an unknown extension.", 0, "abi.load", 10s,
      unknown_extension},
     {"abi.create", "An instance can be created with the default options and destroyed without a start.", 0,
      "abi.load", 20s, create},
-    {"abi.same-answer", "Each negotiate returns the same plugin with the same descriptor.", 0, "abi.create", 20s,
-     same_answer},
-    {"abi.longer-options", "It steps through the options by their struct_size.", 0, "abi.create", 10s,
+    {"abi.same-answer", "Every call of negotiate returns the same plugin with the same descriptor.", 0, "abi.create",
+     20s, same_answer},
+    {"abi.longer-options", "It uses struct_size as the stride of the options array.", 0, "abi.create", 10s,
      longer_options},
     {"abi.unknown-option", "It ignores options with unknown keys.", 0, "abi.create", 10s, unknown_option},
     {"abi.two-instances", "Two instances can exist at the same time and be destroyed in any order.", 0, "abi.create",
      20s, two_instances},
-    {"abi.create-1000-times",
-     "After 1,000 create and destroy, or 20 s of them, no descriptor, thread or memory has leaked.", 0, "abi.create",
-     240s, create_repeatedly},
-    {"abi.cancelled-create", "After cancellation, create returns soon, with OK or CANCELLED.", 0, "abi.create", 10s,
+    {"abi.create-1000-times", "1,000 create/destroy cycles, or 20 s of them, leak no descriptors, threads or memory.",
+     0, "abi.create", 240s, create_repeatedly},
+    {"abi.cancelled-create", "After cancellation, create promptly returns OK or CANCELLED.", 0, "abi.create", 10s,
      cancelled},
 };
 

@@ -13,17 +13,17 @@ namespace arhost::conformance {
 
 inline void expect_ok_or_cancelled(const char *call, arhost_status status, const char *when = "after cancellation") {
     if (status != ARHOST_STATUS_OK && status != ARHOST_STATUS_ERROR_CANCELLED)
-        throw Failure(fmt::format("{}, {} returned {}; it must be OK or CANCELLED", when, call, status_name(status)));
+        throw Failure(fmt::format("{}, {} returned {}; expected OK or CANCELLED", when, call, status_name(status)));
 }
 
-// Cancels 100 ms after the first call of `function`, the plugin's `call`; repeats the call until then.
+// Repeats `function`, the plugin's `call`, and cancels it after 100 ms.
 template <class Function>
 void expect_to_be_cancelled(const Context &context, Host &host, const char *call, Function &&function) {
     using Clock = std::chrono::steady_clock;
-    // A plugin polls every 100 ms, even if a timeout factor shortens the deadlines.
+    // At least 2 s, whatever the timeout factor: plugins poll every 100 ms.
     const std::chrono::duration<double> limit = 2s * std::max(1.0, context.timeout_factor);
     Clock::time_point cancelled;
-    std::jthread other([&] {
+    std::jthread canceller([&] {
         std::this_thread::sleep_for(100ms);
         cancelled = Clock::now();
         host.cancel();
@@ -33,7 +33,7 @@ void expect_to_be_cancelled(const Context &context, Host &host, const char *call
         status = function();
     const Clock::time_point returned = Clock::now();
     const bool was_cancelled = host.is_cancelled();
-    other.join();
+    canceller.join();
     if (!was_cancelled && status == ARHOST_STATUS_END)
         throw Skip(fmt::format("{} reached the end of the source before it could be cancelled", call));
     if (!was_cancelled)
@@ -41,8 +41,8 @@ void expect_to_be_cancelled(const Context &context, Host &host, const char *call
     expect_ok_or_cancelled(call, status == ARHOST_STATUS_END ? ARHOST_STATUS_OK : status,
                            "cancelled during the call");
     if (returned - cancelled > limit)
-        throw Failure(fmt::format("cancelled during the call, {} took another {:.1f} s; {:.3g} s are allowed", call,
-                                  std::chrono::duration<double>(returned - cancelled).count(), limit.count()));
+        throw Failure(fmt::format("cancelled during the call, {} returned {:.1f} s later; the limit is {:.3g} s",
+                                  call, std::chrono::duration<double>(returned - cancelled).count(), limit.count()));
 }
 
 } // namespace arhost::conformance

@@ -87,7 +87,7 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message = failure.what();
         result.wrong_pixel = failure.wrong_pixel;
         for (const auto &[label, picture] : failure.pictures)
-            result.exhibits.push_back({label, picture.png_base64(), picture.width(), picture.height()});
+            result.images.push_back({label, picture.png_base64(), picture.width(), picture.height()});
     } catch (const Skip &skip) {
         result.verdict = Verdict::skip;
         result.message = skip.what();
@@ -96,10 +96,11 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message = warning.what();
     } catch (const std::exception &error) {
         const auto *system = dynamic_cast<const std::system_error *>(&error);
-        const bool none_left =
+        const bool out_of_descriptors =
             system && system->code() == std::errc::too_many_files_open; // the suite itself uses few
-        result.verdict = none_left ? Verdict::fail : Verdict::error;
-        result.message = none_left ? "it leaks descriptors until none is left" : error.what();
+        result.verdict = out_of_descriptors ? Verdict::fail : Verdict::error;
+        result.message =
+            out_of_descriptors ? "it leaks descriptors until the limit of open files is reached" : error.what();
     }
     return result;
 }
@@ -107,8 +108,8 @@ Result run(const Test &test, const Subject &subject, Context &context) {
 } // namespace
 
 std::filesystem::path default_reference() {
-    const std::filesystem::path own_folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-    return (own_folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
+    const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+    return (folder / "../lib/arhost/plugins/rt_embree.so").lexically_normal();
 }
 
 Pipe::Pipe() {
@@ -119,7 +120,7 @@ Pipe::Pipe() {
     write_end.reset(ends[1]);
 }
 
-pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors, bool own_group) {
+pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors, bool new_group) {
     std::vector<char *> argv;
     argv.reserve(arguments.size() + 1);
     for (std::string &argument : arguments)
@@ -132,7 +133,7 @@ pid_t start_process(std::vector<std::string> arguments, std::initializer_list<in
     if (pid > 0)
         return pid;
     // A plugin may have started threads: only async-signal-safe calls until exec.
-    if (own_group)
+    if (new_group)
         ::setpgid(0, 0);
     base::exec_child("/proc/self/exe", argv.data(), {descriptors.begin(), descriptors.size()}, parent);
     ::_exit(127);
@@ -164,9 +165,9 @@ ipc::Json to_json(const Result &result) {
     ipc::Json json = {{"test", result.test},       {"verdict", to_text(result.verdict)},
                       {"message", result.message}, {"seconds", result.seconds},
                       {"facts", result.facts},     {"images", ipc::Json::array()}};
-    for (const Exhibit &exhibit : result.exhibits)
+    for (const ReportImage &image : result.images)
         json["images"].push_back(
-            {{"label", exhibit.label}, {"width", exhibit.width}, {"height", exhibit.height}, {"png", exhibit.png}});
+            {{"label", image.label}, {"width", image.width}, {"height", image.height}, {"png", image.png}});
     if (result.wrong_pixel)
         json["wrong_pixel"] = *result.wrong_pixel;
     return json;
@@ -185,8 +186,8 @@ Result result_from_json(const ipc::Json &json) {
     if (result.facts != ipc::Json::object())
         ipc::description_from_json(result.facts); // throws if invalid
     for (const ipc::Json &image : json.at("images"))
-        result.exhibits.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
-                                   image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});
+        result.images.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
+                                 image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});
     if (json.contains("wrong_pixel"))
         result.wrong_pixel = json["wrong_pixel"].get<std::array<unsigned, 2>>();
     return result;

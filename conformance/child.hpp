@@ -40,10 +40,10 @@ struct Pipe {
     base::UniqueFd read_end, write_end; // close-on-exec
 };
 
-// Forks and executes this program with `arguments` and with `descriptors` as 0, 1, 2, … The process dies with this
-// one. `own_group`: it leads its own process group.
+// Executes this program in a child process, with `descriptors` as 0, 1, 2, … The kernel kills the child when this
+// process ends. `new_group`: the child leads a new process group.
 pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors,
-                    bool own_group = false);
+                    bool new_group = false);
 
 // Runs one test and writes its result to `result_fd` as a line of JSON. Returns the exit status.
 int run_child(const std::string &test, const Subject &subject);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times of a plugin's per-frame call, for the tests of speed.
+// Measures a plugin's per-frame call, for the speed tests.
 #pragma once
 
 #include "conformance/test.hpp"
@@ -42,7 +42,7 @@ inline void check_speed(Context &context, std::uint32_t width, std::uint32_t hei
     context.note = fmt::format("{}×{}: p50 {:.3g} ms, p99 {:.3g} ms, of {} frames", width, height, p50,
                                percentile(sorted_ms, 99), sorted_ms.size());
     if (p50 > bound_ms)
-        throw Warning(fmt::format("{}; p50 must be at most {} ms", context.note, bound_ms));
+        throw Warning(fmt::format("{}; the limit of p50 is {} ms", context.note, bound_ms));
 }
 
 } // namespace arhost::conformance

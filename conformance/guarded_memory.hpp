@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Memory between inaccessible pages, so that an access out of bounds crashes.
+// Memory between inaccessible pages, so that out-of-bounds accesses crash.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace arhost::conformance {
 
 class GuardedMemory {
 public:
-    // Ends exactly at a page's end; begins up to a page behind the page before it.
+    // The end is exact: the byte after it is inaccessible. Up to a page before the start may be accessible.
     explicit GuardedMemory(std::size_t size);
     ~GuardedMemory();
     GuardedMemory(const GuardedMemory &) = delete;

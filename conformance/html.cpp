@@ -22,15 +22,15 @@ figure { display: inline-block; margin: .6em 1em 0 0 } figcaption { color: #555 
 .image i { position: absolute; width: 18px; height: 18px; margin: -11px; border: 2px solid #f0f; border-radius: 50% }
 )";
 
-std::string figure(const Exhibit &exhibit, const Result &result) {
+std::string figure(const ReportImage &image, const Result &result) {
     std::string mark;
     if (result.wrong_pixel)
         mark = fmt::format("<i style=\"left:{:.2f}%;top:{:.2f}%\"></i>",
-                           100 * ((*result.wrong_pixel)[0] + 0.5) / exhibit.width,
-                           100 * ((*result.wrong_pixel)[1] + 0.5) / exhibit.height);
+                           100 * ((*result.wrong_pixel)[0] + 0.5) / image.width,
+                           100 * ((*result.wrong_pixel)[1] + 0.5) / image.height);
     return fmt::format("<figure><div class=\"image\"><img alt=\"\" src=\"data:image/png;base64,{}\">{}</div>"
                        "<figcaption>{}</figcaption></figure>",
-                       escaped(exhibit.png), mark, escaped(exhibit.label));
+                       escaped(image.png), mark, escaped(image.label));
 }
 
 } // namespace
@@ -45,8 +45,8 @@ std::string as_html(const Report &report) {
             rows += fmt::format("<p class=\"{}\">{}</p>", to_text(result.verdict), escaped(result.message));
         if (result.verdict != Verdict::pass && result.verdict != Verdict::skip)
             rows += fmt::format("<p><code>{}</code></p>", escaped(report.command(result)));
-        for (const Exhibit &exhibit : result.exhibits)
-            rows += figure(exhibit, result);
+        for (const ReportImage &image : result.images)
+            rows += figure(image, result);
         rows += "</td></tr>\n";
     }
     return fmt::format(

@@ -43,7 +43,8 @@ std::string invalid_name(const std::string &text) {
 std::string invalid_variable(const std::string &text) {
     return sandbox::is_variable_name(text)
                ? ""
-               : "'" + text + "' must be only a variable's name; its value is taken from arhost's environment";
+               : "'" + text +
+                     "' is not a variable name; give only the name, the value is that of arhost's environment";
 }
 std::string invalid_seed(const std::string &text) {
     std::uint64_t seed = 0;
@@ -84,21 +85,21 @@ struct PolicyOptions {
     std::string sandbox{sandbox::modes.front()};
 
     void add_to(base::CommandLine &app) {
-        const auto add = [&](const char *name, std::vector<std::string> &values, const char *what) {
-            return app.option(name, values, what).one_value_each();
+        const auto add = [&](const char *name, std::vector<std::string> &values, const char *help) {
+            return app.option(name, values, help).one_value_each();
         };
         const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
-        add("--allow", allow, "What the sandbox allows, as 'allow' in the configuration (docs/security.md)")
-            .type_name("WHAT")
+        add("--allow", allow, "Allow the plugin a resource, as 'allow' in the configuration (repeatable)")
+            .type_name("RESOURCE")
             .separator(',')
             .one_of(known);
-        add("--reads", reads, "Another file or folder that the plugin may read (repeatable)")
+        add("--reads", reads, "Allow the plugin to read a file or folder (repeatable)")
             .type_name("PATH")
             .existing_path();
-        add("--environment", environment, "Another environment variable that the plugin gets (repeatable)")
+        add("--environment", environment, "Pass an environment variable to the plugin (repeatable)")
             .type_name("NAME")
             .check(invalid_variable);
-        app.option("--sandbox", sandbox, "permissive, strict or none, as 'sandbox' in the configuration")
+        app.option("--sandbox", sandbox, "Sandbox mode: permissive, strict or none")
             .type_name("MODE")
             .one_of(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end()));
     }
@@ -145,7 +146,7 @@ std::string list(const std::vector<std::string> &patterns) {
     return text;
 }
 
-// Describes a need of the plugin that the policy does not allow; without it the host creates no instance. Empty if
+// Describes a need of the plugin that the policy does not allow, so that the host would create no instance. Empty if
 // all are allowed.
 std::string missing_need(const Result &loaded, const sandbox::Policy &policy) {
     if (policy.mode != sandbox::Mode::none)
@@ -162,7 +163,7 @@ bool creates_instances(std::span<const Test> tests, std::string_view name) {
     return test != tests.end() && creates_instances(tests, test->needs);
 }
 
-// Explains why images cannot be compared with the reference, which is not the plugin's fault; empty if they can.
+// Describes why the reference cannot be used (an error of the suite, not of the plugin); empty if it can.
 std::string reference_problem(std::span<const Test> tests, const RunSettings &settings) {
     const fs::path &file = settings.subject.reference;
     if (!fs::is_regular_file(file))
@@ -189,18 +190,18 @@ void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);
     } catch (const std::system_error &error) {
-        throw std::runtime_error("standard output cannot be written: " + error.code().message());
+        throw std::runtime_error("cannot write to standard output: " + error.code().message());
     }
 }
 
 Report run(const RunSettings &settings, const std::vector<std::string> &patterns, bool quiet) {
     Report report{settings, all_tests(), {}, {}};
-    const auto wanted = [&](const char *test) { return matches(patterns, test); };
+    const auto is_selected = [&](const char *test) { return matches(patterns, test); };
     const auto is_fine = [](const Result &result) {
         return result.verdict == Verdict::pass || result.verdict == Verdict::skip;
     };
     const auto print_result = [&](const Result &result) {
-        if (!is_fine(result) || (wanted(result.test.c_str()) && !quiet))
+        if (!is_fine(result) || (is_selected(result.test.c_str()) && !quiet))
             print(as_line(report, result), settings.signals);
     };
     const auto set_result = [&](const Test &test, Verdict verdict, const std::string &why) {
@@ -214,7 +215,7 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
     std::vector<Test> selected;
     std::set<std::string_view> needed;
     std::for_each(report.tests.rbegin(), report.tests.rend(), [&](const Test &test) {
-        if ((wanted(test.name) && (test.kind == 0 || test.kind == kind)) || needed.contains(test.name)) {
+        if ((is_selected(test.name) && (test.kind == 0 || test.kind == kind)) || needed.contains(test.name)) {
             selected.insert(selected.begin(), test);
             needed.insert(test.needs);
         }
@@ -227,15 +228,15 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
             if (const std::string problem = reference_problem(report.tests, settings); !problem.empty())
                 set_result(test, Verdict::error, problem);
     run_all(selected, settings, report.results, print_result);
-    // Report tests that run only because others need them only if they fail.
+    // Prerequisites that were not selected are reported only if they fail.
     std::erase_if(report.results,
-                  [&](const Result &result) { return is_fine(result) && !wanted(result.test.c_str()); });
+                  [&](const Result &result) { return is_fine(result) && !is_selected(result.test.c_str()); });
     std::sort(report.results.begin(), report.results.end(),
               [&](const Result &a, const Result &b) { return &report.test_of(a) < &report.test_of(b); });
     return report;
 }
 
-// With fewer, a test would fail without the plugin's fault.
+// Too few descriptors would fail tests of correct plugins.
 void expect_descriptors(unsigned jobs) {
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
@@ -257,7 +258,7 @@ void expect_utf8(const std::vector<std::string> &settings) {
     texts.push_back(fs::temp_directory_path(none));
     for (const std::string &text : texts)
         if (!base::is_utf8(text))
-            throw std::runtime_error("'" + text + "' is not UTF-8, as text for a plugin must be; rename it");
+            throw std::runtime_error("'" + text + "' is not UTF-8, but text passed to plugins must be: rename it");
 }
 
 // Reports must not replace files that the run reads, nor each other. Pipes and devices are exempt.
@@ -281,7 +282,7 @@ void check_report_files(const std::vector<std::string> &reports, const Subject &
             continue;
         const auto [path, node] = identity_of(report);
         if (read.contains(path) || read.contains(node))
-            throw std::runtime_error("cannot write " + report + ": it is a file that this run reads; choose another");
+            throw std::runtime_error("cannot write " + report + ": this run reads that file; choose another");
         if (written.contains(path) || written.contains(node))
             throw std::runtime_error("cannot write " + report + ": another report is written there");
         add(written, report);
@@ -301,7 +302,7 @@ base::UniqueFd take_signals() {
     return base::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
 }
 
-// Prints the last line. If nobody reads it, another signal ends the program.
+// Prints the last line. Blocks while nobody reads standard error; another signal ends the program.
 void print_last_line(const std::string &line, int signals) noexcept {
     try {
         base::write_all(STDERR_FILENO, line + "\n", signals);
@@ -332,28 +333,27 @@ int main(int argc, char **argv) {
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
     app.option("PLUGIN", plugin, "The plugin's shared object");
     app.flag("--list", only_list, "Print the tests' names and requirements");
-    app.option("--only", patterns, "Only tests whose name matches, as 'raytracer.*' (repeatable)")
+    app.option("--only", patterns, "Run only tests whose name matches, such as 'raytracer.*' (repeatable)")
         .type_name("PATTERN")
         .separator(',')
         .one_value_each();
-    app.option("--set", option_texts, "An option of the plugin (repeatable)").type_name("KEY=VALUE").one_value_each();
-    app.option("--print", print_texts,
-               "A PNG of a marker that the tracker detects (repeatable), instead of tag36h11 tags")
+    app.option("--set", option_texts, "Set an option of the plugin (repeatable)")
+        .type_name("KEY=VALUE")
+        .one_value_each();
+    app.option("--print", print_texts, "Draw marker ID from this PNG, instead of tag36h11 tags (repeatable)")
         .type_name("ID=FILE")
         .one_value_each();
     PolicyOptions policy_options;
     policy_options.add_to(app);
-    app.option("--seed", settings.subject.seed, "Seed of random choices (1)").type_name("N").check(invalid_seed);
-    app.option("--jobs", settings.jobs, "Number of tests to run in parallel").type_name("N").range(1, 256);
-    app.option("--timeout-factor", settings.subject.timeout_factor, "Multiplies each deadline, for slow machines (1)")
+    app.option("--seed", settings.subject.seed, "Random seed (1)").type_name("N").check(invalid_seed);
+    app.option("--jobs", settings.jobs, "Number of tests that run in parallel").type_name("N").range(1, 256);
+    app.option("--timeout-factor", settings.subject.timeout_factor, "Multiply each deadline, for slow machines (1)")
         .type_name("FACTOR")
         .check(invalid_timeout_factor);
-    app.option("--reference", reference, "The ray tracer that images are compared with")
-        .type_name("FILE")
-        .check(invalid_name);
+    app.option("--reference", reference, "Compare images with this ray tracer").type_name("FILE").check(invalid_name);
     app.flag("-q,--quiet", quiet, "Do not print passed and skipped tests");
-    const auto add_file = [&](const char *name, std::string &file, const char *what) {
-        app.option(name, file, what).type_name("FILE").check(invalid_name);
+    const auto add_file = [&](const char *name, std::string &file, const char *help) {
+        app.option(name, file, help).type_name("FILE").check(invalid_name);
     };
     add_file("--json", json, "Write the results as JSON");
     add_file("--junit", junit, "Write the results as JUnit XML");
@@ -382,7 +382,7 @@ int main(int argc, char **argv) {
         expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
         check_report_files({json, junit, html}, settings.subject);
-        signals = take_signals(); // not in a test's process, which signals end as usual
+        signals = take_signals(); // not in a test's process: signals terminate it
         settings.signals = signals.get();
         base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
@@ -390,7 +390,7 @@ int main(int argc, char **argv) {
         print(as_summary(report), settings.signals);
         if (report.results.empty())
             throw std::runtime_error(
-                fmt::format("--only {}: no test of this kind of plugin has such a name", fmt::join(patterns, ",")));
+                fmt::format("--only {}: no test for this kind of plugin matches", fmt::join(patterns, ",")));
         json_file.write(as_json(report));
         junit_file.write(as_junit(report));
         html_file.write(as_html(report));

@@ -58,12 +58,12 @@ std::string Picture::damage() const {
         return std::nullopt;
     };
     if (const auto at = first_in(0, guard_size))
-        return fmt::format("{} bytes before the image", guard_size - *at);
+        return fmt::format("a guard byte {} bytes before the image", guard_size - *at);
     for (std::uint32_t y = 0; y < height_; ++y)
         if (const auto at = first_in(row(y) + std::size_t{4} * width_,
                                      y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Page)))
-            return y + 1 < height_ ? fmt::format("in row {}, {} bytes after its last pixel", y, *at)
-                                   : fmt::format("{} bytes after the image's last pixel", *at);
+            return y + 1 < height_ ? fmt::format("a guard byte in row {}, {} bytes after its last pixel", y, *at)
+                                   : fmt::format("a guard byte {} bytes after the image's last pixel", *at);
     return {};
 }
 

@@ -26,10 +26,11 @@ public:
     int alpha(std::uint32_t x, std::uint32_t y) const { return at(x, y)[3]; }
     void set(std::uint32_t x, std::uint32_t y, const Pixel &pixel);
 
-    // Describes overwritten guard bytes, as the end of a sentence; empty if there are none.
+    // Describes the first overwritten guard byte, as the end of a sentence; empty if there is none.
     std::string damage() const;
 
-    // The neighbouring pixels have the same alpha and nearly the same colour: no edge or reflected edge is near.
+    // The neighbouring pixels have the same alpha and nearly the same colour: there is no edge or reflected edge
+    // nearby.
     bool is_smooth(std::uint32_t x, std::uint32_t y) const;
 
     std::string png_base64() const;

@@ -35,20 +35,20 @@ const arhost_option_descriptor *PluginLibrary::option(const std::string &key) {
 
 arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text) {
     arhost_option value{sizeof value, option.type, option.key, 0, 0, text.c_str()};
-    const auto refuse = [&](const char *why) {
+    const auto reject = [&](const char *why) {
         throw std::runtime_error(fmt::format("option '{}': '{}' {}", option.key, text, why));
     };
     const auto check_range = [&](double number) {
         const bool bounded = option.minimum != 0 || option.maximum != 0;
         if (bounded && !(number >= option.minimum && number <= option.maximum))
-            refuse(fmt::format("is not from {} to {}", option.minimum, option.maximum).c_str());
+            reject(fmt::format("is outside the range {} to {}", option.minimum, option.maximum).c_str());
     };
     try {
         std::size_t used = text.size();
         switch (option.type) {
         case ARHOST_OPTION_BOOL:
             if (text != "true" && text != "false")
-                refuse("is neither true nor false");
+                reject("is neither true nor false");
             value.integer = text == "true";
             break;
         case ARHOST_OPTION_INTEGER:
@@ -65,19 +65,19 @@ arhost_option parse_option(const arhost_option_descriptor &option, const std::st
                 while (*choice && text != *choice)
                     ++choice;
                 if (!*choice)
-                    refuse("is not among the choices");
+                    reject("is not one of the choices");
             }
             break;
         case ARHOST_OPTION_INPUT_PATH:
         case ARHOST_OPTION_OUTPUT_PATH:
             break;
         default:
-            refuse("has an unknown type");
+            reject("has an unknown type");
         }
         if (used != text.size())
-            refuse("is not a number");
+            reject("is not a number");
     } catch (const std::logic_error &) { // of stoll and stod
-        refuse("is not a number");
+        reject("is not a number");
     }
     return value;
 }
@@ -186,7 +186,7 @@ std::string status_name(arhost_status status) {
     case ARHOST_STATUS_END:
         return "END";
     case ARHOST_STATUS_END_TRUNCATED:
-        return "END_CUT_SHORT";
+        return "END_TRUNCATED";
     case ARHOST_STATUS_ERROR_INVALID_ARGUMENT:
         return "INVALID_ARGUMENT";
     case ARHOST_STATUS_ERROR_CONFIGURATION:
@@ -204,7 +204,7 @@ std::string status_name(arhost_status status) {
     case ARHOST_STATUS_ERROR_INTERNAL:
         return "INTERNAL";
     default:
-        return fmt::format("{}, which is not a status", status);
+        return fmt::format("{}, which is not a valid status", status);
     }
 }
 

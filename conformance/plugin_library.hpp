@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plugin in a test's process: opened as arhost-worker opens it, its instances, and their host.
+// The plugin in a test's process, opened as arhost-worker opens it, with its instances and their host.
 #pragma once
 
 #include "ipc/json_abi.hpp"
@@ -85,7 +85,7 @@ public:
     void cancel() { cancelled_ = true; }
     bool is_cancelled() const { return cancelled_; }
     std::vector<std::string> log() const;
-    std::string last_error() const; // empty if there was none
+    std::string last_error() const; // empty if there is none
 
 private:
     static Host &self(const arhost_host *host) { return *static_cast<Host *>(host->context); }
@@ -106,13 +106,13 @@ public:
     Instance(const Instance &) = delete;
     Instance &operator=(const Instance &) = delete;
 
-    // What the host of a newer ABI adds.
+    // Additions that a host with a newer ABI may pass.
     struct Newer {
-        std::size_t bytes = 0; // of garbage after each option
-        bool option = false;   // an unknown one after the declared ones
+        std::size_t bytes = 0; // garbage after each option
+        bool option = false;   // an unknown option after the declared ones
     };
-    void create_or_fail(Newer newer);  // throws Failure
-    arhost_status create(Newer newer); // any status
+    void create_or_fail(Newer newer); // throws Failure unless it succeeds
+    arhost_status create(Newer newer);
     void create_or_fail() { create_or_fail({}); }
     arhost_status create() { return create({}); }
     void destroy();
@@ -132,7 +132,7 @@ private:
     arhost_instance *instance_ = nullptr;
 };
 
-// "OK", "INVALID_ARGUMENT", …; "0, which is not a status".
+// "OK", "INVALID_ARGUMENT", …; "0, which is not a valid status".
 std::string status_name(arhost_status status);
 
 // For example "read returned IO: the camera was unplugged".

@@ -40,22 +40,22 @@ Print print_of(const Tag &tag) {
 }
 
 Print read_print(int id, const std::filesystem::path &file) {
-    const auto refuse = [&](const std::string &why) {
+    const auto error = [&](const std::string &why) {
         return std::runtime_error("--print " + std::to_string(id) + "=" + file.string() + ": " + why);
     };
     png_image png{};
     png.version = PNG_IMAGE_VERSION;
     if (!png_image_begin_read_from_file(&png, file.c_str()))
-        throw refuse(png.message);
+        throw error(png.message);
     if (png.width != png.height) {
         png_image_free(&png);
-        throw refuse("the picture must be square: the part of the print between the corners");
+        throw error("the picture must be square: crop it to the print between the marker's corners");
     }
     png.format = PNG_FORMAT_GRAY;
     Print print{id, png.width, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(png))};
     const png_color white{255, 255, 255};
     if (!png_image_finish_read(&png, &white, print.grey.data(), 0, nullptr))
-        throw refuse(png.message);
+        throw error(png.message);
     return print;
 }
 

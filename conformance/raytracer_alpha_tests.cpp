@@ -6,7 +6,7 @@
 namespace arhost::conformance {
 namespace {
 
-constexpr double rim = 1.5; // px on both sides of a silhouette that are not checked
+constexpr double rim = 1.5; // px on each side of a silhouette that are not checked
 constexpr int opaque = 153, translucent = 77;
 
 // A sphere of radius 30 at the origin, seen from (0, 0, 200): its silhouette has this radius.
@@ -16,7 +16,7 @@ void empty_scene(Context &context) {
     const Picture picture = Tracer(context, scene::ArenaBuilder()).render(from_front());
     expect_pixels(picture, [&](auto x, auto y) {
         const int alpha = picture.alpha(x, y);
-        return alpha == 0 ? "" : fmt::format("the scene is empty, alpha is {} and must be 0", alpha);
+        return alpha == 0 ? "" : fmt::format("the scene is empty, alpha is {}; expected 0", alpha);
     });
 }
 
@@ -25,7 +25,7 @@ void miss_alpha(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const int alpha = picture.alpha(x, y);
         const bool miss = distance_from_centre(picture, x, y) > silhouette + rim;
-        return !miss || alpha == 0 ? "" : fmt::format("no ray hit, alpha is {} and must be 0", alpha);
+        return !miss || alpha == 0 ? "" : fmt::format("no ray hit, alpha is {}; expected 0", alpha);
     });
 }
 
@@ -34,8 +34,7 @@ void hit_alpha(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const int alpha = picture.alpha(x, y);
         const bool hit = distance_from_centre(picture, x, y) < silhouette - rim;
-        return !hit || alpha == 255 ? ""
-                                    : fmt::format("every ray hit the sphere, alpha is {} and must be 255", alpha);
+        return !hit || alpha == 255 ? "" : fmt::format("every ray hit the sphere, alpha is {}; expected 255", alpha);
     });
 }
 
@@ -43,20 +42,20 @@ void inside_sphere(Context &context) {
     const Picture picture = Tracer(context, one_sphere({0, 0, 200, 50})).render(from_front());
     expect_pixels(picture, [&](auto x, auto y) {
         const int alpha = picture.alpha(x, y);
-        return alpha == 255 ? "" : fmt::format("the eye is inside a sphere, alpha is {} and must be 255", alpha);
+        return alpha == 255 ? "" : fmt::format("the eye is inside a sphere, alpha is {}; expected 255", alpha);
     });
 }
 
 void near_the_eye(Context &context) {
-    for (const double mm : {1.0, 0.05}) { // of a scene of 230; the sphere begins at 3/4 of it: 1.6e-4 of that
+    for (const double mm : {1.0, 0.05}) { // the surface is at 3/4 of it: down to 1.6e-4 of the scene's 230 mm
         scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
         builder.add_object("near", builder.add_spheres({{0, 0, 200 - mm, mm / 4}}),
                            builder.add_material(glowing(glm::vec3(0.8f))));
         const Picture picture = Tracer(context, std::move(builder)).render(from_front());
         expect_pixels(picture, [&](auto x, auto y) {
-            constexpr double radius = 48; // of 51.6 px: the sine is 1/4
+            constexpr double radius = 48; // px; the silhouette's is 51.6 (the sine of its half angle is 1/4)
             const Pixel p = picture.at(x, y);
-            if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // 231 and 255
+            if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // correct: 231 and 255
                 return fmt::format("a bright sphere {} mm in front of the eye is not visible; the pixel is {}", mm,
                                    text_of(p));
             return std::string();
@@ -73,10 +72,10 @@ void depth_order(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
         const int code = picture.at(x, y)[0];
-        if (r < 8 && code < 150) // 231; passes if a fifth too dark
+        if (r < 8 && code < 150) // correct: 231; accepts a fifth too dark
             return fmt::format("the near sphere is bright, but the code is {}: a farther object is visible", code);
-        if (r > 20 && r < 25 && code > 120) // 89
-            return fmt::format("only the large, dark sphere is here, the code is {}", code);
+        if (r > 20 && r < 25 && code > 120) // correct: 89
+            return fmt::format("only the large, dark sphere is visible here, but the code is {}", code);
         return std::string();
     });
 }
@@ -93,27 +92,27 @@ void occluder(Context &context) {
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
         const int alpha = picture.alpha(x, y);
-        if (r < 12 && alpha > 2) // a screen of ±14 px; miss-alpha checks for exactly 0
-            return fmt::format("an occluder hides the sphere, alpha is {} and must be 0", alpha);
+        if (r < 12 && alpha > 2) // the screen covers ±14 px; miss-alpha checks for exactly 0
+            return fmt::format("an occluder hides the sphere, alpha is {}; expected 0", alpha);
         if (r > 22 && r < silhouette - rim && alpha < 250)
-            return fmt::format("the occluder does not hide the sphere here, alpha is {} and must be 255", alpha);
+            return fmt::format("the occluder does not hide the sphere here, alpha is {}; expected 255", alpha);
         return std::string();
     });
 }
 
 // ---- Shadows ---------------------------------------------------------------------------------------
 
-// The shadow of ball_over_catcher lies about the image's centre.
-void expect_shadow(const Picture &picture, int alpha, const char *of) {
-    constexpr int radius = 10; // of a shadow of 15 and more
+// Checks the shadow of ball_over_catcher around the image's centre.
+void expect_shadow(const Picture &picture, int alpha, const char *caster) {
+    constexpr int radius = 10; // px; the shadow's is at least 15
     expect_pixels(picture, [&](auto x, auto y) {
         if (distance_from_centre(picture, x, y) > radius)
             return std::string();
         const Pixel p = picture.at(x, y);
         if (p[3] != alpha)
-            return fmt::format("in the shadow of {}, alpha is {} and must be {}", of, p[3], alpha);
+            return fmt::format("in the shadow of {}, alpha is {}; expected {}", caster, p[3], alpha);
         if (p[0] + p[1] + p[2] != 0)
-            return fmt::format("in the shadow of {}, the colour is {} and must be black", of, text_of(p));
+            return fmt::format("in the shadow of {}, the colour is {}; expected black", caster, text_of(p));
         return std::string();
     });
 }
@@ -135,7 +134,7 @@ void catcher_in_light(Context &context) {
         const bool far = distance_from_centre(picture, x, y) > 24;
         const bool ball = std::abs(y - (picture.height() - 1) / 2.0) < 22;
         const int alpha = picture.alpha(x, y);
-        return !far || ball || alpha <= 2 ? "" : fmt::format("the catcher is lit, alpha is {} and must be 0", alpha);
+        return !far || ball || alpha <= 2 ? "" : fmt::format("the catcher is lit, alpha is {}; expected 0", alpha);
     });
 }
 
@@ -145,12 +144,11 @@ void stronger_shadow_wins(Context &context) {
     builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     // The glass ball's shadow (20 mm about y = 17.5) covers the upper half of the other (15 mm about y = 0).
-    const int both = picture.alpha(79, 59 - 6), one = picture.alpha(79, 59 + 8);
-    if (std::abs(both - one) > 2)
-        throw Failure(
-            fmt::format("where an opaque and a translucent shadow overlap, alpha is {}; it must be {} as in the "
-                        "opaque one alone",
-                        both, one))
+    const int overlap = picture.alpha(79, 59 - 6), opaque_only = picture.alpha(79, 59 + 8);
+    if (std::abs(overlap - opaque_only) > 2)
+        throw Failure(fmt::format("where an opaque and a translucent shadow overlap, alpha is {}; expected {} as in "
+                                  "the opaque shadow alone",
+                                  overlap, opaque_only))
             .with("rendered", picture);
 }
 
@@ -163,7 +161,7 @@ void shadow_alpha_of_the_scene(Context &context) {
         const int expected = is_glass ? 51 : 204;
         const int alpha = picture.alpha(79, 59);
         if (alpha != expected)
-            throw Failure(fmt::format("pixel (79, 59): the scene's shadows of {} bodies have alpha {}, it is {}",
+            throw Failure(fmt::format("pixel (79, 59): the scene sets {} shadows to alpha {}, but it is {}",
                                       is_glass ? "translucent" : "opaque", expected, alpha))
                 .with("rendered", picture)
                 .at(79, 59);
@@ -184,12 +182,11 @@ void straight_alpha(Context &context) {
         edges += edge ? 1 : 0;
         return !edge || std::abs(p[1] - inside) <= 4
                    ? ""
-                   : fmt::format("alpha is {}, green is {} and must be {} as where the sphere covers the whole pixel "
-                                 "(straight alpha)",
+                   : fmt::format("alpha is {}, green is {}; expected {} as in fully covered pixels (straight alpha)",
                                  p[3], p[1], inside);
     });
     if (edges == 0)
-        throw Skip("no pixel is partly covered");
+        throw Skip("no pixel is partially covered");
 }
 
 constexpr const char *gate = "raytracer.render";
@@ -199,7 +196,7 @@ constexpr Test tests[] = {
     {"raytracer.miss-alpha", "Where no ray hits, alpha is exactly 0.", kind, gate, 20s, miss_alpha},
     {"raytracer.hit-alpha", "Where every ray hits a virtual object, alpha is exactly 255.", kind, gate, 20s,
      hit_alpha},
-    {"raytracer.straight-alpha", "The colour of a partly covered pixel is not premultiplied by alpha.", kind, gate,
+    {"raytracer.straight-alpha", "The colour of a partially covered pixel is not premultiplied by alpha.", kind, gate,
      20s, straight_alpha},
     {"raytracer.inside-sphere", "A camera inside an object sees the object in every pixel.", kind, gate, 20s,
      inside_sphere},
@@ -214,7 +211,7 @@ constexpr Test tests[] = {
     {"raytracer.stronger-shadow-wins",
      "Where opaque and translucent shadows overlap, alpha is that of the opaque one.", kind, gate, 20s,
      stronger_shadow_wins},
-    {"raytracer.shadow-alpha-of-scene", "The shadow alphas are those of the scene.", kind, gate, 20s,
+    {"raytracer.shadow-alpha-of-scene", "Shadow alphas are those of the scene's settings.", kind, gate, 20s,
      shadow_alpha_of_the_scene},
 };
 

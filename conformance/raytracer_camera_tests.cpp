@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projection. With one sample per pixel a centroid is uncertain by some hundredths of a pixel, so narrow bounds apply
-// to means over several positions.
+// Projection. With one sample per pixel, a centroid has an error of some hundredths of a pixel, so narrow bounds
+// apply to means over several positions.
 #include "conformance/expect.hpp"
 #include "conformance/projection.hpp"
 #include "conformance/tracer.hpp"
@@ -11,21 +11,21 @@
 namespace arhost::conformance {
 namespace {
 
-glm::dvec2 seen_at(const Picture &picture) {
+glm::dvec2 find_centroid(const Picture &picture) {
     const auto at = centroid(picture);
     if (!at)
         throw Failure("a sphere in view is not visible: no alpha is 128 or more").with("rendered", picture);
     return *at;
 }
 
-void expect_near(const glm::dvec2 &is, const glm::dvec2 &should, double tolerance, const std::string &what,
+void expect_near(const glm::dvec2 &actual, const glm::dvec2 &expected, double tolerance, const std::string &object,
                  const Picture &picture) {
-    if (glm::length(is - should) > tolerance)
-        throw Failure(fmt::format("{} is at ({:.3f}, {:.3f}) px and must be at ({:.3f}, {:.3f})", what, is.x, is.y,
-                                  should.x, should.y))
+    if (glm::length(actual - expected) > tolerance)
+        throw Failure(fmt::format("{} is at ({:.3f}, {:.3f}) px; expected ({:.3f}, {:.3f})", object, actual.x,
+                                  actual.y, expected.x, expected.y))
             .with("rendered", picture)
-            .at(static_cast<unsigned>(std::max(0.0, std::round(is.x))),
-                static_cast<unsigned>(std::max(0.0, std::round(is.y))));
+            .at(static_cast<unsigned>(std::max(0.0, std::round(actual.x))),
+                static_cast<unsigned>(std::max(0.0, std::round(actual.y))));
 }
 
 void pixel_centres(Context &context) {
@@ -37,15 +37,14 @@ void pixel_centres(Context &context) {
         const glm::dvec3 aside(context.uniform(-3, 3), context.uniform(-3, 3), 0);
         for (const double sign : {1.0, -1.0}) {
             const glm::dvec3 eye = glm::dvec3(0, 0, 200) + sign * aside;
-            sum += seen_at(tracer.render(camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0})));
+            sum += find_centroid(tracer.render(camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0})));
         }
     }
     const glm::dvec2 mean = sum / (2.0 * pairs);
     if (std::abs(mean.x - 79.5) > 0.02 || std::abs(mean.y - 59.5) > 0.02)
-        throw Failure(
-            fmt::format("spheres about the axis of a 160×120 image have their mean centroid at ({:.3f}, {:.3f}) "
-                        "and must have it at (79.5, 59.5): pixel centres are at integers",
-                        mean.x, mean.y));
+        throw Failure(fmt::format("the mean centroid of spheres around the axis of a 160×120 image is ({:.3f}, "
+                                  "{:.3f}); expected (79.5, 59.5): pixel centres are at integers",
+                                  mean.x, mean.y));
 }
 
 void focal_length(Context &context) {
@@ -56,31 +55,30 @@ void focal_length(Context &context) {
         const auto at = [&](const glm::dvec3 &aside) {
             const glm::dvec3 eye = glm::dvec3(0, 0, 200) + aside;
             const arhost_camera view = camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0}, in);
-            return std::pair(seen_at(tracer.render(view)), silhouette_centroid(view, {0, 0, 0}, 18));
+            return std::pair(find_centroid(tracer.render(view)), silhouette_centroid(view, {0, 0, 0}, 18));
         };
-        const auto [is_a, should_a] = at(half);
-        const auto [is_b, should_b] = at(-half);
-        return std::pair(glm::length(is_a - is_b), glm::length(should_a - should_b));
+        const auto [actual_a, expected_a] = at(half);
+        const auto [actual_b, expected_b] = at(-half);
+        return std::pair(glm::length(actual_a - actual_b), glm::length(expected_a - expected_b));
     };
     for (const auto &[half, name] : {std::pair(glm::dvec3(75, 0, 0), "fx"), {glm::dvec3(0, 40, 0), "fy"}}) {
-        const auto [is, should] = distance(half);
-        if (std::abs(is - should) > 0.2)
-            throw Failure(fmt::format("two places of a sphere are {:.2f} px apart and must be {:.2f}: {} is not {}",
-                                      is, should, name, name[1] == 'x' ? in.fx : in.fy));
+        const auto [actual, expected] = distance(half);
+        if (std::abs(actual - expected) > 0.2)
+            throw Failure(fmt::format("two positions of a sphere are {:.2f} px apart; expected {:.2f}: {} is not {}",
+                                      actual, expected, name, name[1] == 'x' ? in.fx : in.fy));
     }
 }
 
 void orientation(Context &context) {
     const Picture picture = Tracer(context, one_sphere({35, 20, 0, 12})).render(from_front());
-    const glm::dvec2 is = seen_at(picture);
-    const glm::dvec2 should = silhouette_centroid(from_front(), {35, 20, 0}, 12);
-    if (glm::length(is - should) > 4)
-        throw Failure(
-            fmt::format("a sphere to the right of the axis and above it is seen at ({:.1f}, {:.1f}) px and must "
-                        "be at ({:.1f}, {:.1f}): the first row is at the top",
-                        is.x, is.y, should.x, should.y))
+    const glm::dvec2 actual = find_centroid(picture);
+    const glm::dvec2 expected = silhouette_centroid(from_front(), {35, 20, 0}, 12);
+    if (glm::length(actual - expected) > 4)
+        throw Failure(fmt::format("a sphere to the right of and above the axis is at ({:.1f}, {:.1f}) px; expected "
+                                  "({:.1f}, {:.1f}): the first row is at the top",
+                                  actual.x, actual.y, expected.x, expected.y))
             .with("rendered", picture)
-            .at(static_cast<unsigned>(is.x), static_cast<unsigned>(is.y));
+            .at(static_cast<unsigned>(actual.x), static_cast<unsigned>(actual.y));
 }
 
 void principal_point(Context &context) {
@@ -88,14 +86,14 @@ void principal_point(Context &context) {
     in.cx = 50;
     in.cy = 80;
     const Picture picture = Tracer(context, one_sphere({0, 0, 0, 20})).render(from_front(in));
-    expect_near(seen_at(picture), {50, 80}, 1, "the sphere on the axis", picture);
+    expect_near(find_centroid(picture), {50, 80}, 1, "the sphere on the axis", picture);
 }
 
 void eye_look_at_up(Context &context) {
     constexpr double radius = 18;
     const glm::dvec3 centre(12, -7, 21);
     Tracer tracer(context, one_sphere(glm::vec4(centre, radius)));
-    const auto direction = [&] { // of unit length, all equally likely
+    const auto direction = [&] { // uniform on the unit sphere
         for (;;) {
             const glm::dvec3 d(context.uniform(-1, 1), context.uniform(-1, 1), context.uniform(-1, 1));
             if (const double length = glm::length(d); length > 0.1 && length <= 1)
@@ -105,30 +103,29 @@ void eye_look_at_up(Context &context) {
     constexpr int count = 16;
     glm::dvec2 sum(0);
     for (int i = 0; i < count;) {
-        // Nothing of unit length, nothing perpendicular: a ray tracer copes.
+        // The vectors are deliberately neither normalized nor perpendicular.
         const glm::dvec3 eye = centre + 200.0 * direction();
         const glm::dvec3 look_at = eye + (centre - eye) * context.uniform(0.1, 2) + 40.0 * direction();
         const arhost_camera view = camera(eye, look_at, direction() * context.uniform(0.1, 5));
         const glm::dvec3 seen = in_camera(view, centre);
-        const glm::dvec2 should = silhouette_centroid(view, centre, radius);
-        const double off = glm::length(should - glm::dvec2(79.5, 59.5));
-        if (seen.z < 100 || std::abs(should.x - 79.5) > 55 || std::abs(should.y - 59.5) > 35 || off < 30 ||
+        const glm::dvec2 expected = silhouette_centroid(view, centre, radius);
+        const double off = glm::length(expected - glm::dvec2(79.5, 59.5));
+        if (seen.z < 100 || std::abs(expected.x - 79.5) > 55 || std::abs(expected.y - 59.5) > 35 || off < 30 ||
             glm::length(glm::cross(glm::normalize(look_at - eye), glm::dvec3(view.up[0], view.up[1], view.up[2]))) <
                 0.2)
-            continue; // partly out of view, or too near the axis to be significant
+            continue; // partially out of view, or too close to the axis to be significant
         const Picture picture = tracer.render(view);
-        const glm::dvec2 is = seen_at(picture);
-        expect_near(is, should, 0.25,
+        const glm::dvec2 actual = find_centroid(picture);
+        expect_near(actual, expected, 0.25,
                     fmt::format("from eye ({:.1f}, {:.1f}, {:.1f}) the sphere", eye.x, eye.y, eye.z), picture);
-        sum += is - should;
+        sum += actual - expected;
         ++i;
     }
     const glm::dvec2 mean = sum / static_cast<double>(count);
     if (glm::length(mean) > 0.04)
-        throw Failure(
-            fmt::format("over {} cameras, spheres are seen ({:.3f}, {:.3f}) px beside the analytic projection on "
-                        "the mean; 0.04 px are allowed",
-                        count, mean.x, mean.y));
+        throw Failure(fmt::format("over {} cameras, the mean offset of a sphere from its analytic projection is "
+                                  "({:.3f}, {:.3f}) px; the limit is 0.04 px",
+                                  count, mean.x, mean.y));
 }
 
 void lens(Context &context) {
@@ -144,8 +141,8 @@ void lens(Context &context) {
         const glm::dvec3 eye = glm::dvec3(0, 0, 200) + aside;
         const arhost_camera view = camera(eye, eye - glm::dvec3(0, 0, 200), {0, 1, 0}, in);
         const Picture picture = tracer.render(view);
-        expect_near(seen_at(picture), silhouette_centroid(view, {0, 0, 0}, 14), 0.3,
-                    "through Brown's lens the sphere", picture);
+        expect_near(find_centroid(picture), silhouette_centroid(view, {0, 0, 0}, 14), 0.3,
+                    "with Brown's lens model, the sphere", picture);
     }
 }
 
@@ -163,7 +160,7 @@ void crop(Context &context) {
     for (std::uint32_t y = 0; y < part.height; ++y)
         for (std::uint32_t x = 0; x < part.width; ++x)
             expected.set(x, y, whole.at(x + x0, y + y0));
-    expect_alike(cropped, expected, "a camera with a part of the image does not see that part of it", 3, 0.01);
+    expect_alike(cropped, expected, "the image of a camera for a crop differs from that crop", 3, 0.01);
 }
 
 void moved_with_camera(Context &context) {
@@ -171,7 +168,7 @@ void moved_with_camera(Context &context) {
     moved = glm::rotate(moved, context.uniform(0.5, 2), glm::normalize(glm::dvec3(1, -2, 0.5)));
     const Picture here = Tracer(context, still_life()).render(still_life_camera());
     const Picture there = Tracer(context, still_life(glm::mat4(moved))).render(still_life_camera(pinhole(), moved));
-    expect_alike(there, here, "the scene moved together with its camera looks different", 3, 0.01);
+    expect_alike(there, here, "moving the scene together with its camera changes the image", 3, 0.01);
 }
 
 void moving_object(Context &context) {
@@ -194,12 +191,13 @@ void moving_object(Context &context) {
                 moved.world_from_object[9 + i] = static_cast<float>(to[i]);
             const arhost_motion now{sizeof now, 1, &moved, nullptr, 0, 0};
             const Picture picture = tracer.render(from_front(), &now);
-            const glm::dvec2 is = seen_at(picture) - glm::dvec2(79.5, 59.5);
-            const double should = glm::length(silhouette_centroid(from_front(), to, radius) - glm::dvec2(79.5, 59.5));
-            if (std::abs(glm::length(is) - should) > 2)
+            const glm::dvec2 actual = find_centroid(picture) - glm::dvec2(79.5, 59.5);
+            const double expected =
+                glm::length(silhouette_centroid(from_front(), to, radius) - glm::dvec2(79.5, 59.5));
+            if (std::abs(glm::length(actual) - expected) > 2)
                 throw Failure(
-                    fmt::format("moved by {:.1f} mm, an object is seen {:.1f} px off the centre and must be {:.1f}",
-                                glm::length(to), glm::length(is), should))
+                    fmt::format("an object moved by {:.1f} mm is {:.1f} px from the centre; expected {:.1f}",
+                                glm::length(to), glm::length(actual), expected))
                     .with("rendered", picture);
         }
 }
@@ -207,20 +205,20 @@ void moving_object(Context &context) {
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.pixel-centres", "Rays go through pixel centres, which are at integers, to 0.02 px.", kind, gate, 30s,
-     pixel_centres},
-    {"raytracer.focal-length", "fx and fy are those of the intrinsics.", kind, gate, 20s, focal_length},
+    {"raytracer.pixel-centres", "Rays pass through pixel centres, at integer coordinates, accurate to 0.02 px.", kind,
+     gate, 30s, pixel_centres},
+    {"raytracer.focal-length", "fx and fy of the intrinsics are used.", kind, gate, 20s, focal_length},
     {"raytracer.orientation", "The image is not mirrored; its first row is at the top.", kind, gate, 20s,
      orientation},
-    {"raytracer.principal-point", "The optical axis projects to the principal point, wherever that is.", kind, gate,
-     20s, principal_point},
-    {"raytracer.eye-look-at-up", "For any eye, look-at and up, a sphere is where the analytic projection puts it.",
-     kind, gate, 30s, eye_look_at_up},
-    {"raytracer.lens", "A ray tracer with LENS_DISTORTION distorts rays by Brown's model.", kind, gate, 20s, lens},
-    {"raytracer.crop", "A camera for a crop of the image renders that crop.", kind, gate, 20s, crop},
+    {"raytracer.principal-point", "The optical axis projects to the principal point.", kind, gate, 20s,
+     principal_point},
+    {"raytracer.eye-look-at-up", "For any eye, look-at and up, a sphere is at its analytic projection.", kind, gate,
+     30s, eye_look_at_up},
+    {"raytracer.lens", "If LENS_DISTORTION is declared, rays are distorted by Brown's model.", kind, gate, 20s, lens},
+    {"raytracer.crop", "A camera with the intrinsics of a crop renders that crop.", kind, gate, 20s, crop},
     {"raytracer.moved-with-camera", "A scene moved together with its camera looks the same.", kind, gate, 20s,
      moved_with_camera},
-    {"raytracer.moving-object", "Objects are where the request's motion puts them.", kind, gate, 20s, moving_object},
+    {"raytracer.moving-object", "Objects move as the request's motion specifies.", kind, gate, 20s, moving_object},
 };
 
 } // namespace

@@ -19,7 +19,7 @@ void writes_every_pixel(Context &context) {
             const Pixel none{0, 0, 0, 0}, all{255, 255, 255, 255};
             return on_zeros.at(x, y) != none || on_ones.at(x, y) != all
                        ? ""
-                       : fmt::format("of a {}×{} image, it keeps what was there before, zeros or ones", size.width,
+                       : fmt::format("in a {}×{} image, the previous value is kept, 0x00 or 0xff", size.width,
                                      size.height);
         });
     }
@@ -30,7 +30,7 @@ void writes_nothing_else(Context &context) {
         const Picture picture =
             Tracer(context, one_sphere({0, 0, 0, 30})).render(from_front(pinhole(size.width, size.height)));
         if (const std::string damage = picture.damage(); !damage.empty())
-            throw Failure(fmt::format("of a {}×{} image, it wrote {}", size.width, size.height, damage));
+            throw Failure(fmt::format("for a {}×{} image, it overwrote {}", size.width, size.height, damage));
     }
 }
 
@@ -41,9 +41,10 @@ void sizes(Context &context) {
         expect_pixels(picture, [&](auto x, auto y) {
             const bool hit = distance_from_centre(picture, x, y) < 100 * 30 / 200.0 - 2;
             const int alpha = picture.alpha(x, y);
-            return !hit || alpha >= 250 ? ""
-                                        : fmt::format("of a {}×{} image, the sphere is here but alpha is {}",
-                                                      size.width, size.height, alpha);
+            return !hit || alpha >= 250
+                       ? ""
+                       : fmt::format("in a {}×{} image, the sphere covers this pixel, but alpha is {}", size.width,
+                                     size.height, alpha);
         });
     }
 }
@@ -61,7 +62,7 @@ void region(Context &context) {
         const std::uint64_t right = std::uint64_t{info.region_x} + info.region_width,
                             bottom = std::uint64_t{info.region_y} + info.region_height;
         if (right > picture.width() || bottom > picture.height())
-            throw Failure(fmt::format("the region ends at ({}, {}), beyond an image of {}×{}", right, bottom,
+            throw Failure(fmt::format("the region ends at ({}, {}), outside the {}×{} image", right, bottom,
                                       picture.width(), picture.height()));
         expect_pixels(picture, [&](auto x, auto y) {
             const bool inside = x >= info.region_x && x < right && y >= info.region_y && y < bottom;
@@ -79,20 +80,20 @@ void region(Context &context) {
 void device_time(Context &context) {
     bool reported = false;
     Tracer tracer(context, still_life());
-    for (int image = 1; image <= 3; ++image) { // several, because a device time may accumulate
+    for (int image = 1; image <= 3; ++image) { // several, to detect accumulated times
         tracer.render(still_life_camera());
         const auto ms = [](auto ns) { return 1e-6 * static_cast<double>(ns); };
-        const double device_ms = ms(tracer.info().device_time_ns), took_ms = ms(tracer.duration().count());
-        if (device_ms > took_ms)
+        const double device_ms = ms(tracer.info().device_time_ns), duration_ms = ms(tracer.duration().count());
+        if (device_ms > duration_ms)
             throw Failure(fmt::format("for image {} it reports a device time of {:.3f} ms, but render took {:.3f} ms",
-                                      image, device_ms, took_ms));
+                                      image, device_ms, duration_ms));
         reported = reported || device_ms > 0;
     }
     if (!reported)
         throw Skip("it reports no device time");
 }
 
-// ---- Sameness --------------------------------------------------------------------------------------
+// ---- Determinism -----------------------------------------------------------------------------------
 
 void deterministic(Context &context) {
     Tracer tracer(context, still_life()), other(context, still_life());
@@ -108,7 +109,7 @@ void frames_before(Context &context) {
     const arhost_camera here = still_life_camera(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
     const Picture first = tracer.render(here);
     const Picture second = tracer.render(there);
-    expect_alike(tracer.render(here), first, "an image depends on the frame before it", 1);
+    expect_alike(tracer.render(here), first, "an image depends on the previous frame", 1);
     if (!first_difference(first, second, 1))
         throw Failure("two different cameras give the same image").with("rendered", first);
 }
@@ -120,7 +121,7 @@ void threads(Context &context) {
     const Picture one = Tracer(context, still_life(), {{"threads", "1"}}).render(still_life_camera());
     for (const char *count : {"2", "3"})
         expect_alike(Tracer(context, still_life(), {{"threads", count}}).render(still_life_camera()), one,
-                     fmt::format("{} threads give another image than one", count), 1);
+                     fmt::format("the image with {} threads differs from that with one", count), 1);
 }
 
 // ---- The reference ---------------------------------------------------------------------------------
@@ -131,20 +132,20 @@ void reference(Context &context) {
                                  "' does not exist; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
     Context of_reference{library, context.reference, context.random};
-    const Picture should = Tracer(of_reference, still_life()).render(still_life_camera());
-    const Picture is = Tracer(context, still_life()).render(still_life_camera());
-    // Edges, and reflections of edges, may lie a pixel elsewhere.
+    const Picture expected = Tracer(of_reference, still_life()).render(still_life_camera());
+    const Picture actual = Tracer(context, still_life()).render(still_life_camera());
+    // Edges and their reflections may be off by a pixel.
     double squares = 0;
     int compared = 0, alphas = 0;
     std::optional<std::array<unsigned, 2>> worst;
     int worst_difference = -1;
-    for (std::uint32_t y = 0; y < is.height(); ++y)
-        for (std::uint32_t x = 0; x < is.width(); ++x) {
-            if (!should.is_smooth(x, y))
+    for (std::uint32_t y = 0; y < actual.height(); ++y)
+        for (std::uint32_t x = 0; x < actual.width(); ++x) {
+            if (!expected.is_smooth(x, y))
                 continue;
-            const Pixel p = is.at(x, y), q = should.at(x, y);
+            const Pixel p = actual.at(x, y), q = expected.at(x, y);
             int largest = std::abs(p[3] - q[3]);
-            if (largest > 1) // exactness is for other tests
+            if (largest > 1) // other tests check for exact values
                 ++alphas;
             if (q[3] == 255)
                 for (int channel = 0; channel < 3; ++channel) {
@@ -158,18 +159,18 @@ void reference(Context &context) {
                 worst = {x, y};
             }
         }
-    const double psnr = squares == 0 ? 99 : 10 * std::log10(255.0 * 255.0 * compared / squares);
-    constexpr double least_psnr = 40;
-    if (psnr >= least_psnr && alphas == 0)
+    const double psnr_db = squares == 0 ? 99 : 10 * std::log10(255.0 * 255.0 * compared / squares);
+    constexpr double min_psnr_db = 40;
+    if (psnr_db >= min_psnr_db && alphas == 0)
         return;
     throw Failure(
-        fmt::format("beside {}, inside of objects the PSNR is {:.1f} dB and must be {} or more, and {} pixels "
-                    "away from edges have another alpha; most at ({}, {}): {} and {}",
-                    context.reference.stem().string(), psnr, least_psnr, alphas, (*worst)[0], (*worst)[1],
-                    text_of(is.at((*worst)[0], (*worst)[1])), text_of(should.at((*worst)[0], (*worst)[1]))))
-        .with("rendered", is)
-        .with("reference", should)
-        .with("difference × 5", difference(is, should))
+        fmt::format("compared with {}, the PSNR inside objects is {:.1f} dB (minimum: {} dB), and alpha differs in "
+                    "{} pixels away from edges; the largest difference is at ({}, {}): {} instead of {}",
+                    context.reference.stem().string(), psnr_db, min_psnr_db, alphas, (*worst)[0], (*worst)[1],
+                    text_of(actual.at((*worst)[0], (*worst)[1])), text_of(expected.at((*worst)[0], (*worst)[1]))))
+        .with("rendered", actual)
+        .with("reference", expected)
+        .with("difference × 5", difference(actual, expected))
         .at((*worst)[0], (*worst)[1]);
 }
 
@@ -185,11 +186,12 @@ constexpr Test tests[] = {
      device_time},
     {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", kind,
      gate, 20s, deterministic},
-    {"raytracer.frames-before", "An image does not depend on the frames before it.", kind, gate, 20s, frames_before},
+    {"raytracer.frames-before", "An image does not depend on previous frames.", kind, gate, 20s, frames_before},
     {"raytracer.threads", "The image does not depend on the number of threads.", kind, gate, 20s, threads},
     {"raytracer.reference",
-     "The image matches the reference ray tracer's: 40 dB inside objects, the same alpha except at edges.", kind,
-     gate, 30s, reference},
+     "The image matches that of the reference ray tracer: a PSNR of 40 dB inside objects, equal alpha except at "
+     "edges.",
+     kind, gate, 30s, reference},
 };
 
 } // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ray tracer from start to stop: rejected input, cancellation and unusual scenes.
+// Life cycle of a ray tracer: restarts, rejected input, cancellation and unusual scenes.
 #include "conformance/cancelling.hpp"
 #include "conformance/expect.hpp"
 #include "conformance/frame_times.hpp"
@@ -27,7 +27,7 @@ void start_again(Context &context) {
     const arhost_intrinsics smaller = pinhole(90, 70, 110);
     expect_alike(tracer.render(still_life_camera(smaller)),
                  Tracer(context, still_life()).render(still_life_camera(smaller)),
-                 "stopped, and started with another scene and size, it gives another image than a new instance", 1);
+                 "restarted with another scene and size, its image differs from that of a new instance", 1);
 }
 
 void leaks(Context &context) {
@@ -39,7 +39,7 @@ void leaks(Context &context) {
     });
 }
 
-// ---- Refusals --------------------------------------------------------------------------------------
+// ---- Rejected input --------------------------------------------------------------------------------
 
 void parallel_up(Context &context) {
     Tracer tracer(context, one_sphere({0, 0, 0, 30}));
@@ -50,9 +50,9 @@ void parallel_up(Context &context) {
         if (const arhost_status status = tracer.try_render(camera({0, 0, 200}, {0, 0, 0}, up), picture, info);
             status != ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
             throw Failure(
-                fmt::format("looking along −z with up (0, 0, {}), render returned {}; it must be INVALID_ARGUMENT",
+                fmt::format("looking along −z with up (0, 0, {}), render returned {}; expected INVALID_ARGUMENT",
                             up.z, status_name(status)));
-    tracer.render(from_front()); // and goes on
+    tracer.render(from_front()); // must still work
 }
 
 void not_finite(Context &context) {
@@ -67,10 +67,9 @@ void not_finite(Context &context) {
           camera({0, 0, 200}, {0, 0, 0}, {0, nan, 0})})
         if (const arhost_status status = tracer.try_render(view, picture, info);
             status != ARHOST_STATUS_ERROR_INVALID_ARGUMENT && status != ARHOST_STATUS_OK)
-            throw Failure(
-                fmt::format("with a camera with non-finite numbers, render returned {}; it must be INVALID_ARGUMENT, "
-                            "or OK",
-                            status_name(status)));
+            throw Failure(fmt::format(
+                "with a camera with non-finite numbers, render returned {}; expected INVALID_ARGUMENT or OK",
+                status_name(status)));
     expect_alike(tracer.render(from_front()), before, "after a camera with non-finite numbers, the image differs", 1);
 }
 
@@ -85,7 +84,7 @@ void cancelled(Context &context) {
     expect_ok_or_cancelled("start", starting.try_start(pinhole()));
 }
 
-// Inside of a mirror that is a sphere, where each ray is followed as far as it may be.
+// The inside of a mirror sphere, where every ray reaches the maximum depth.
 scene::ArenaBuilder hall_of_mirrors() {
     scene::ArenaBuilder builder = one_sphere({0, 0, 0, 300}, mirror(1));
     builder.settings.max_depth = scene::max_depth_limit;
@@ -96,7 +95,7 @@ void cancel_while_rendering(Context &context) {
     for (const char *const *need = context.library.descriptor().needs; need && *need; ++need)
         if (*need == std::string_view("gpu"))
             throw Skip("it needs 'gpu', and work submitted to a GPU cannot be cancelled");
-    const arhost_intrinsics large = pinhole(1920, 1440, 1600); // seconds of work for a processor
+    const arhost_intrinsics large = pinhole(1920, 1440, 1600); // takes seconds on a CPU
     Tracer tracer(context, hall_of_mirrors());
     tracer.start(large);
     Picture picture(large.width, large.height);
@@ -105,9 +104,9 @@ void cancel_while_rendering(Context &context) {
                            [&] { return tracer.try_render(from_front(large), picture, info); });
 }
 
-// ---- Odd scenes ------------------------------------------------------------------------------------
+// ---- Unusual scenes --------------------------------------------------------------------------------
 
-// The sphere is where it would be without what else there is.
+// Only a sphere of this radius at the image's centre is visible.
 void expect_sphere(const Picture &picture, double radius_px, const char *scene) {
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);
@@ -129,15 +128,16 @@ void degenerate(Context &context) {
     slivers.normals.assign(4, {0, 0, 1});
     builder.add_object("smooth slivers", builder.add_triangles(slivers), material);
     builder.add_light(lamp({0, 0, 200}, 1));
-    expect_sphere(Tracer(context, std::move(builder)).render(from_front()), 30, "among triangles without area");
+    expect_sphere(Tracer(context, std::move(builder)).render(from_front()), 30,
+                  "with degenerate triangles in the scene");
 }
 
 void far_away(Context &context) {
-    // A kilometre away and just as large: the same image.
+    // Distance and size have the same factor, so the image is the same.
     constexpr double factor = 5000;
     const arhost_camera view = camera(glm::dvec3(0, 0, 200) * factor, {0, 0, 0}, {0, 1, 0});
     expect_sphere(Tracer(context, one_sphere(glm::vec4(0, 0, 0, 30) * static_cast<float>(factor))).render(view), 30,
-                  "in a scene of a kilometre");
+                  "in a scene scaled to 1 km");
 }
 
 // ---- Speed -----------------------------------------------------------------------------------------
@@ -153,25 +153,25 @@ constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
     {"raytracer.start", "It starts on a scene in read-only memory, and stops.", kind, "abi.create", 30s, start},
     {"raytracer.render", "It renders an image of a scene in read-only memory.", kind, "raytracer.start", 30s, render},
-    {"raytracer.start-again", "After a stop it starts with another scene and another size.", kind, "raytracer.render",
+    {"raytracer.start-again", "After stop, it starts with another scene and another size.", kind, "raytracer.render",
      30s, start_again},
-    {"raytracer.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, "raytracer.render",
+    {"raytracer.leaks", "Frames, starts and stops leak no descriptors, threads or memory.", kind, "raytracer.render",
      60s, leaks},
     {"raytracer.parallel-up", "An up vector parallel to the view is rejected with INVALID_ARGUMENT.", kind,
      "raytracer.render", 20s, parallel_up},
     {"raytracer.not-finite",
      "A camera with non-finite numbers is rejected or rendered, and the next image is correct.", kind,
      "raytracer.render", 20s, not_finite},
-    {"raytracer.cancelled", "After cancellation, start and render return soon, with OK or CANCELLED.", kind,
+    {"raytracer.cancelled", "After cancellation, start and render promptly return OK or CANCELLED.", kind,
      "raytracer.render", 20s, cancelled},
     {"raytracer.cancel-while-rendering",
-     "Cancelled during a large image, render returns within 2 s; not checked on GPUs.", kind, "raytracer.cancelled",
-     30s, cancel_while_rendering},
-    {"raytracer.degenerate", "Triangles without area do not affect the image.", kind, "raytracer.render", 20s,
+     "When cancelled during a large image, render returns within 2 s; not checked on GPUs.", kind,
+     "raytracer.cancelled", 30s, cancel_while_rendering},
+    {"raytracer.degenerate", "Degenerate triangles do not affect the image.", kind, "raytracer.render", 20s,
      degenerate},
-    {"raytracer.far-away", "A scene scaled to a kilometre looks the same as one of a foot.", kind, "raytracer.render",
-     20s, far_away},
-    {"raytracer.speed", "The median time of a small image is at most 250 ms; otherwise a warning.", kind,
+    {"raytracer.far-away", "Scaling scene and camera from 0.2 m to 1 km does not change the image.", kind,
+     "raytracer.render", 20s, far_away},
+    {"raytracer.speed", "The median time of render at 640×480 is at most 250 ms; otherwise a warning.", kind,
      "raytracer.render", 120s, speed},
 };
 

@@ -26,7 +26,7 @@ void colour_order(Context &context) {
         const Pixel p = centre_of(picture);
         for (int other = 0; other < 3; ++other)
             if (other == channel ? p[other] < 128 : p[other] > 20)
-                throw Failure(fmt::format("pixel (80, 60): a {} sphere is {}; the bytes are R, G, B, A",
+                throw Failure(fmt::format("pixel (80, 60): a {} sphere is {}; the byte order is R, G, B, A",
                                           names[channel], text_of(p)))
                     .with("rendered", picture)
                     .at(80, 60);
@@ -39,25 +39,25 @@ void srgb(Context &context) {
             Tracer(context, one_sphere({0, 0, 0, 30}, glowing(glm::vec3(value)))).render(from_front());
         const int code = centre_of(picture)[1], expected = srgb8_exact(double{value});
         if (std::abs(code - expected) > 1)
-            throw Failure(fmt::format("pixel (80, 60): {} in linear light has code {} and must have {}, sRGB-encoded",
+            throw Failure(fmt::format("pixel (80, 60): linear light of {} is encoded as {}; expected {} (sRGB)",
                                       value, code, expected))
                 .with("rendered", picture)
                 .at(80, 60);
     }
 }
 
-// A plane at z = 0 under a light; `irradiance` is of a point, by the formulas.
+// Compares a plane at z = 0 under a light with `irradiance(point)`, the formula.
 template <class Irradiance> void expect_plane(Context &context, const arhost_light &light, Irradiance &&irradiance) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.1f);
-    // One triangle for each side: between two that share an edge, a fast ray tracer may have a gap.
+    // One triangle per side: a fast ray tracer may leave a gap between triangles that share an edge.
     const scene::TriangleMesh plane{
         {{-600, -300, 1}, {600, -300, 1}, {0, 900, 1}, {-600, -300, -1}, {600, -300, -1}, {0, 900, -1}},
         {},
         {},
         {{0, 1, 2}, {5, 4, 3}}};
     builder.add_object("plane", builder.add_triangles(plane), builder.add_material(diffuse(glm::vec3(0.8f))));
-    for (const float side : {1.0f, -1.0f}) { // the same above and below
+    for (const float side : {1.0f, -1.0f}) { // same light on both sides
         arhost_light one = light;
         one.position[2] *= side;
         one.direction[2] *= side;
@@ -71,7 +71,7 @@ template <class Irradiance> void expect_plane(Context &context, const arhost_lig
         const int code = picture.at(x, y)[0];
         return std::abs(code - expected) <= 1
                    ? ""
-                   : fmt::format("a lit plane has code {} and must have {} by Lambert's law", code, expected);
+                   : fmt::format("a lit plane has the code {}; expected {} by Lambert's law", code, expected);
     });
 }
 
@@ -110,9 +110,9 @@ void shadow_on_object(Context &context) {
     builder.add_light(lamp({150, 0, 200}, 0.8f));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     const int shadowed = picture.at(79, 59)[1], lit = picture.at(79, 99)[1];
-    if (2 * shadowed > lit + shadowed || shadowed > 120) // 89 or so by the ambient light alone, beside 195
+    if (2 * shadowed > lit + shadowed || shadowed > 120) // about 89 from ambient light alone, 195 if lit
         throw Failure(
-            fmt::format("pixel (79, 59): a ball is between lamp and plane, the code is {}; in the light it is {}",
+            fmt::format("pixel (79, 59): a ball is between lamp and plane, but the code is {}; the lit plane has {}",
                         shadowed, lit))
             .with("rendered", picture)
             .at(79, 59);

@@ -13,14 +13,14 @@ namespace arhost::conformance {
 namespace {
 
 struct Part {
-    scene::TriangleMesh mesh; // one of the two
-    scene::Spheres spheres;   // is empty
-    std::uint32_t material;   // of `materials` below
+    scene::TriangleMesh mesh; // either the mesh
+    scene::Spheres spheres;   // or the spheres are empty
+    std::uint32_t material;   // index in scene_of
     arhost_role role = ARHOST_ROLE_VIRTUAL;
-    glm::mat4 place{1};
+    glm::mat4 transform{1};
 };
 
-// A smooth ellipsoid, a box, balls and a post on a table, each in another place than it was made in.
+// A smooth ellipsoid, a box, balls and a post on a table, each with a transform.
 std::vector<Part> parts() {
     const auto at = [](float x, float y, float z) { return glm::translate(glm::mat4(1), glm::vec3(x, y, z)); };
     const glm::mat4 turned = glm::rotate(at(-34, 6, 20), 0.5f, glm::vec3(0, 0, 1));
@@ -41,73 +41,72 @@ scene::ArenaBuilder scene_of(const std::vector<Part> &parts) {
     for (const Part &part : parts) {
         const std::uint32_t geometry =
             part.spheres.empty() ? builder.add_triangles(part.mesh) : builder.add_spheres(part.spheres);
-        builder.add_object("part", geometry, part.material, part.role, glm::mat4x3(part.place));
+        builder.add_object("part", geometry, part.material, part.role, glm::mat4x3(part.transform));
     }
     builder.add_light(lamp({40, -80, 160}, 0.6f));
     builder.add_light(lamp({-120, -60, 200}, 0.3f));
     return builder;
 }
 
-void expect_same(Context &context, const std::vector<Part> &other, const std::string &what) {
-    const Picture should = Tracer(context, scene_of(parts())).render(still_life_camera());
-    expect_alike(Tracer(context, scene_of(other)).render(still_life_camera()), should, what, 3, 0.01);
+void expect_same(Context &context, const std::vector<Part> &other, const std::string &violation) {
+    const Picture expected = Tracer(context, scene_of(parts())).render(still_life_camera());
+    expect_alike(Tracer(context, scene_of(other)).render(still_life_camera()), expected, violation, 3, 0.01);
 }
 
 void object_order(Context &context) {
     const std::vector<Part> all = parts();
     const std::vector<Part> reversed(all.rbegin(), all.rend());
-    expect_same(context, reversed, "the same objects in the reverse order look different");
+    expect_same(context, reversed, "reversing the order of objects changes the image");
 }
 
 void split_mesh(Context &context) {
     std::vector<Part> split;
     for (const Part &part : parts()) {
         for (const glm::vec4 &sphere : part.spheres)
-            split.push_back({{}, {sphere}, part.material, part.role, part.place});
+            split.push_back({{}, {sphere}, part.material, part.role, part.transform});
         constexpr std::size_t pieces = 5;
         const std::vector<glm::uvec3> &all = part.mesh.triangles;
         for (std::size_t piece = 0; piece < pieces; ++piece) {
-            Part some = part;
-            some.mesh.triangles.assign(all.data() + piece * all.size() / pieces,
-                                       all.data() + (piece + 1) * all.size() / pieces);
-            if (!some.mesh.triangles.empty())
-                split.push_back(std::move(some));
+            Part object = part;
+            object.mesh.triangles.assign(all.data() + piece * all.size() / pieces,
+                                         all.data() + (piece + 1) * all.size() / pieces);
+            if (!object.mesh.triangles.empty())
+                split.push_back(std::move(object));
         }
     }
-    expect_same(context, split, "meshes in pieces, each an object, look different from whole ones");
+    expect_same(context, split, "splitting meshes into several objects changes the image");
 }
 
 void object_transform(Context &context) {
-    std::vector<Part> in_the_world = parts();
-    for (Part &part : in_the_world) {
-        const glm::mat4 place = std::exchange(part.place, glm::mat4(1));
-        const auto moved = [&](const glm::vec3 &point) { return glm::vec3(place * glm::vec4(point, 1)); };
+    std::vector<Part> in_world = parts();
+    for (Part &part : in_world) {
+        const glm::mat4 transform = std::exchange(part.transform, glm::mat4(1));
+        const auto moved = [&](const glm::vec3 &point) { return glm::vec3(transform * glm::vec4(point, 1)); };
         for (glm::vec3 &position : part.mesh.positions)
             position = moved(position);
         for (glm::vec3 &normal : part.mesh.normals)
-            normal = glm::normalize(glm::inverseTranspose(glm::mat3(place)) * normal);
+            normal = glm::normalize(glm::inverseTranspose(glm::mat3(transform)) * normal);
         for (glm::vec4 &sphere : part.spheres)
             sphere = glm::vec4(moved(glm::vec3(sphere)), sphere.w);
     }
-    expect_same(context, in_the_world,
-                "objects whose vertices are in the world look different from those that "
-                "world_from_object puts there");
+    expect_same(context, in_world,
+                "transforming vertices in advance instead of by world_from_object changes the image");
 }
 
-// ---- Large ones ------------------------------------------------------------------------------------
+// ---- Large scenes ----------------------------------------------------------------------------------
 
 void size(Context &context) {
-    const Picture should = Tracer(context, still_life()).render(still_life_camera());
+    const Picture expected = Tracer(context, still_life()).render(still_life_camera());
     for (const double factor : {1e-3, 1e6}) {
         const glm::dmat4 scaled = glm::scale(glm::dmat4(1), glm::dvec3(factor));
-        const Picture is =
+        const Picture actual =
             Tracer(context, still_life(glm::mat4(scaled))).render(still_life_camera(pinhole(), scaled));
-        expect_alike(is, should, fmt::format("scene and camera {:g} times as large, the image is another", factor), 3,
+        expect_alike(actual, expected, fmt::format("scaling scene and camera by {:g} changes the image", factor), 3,
                      0.01);
     }
 }
 
-// Small images: what counts is that everything is there, not how fast a ray finds it.
+// Small, because the following tests check completeness, not speed.
 arhost_intrinsics small_image() {
     return pinhole(40, 30, 50);
 }
@@ -121,14 +120,14 @@ void many_triangles(Context &context) {
     builder.settings.ambient = glm::vec3(1);
     builder.add_object("ball", builder.add_triangles(std::move(mesh)),
                        builder.add_material(glowing(glm::vec3(0.5f))));
-    const Picture is = Tracer(context, std::move(builder)).render(from_front(small_image()));
-    expect_pixels(is, [&](auto x, auto y) {
-        const double r = distance_from_centre(is, x, y), rim = 50 * 30 / std::sqrt(200.0 * 200 - 30 * 30);
-        const int alpha = is.alpha(x, y);
+    const Picture actual = Tracer(context, std::move(builder)).render(from_front(small_image()));
+    expect_pixels(actual, [&](auto x, auto y) {
+        const double r = distance_from_centre(actual, x, y), rim = 50 * 30 / std::sqrt(200.0 * 200 - 30 * 30);
+        const int alpha = actual.alpha(x, y);
         if (r < rim - 1.5 && alpha < 250)
-            return fmt::format("a ball of {} triangles is here but alpha is {}", count, alpha);
+            return fmt::format("a ball of {} triangles covers this pixel, but alpha is {}", count, alpha);
         if (r > rim + 1.5 && alpha > 2)
-            return fmt::format("beside a ball of {} triangles alpha is {}", count, alpha);
+            return fmt::format("outside a ball of {} triangles, alpha is {}", count, alpha);
         return std::string();
     });
 }
@@ -146,9 +145,9 @@ void many_objects(Context &context) {
     const std::uint32_t same = thousand.add_material(material);
     for (const glm::vec4 &sphere : spheres)
         thousand.add_object("one", thousand.add_spheres({sphere}), same);
-    const Picture should = Tracer(context, std::move(one)).render(from_front(small_image()));
-    expect_alike(Tracer(context, std::move(thousand)).render(from_front(small_image())), should,
-                 "1,000 objects of one sphere look different from one of 1,000 spheres", 3, 0.01);
+    const Picture expected = Tracer(context, std::move(one)).render(from_front(small_image()));
+    expect_alike(Tracer(context, std::move(thousand)).render(from_front(small_image())), expected,
+                 "1,000 objects of one sphere each look different from one object of 1,000 spheres", 3, 0.01);
 }
 
 constexpr const char *gate = "raytracer.render";

@@ -42,7 +42,8 @@ public:
         std::error_code error;
         std::string pattern = std::filesystem::temp_directory_path(error) / "arhost-conform-XXXXXX";
         if (error)
-            throw std::runtime_error("the folder for temporary files does not exist; set TMPDIR to one that does");
+            throw std::runtime_error(
+                "the folder for temporary files does not exist; set TMPDIR to an existing folder");
         if (!::mkdtemp(pattern.data()))
             base::throw_errno("mkdtemp " + pattern);
         path_ = pattern;
@@ -138,7 +139,7 @@ public:
     std::array<int, 2> fds() const { return {result_.read_end.get(), output_.read_end.get()}; }
     Clock::time_point deadline() const { return deadline_; }
 
-    // Reads available output. True once the process has ended, timed out, or written more than a result can take.
+    // Reads available output. True once the process has ended, timed out, or exceeded the size limit of a result.
     bool poll() {
         const bool ended = ended_ || ::waitpid(pid_, &status_, WNOHANG) == pid_;
         read_output(); // after waitpid, so that the process's last output is available
@@ -174,7 +175,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t max_result_size = 32 << 20; // images take some MB
+    static constexpr std::size_t max_result_size = 32 << 20; // images take several MB
     bool has_flooded() const { return text_.size() > max_result_size; }
 
     // The plugin may have written to the result pipe.

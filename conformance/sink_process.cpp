@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char *helper = "sink.process";
 
-// In that process: reads the work from standard input, and writes a byte per frame to result_fd. If it fails, the
+// Runs in the process: reads the work from standard input and writes a byte per frame to result_fd. If it fails, the
 // test's result follows.
 void work(Context &context) {
     SinkProcess::Work work{};
@@ -52,21 +52,21 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
     for (const auto &[key, value] : library.settings())
         arguments.insert(arguments.end(), {"--set", key + "=" + value});
 
-    Pipe orders, written;
+    Pipe work_pipe, progress_pipe;
     const ipc::SharedMemory call_page = ipc::SharedMemory::create("arhost-conform-call", sizeof(ipc::Call));
-    pid_ = start_process(std::move(arguments), {orders.read_end.get(), STDOUT_FILENO, STDERR_FILENO,
-                                                written.write_end.get(), call_page.fd()});
-    orders_ = std::move(orders.write_end);
-    written_ = std::move(written.read_end);
-    const std::string order =
+    pid_ = start_process(std::move(arguments), {work_pipe.read_end.get(), STDOUT_FILENO, STDERR_FILENO,
+                                                progress_pipe.write_end.get(), call_page.fd()});
+    work_pipe_ = std::move(work_pipe.write_end);
+    progress_pipe_ = std::move(progress_pipe.read_end);
+    const std::string line =
         fmt::format("{} {} {} {}\n", work.frames, work.size.width, work.size.height, work.folder);
-    if (::write(orders_.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
+    if (::write(work_pipe_.get(), line.data(), line.size()) != static_cast<ssize_t>(line.size()))
         base::throw_errno("write to the sink's process");
 }
 
 void SinkProcess::wait_until_written(std::uint64_t frames) {
     std::string result; // follows the last frame's byte
-    for (char byte = 0; count_ < frames && ::read(written_.get(), &byte, 1) == 1;)
+    for (char byte = 0; count_ < frames && ::read(progress_pipe_.get(), &byte, 1) == 1;)
         if (byte == '.' && result.empty())
             ++count_;
         else

@@ -23,12 +23,12 @@ public:
     SinkProcess(const SinkProcess &) = delete;
     SinkProcess &operator=(const SinkProcess &) = delete;
 
-    void wait_until_written(std::uint64_t frames); // throws Failure if it ends before
-    void kill();                                   // by SIGTERM, and SIGKILL a second later; waits for the process
+    void wait_until_written(std::uint64_t frames); // throws Failure if the process ends first
+    void kill();                                   // by SIGTERM, then SIGKILL a second later; waits for the process
 
 private:
-    pid_t pid_ = 0;                   // 0 once reaped
-    base::UniqueFd orders_, written_; // the process ends when orders_ is closed
+    pid_t pid_ = 0;                            // 0 once reaped
+    base::UniqueFd work_pipe_, progress_pipe_; // the process ends when work_pipe_ is closed
     std::uint64_t count_ = 0;
 };
 

@@ -17,7 +17,7 @@ struct Size {
     std::uint32_t width = 64, height = 48;
 };
 
-// A frame in read-only memory, as the host's, with inaccessible memory after its last row. Its pixels are
+// A frame in read-only memory, like the host's, with inaccessible memory after its last row. Its pixels are
 // incompressible noise that differs for each frame.
 class SealedOutput {
 public:
@@ -26,7 +26,7 @@ public:
         Size size{};
         std::uint32_t padding = 0;   // bytes per row in addition to the host's stride
         std::uint8_t in_padding = 0; // value of the bytes after a row's pixels
-        bool other = false;          // a different frame with that number
+        bool other = false;          // a different frame with the same number
     };
     explicit SealedOutput(const Content &content);
 

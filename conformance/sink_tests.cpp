@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sinks: accepted input, and their files in normal operation, after a kill and on a full disk.
+// Sinks: accepted input, and files in normal operation, after a kill, and on a full or slow disk.
 #include "conformance/cancelling.hpp"
 #include "conformance/frame_times.hpp"
 #include "conformance/process_usage.hpp"
@@ -34,21 +34,21 @@ void require_files(Context &context) {
     throw Skip("it has no output path, so its output cannot be checked");
 }
 
-void expect_same(const Files &is, const Files &should, const std::string &what) {
-    for (const auto &[name, bytes] : should) {
-        const auto found = is.find(name);
-        if (found == is.end())
-            throw Failure(fmt::format("{}: '{}' is missing", what, name));
+void expect_same(const Files &actual, const Files &expected, const std::string &when) {
+    for (const auto &[name, bytes] : expected) {
+        const auto found = actual.find(name);
+        if (found == actual.end())
+            throw Failure(fmt::format("{}: '{}' is missing", when, name));
         if (found->second.size() != bytes.size())
             throw Failure(
-                fmt::format("{}: '{}' has {} bytes instead of {}", what, name, found->second.size(), bytes.size()));
+                fmt::format("{}: '{}' has {} bytes instead of {}", when, name, found->second.size(), bytes.size()));
         const auto at = std::mismatch(bytes.begin(), bytes.end(), found->second.begin());
         if (at.first != bytes.end())
-            throw Failure(fmt::format("{}: '{}' differs from byte {} on", what, name, at.first - bytes.begin()));
+            throw Failure(fmt::format("{}: '{}' differs from byte {} on", when, name, at.first - bytes.begin()));
     }
-    for (const auto &[name, bytes] : is)
-        if (!should.contains(name))
-            throw Failure(fmt::format("{}: '{}' is unexpected", what, name));
+    for (const auto &[name, bytes] : actual)
+        if (!expected.contains(name))
+            throw Failure(fmt::format("{}: '{}' is unexpected", when, name));
 }
 
 // The files after each frame of an uninterrupted run, and at its end.
@@ -112,7 +112,7 @@ void two_instances(Context &context) {
     }
     second.stop();
     first.stop();
-    expect_same(first.files(), alone.run(3), "with another instance at work meanwhile");
+    expect_same(first.files(), alone.run(3), "while another instance was active");
 }
 
 void leaks(Context &context) {
@@ -146,7 +146,7 @@ void cancelled(Context &context) {
     expect_ok_or_cancelled("start", starting.try_start());
 }
 
-// ---- What it is given ------------------------------------------------------------------------------
+// ---- Input -----------------------------------------------------------------------------------------
 
 void sizes(Context &context) {
     int i = 0;
@@ -174,21 +174,21 @@ void stride(Context &context) {
         sink.stop();
         return sink.files();
     };
-    const Files should = run("a", 0, 0);
-    expect_same(run("b", 0, 0xa5), should, "with other bytes behind each row's pixels");
-    expect_same(run("c", 128, 0x5a), should, "with rows 128 bytes longer");
+    const Files expected = run("a", 0, 0);
+    expect_same(run("b", 0, 0xa5), expected, "with different padding bytes");
+    expect_same(run("c", 128, 0x5a), expected, "with 128 more bytes of padding per row");
 }
 
 void records(Context &context) {
     SinkRun run(context, "out");
     run.start();
     std::uint64_t n = 0;
-    const auto write = [&](const char *what, void (*change)(arhost_record &)) {
+    const auto write = [&](const char *description, void (*change)(arhost_record &)) {
         SealedOutput frame({n++});
         frame.change(change);
-        run.instance().expect_ok(fmt::format("write of a frame {}", what).c_str(), run.try_write(frame));
+        run.instance().expect_ok(fmt::format("write of a frame {}", description).c_str(), run.try_write(frame));
     };
-    write("as any", [](arhost_record &) {});
+    write("with a camera and a marker", [](arhost_record &) {});
     write("without markers and camera", [](arhost_record &r) {
         r.marker_count = 0;
         r.has_camera = 0;
@@ -202,7 +202,7 @@ void records(Context &context) {
             r.markers[i].id = i;
         }
     });
-    write("with a marker that is lost and a held overlay", [](arhost_record &r) {
+    write("with a lost marker and a held overlay", [](arhost_record &r) {
         r.overlay = ARHOST_OVERLAY_HELD;
         r.markers[0].state = ARHOST_MARKER_LOST;
         r.markers[0].age_frames = 17;
@@ -212,7 +212,7 @@ void records(Context &context) {
         r.truth_id = 3;
         std::copy_n(r.markers[0].mt, 16, r.true_mt);
     });
-    write("with a marker that is predicted, and one that is lost, far away", [](arhost_record &r) {
+    write("with a predicted marker and a distant lost one", [](arhost_record &r) {
         r.marker_count = 2;
         r.markers[0].state = ARHOST_MARKER_PREDICTED;
         r.markers[0].age_frames = std::numeric_limits<std::uint32_t>::max();
@@ -220,10 +220,10 @@ void records(Context &context) {
         r.markers[1].state = ARHOST_MARKER_LOST;
         r.markers[1].mt[14] = -1e9;
     });
-    write("with numbers as large as they can be", [](arhost_record &r) {
-        constexpr double most = std::numeric_limits<double>::max();
-        r.markers[0].reprojection_px = r.markers[0].ambiguity = most;
-        r.markers[0].corners_px[0][0] = -most;
+    write("with the largest finite numbers", [](arhost_record &r) {
+        constexpr double max = std::numeric_limits<double>::max();
+        r.markers[0].reprojection_px = r.markers[0].ambiguity = max;
+        r.markers[0].corners_px[0][0] = -max;
     });
     run.stop();
 }
@@ -236,7 +236,7 @@ void gaps(Context &context) {
     run.stop();
 }
 
-// ---- What becomes of it ----------------------------------------------------------------------------
+// ---- Files -----------------------------------------------------------------------------------------
 
 void files(Context &context) {
     const Files once = history_of(context, 4).end;
@@ -245,9 +245,9 @@ void files(Context &context) {
     SinkRun run(context, "again");
     const Files again = run.run(4);
     try {
-        expect_same(again, once, "given the same frames again");
+        expect_same(again, once, "in a second run with the same frames");
     } catch (const Failure &difference) { // for example a date
-        throw Skip(std::string("its runs cannot be compared: ") + difference.what());
+        throw Skip(std::string("its files are not reproducible: ") + difference.what());
     }
 }
 
@@ -262,10 +262,8 @@ void every_frame(Context &context) {
     const History history = history_of(context, frames);
     for (std::size_t n = 0; n < frames; ++n)
         if (history.after[n] == history.after[n + 1])
-            throw Failure(
-                fmt::format("write of frame {} returned OK, but no file has changed; from then on the frame "
-                            "must survive a kill",
-                            n));
+            throw Failure(fmt::format(
+                "write of frame {} returned OK, but no file has changed; the frame must be in a file by then", n));
 }
 
 using Number = std::pair<std::size_t, std::string>; // number of digits first, so that "10" sorts after "9"
@@ -299,13 +297,13 @@ void order(Context &context) {
         std::uint64_t frame;
         std::size_t byte;
     };
-    const Files usual = files_with_other(frames); // none
+    const Files unchanged = files_with_other(frames); // replaces no frame
     std::map<std::string, std::vector<Change>> changes;
     std::set<std::string> resized;
     for (std::uint64_t frame = 0; frame < frames; ++frame)
         for (const auto &[name, bytes] : files_with_other(frame)) {
-            const auto found = usual.find(name);
-            if (found == usual.end() || found->second == bytes)
+            const auto found = unchanged.find(name);
+            if (found == unchanged.end() || found->second == bytes)
                 continue;
             if (found->second.size() != bytes.size())
                 resized.insert(name);
@@ -323,8 +321,7 @@ void order(Context &context) {
             for (const auto &[family, number] : numbers_in(name))
                 families[family][number] = {of_file[0].frame, name};
         for (std::size_t i = 1; i < of_file.size() && !resized.contains(name); ++i) {
-            reported =
-                reported || of_file[i].byte > of_file[i - 1].byte; // equal: may be a checksum at the file's start
+            reported = reported || of_file[i].byte > of_file[i - 1].byte; // equal: may be a checksum in the header
             if (of_file[i].byte < of_file[i - 1].byte)
                 throw Failure(
                     fmt::format("in '{}', frame {} begins at byte {}, before frame {}, which begins at byte {}", name,
@@ -335,22 +332,21 @@ void order(Context &context) {
         std::set<std::uint64_t> in_files;
         for (const auto &[number, file] : files)
             in_files.insert(file.frame);
-        if (in_files.size() != frames) // the number is not the frame's
+        if (in_files.size() != frames) // it is not a frame number
             continue;
         reported = true;
         const File *before = nullptr;
         for (const auto &[number, file] : files) {
             if (before && file.frame == before->frame)
-                throw Failure(
-                    fmt::format("frame {} is in '{}', and in '{}' too", file.frame, before->name, file.name));
+                throw Failure(fmt::format("frame {} is in both '{}' and '{}'", file.frame, before->name, file.name));
             if (before && file.frame < before->frame)
-                throw Failure(fmt::format("frame {} is in '{}', and frame {} in '{}'", before->frame, before->name,
-                                          file.frame, file.name));
+                throw Failure(fmt::format("frame {} is in '{}', but the earlier frame {} is in '{}'", before->frame,
+                                          before->name, file.frame, file.name));
             before = &file;
         }
     }
     if (!reported)
-        throw Skip("its files do not show where a frame begins unless decoded");
+        throw Skip("the position of a frame in its files is unknown without decoding");
 }
 
 void last_frame(Context &context) {
@@ -361,35 +357,35 @@ void last_frame(Context &context) {
     run.write(SealedOutput({.sequence = 2, .size = {}, .padding = 0, .in_padding = 0, .other = true}));
     run.stop();
     if (run.files() == one)
-        throw Failure("with another last frame and another camera, its files are the same");
+        throw Failure("its files do not depend on the last frame and its camera");
 }
 
 void earlier_files(Context &context) {
-    const Files should = history_of(context, 3).end;
-    SinkRun run(context, "uninterrupted"); // which has an earlier run's files
+    const Files expected = history_of(context, 3).end;
+    SinkRun run(context, "uninterrupted"); // the folder of the run above
     run.start();
-    expect_same(run.files(), should, "after a restart without a frame");
+    expect_same(run.files(), expected, "after a restart without a frame");
     run.stop();
-    expect_same(run.files(), should, "after a restart and a stop without a frame");
+    expect_same(run.files(), expected, "after a restart and a stop without a frame");
 }
 
 void no_place(Context &context) {
     SinkRun run(context, "file");
     const std::filesystem::path folder = context.library.scratch() / "file";
     std::filesystem::remove(folder);
-    std::ofstream(folder) << "no folder";
+    std::ofstream(folder) << "not a folder";
     const arhost_status status = run.try_start();
     if (status == ARHOST_STATUS_OK)
-        throw Failure("its output would lie in a folder that is a file, but start returned OK");
+        throw Failure("its output folder is a file, but start returned OK");
     if (run.instance().host().last_error().empty())
-        throw Failure(
-            fmt::format("start cannot write anything and returned {} without an error message", status_name(status)));
+        throw Failure(fmt::format("start returned {} without an error message when its output folder was a file",
+                                  status_name(status)));
 }
 
 // ---- Kills -----------------------------------------------------------------------------------------
 
-// The minimum, which is the least affected by waiting.
-std::chrono::steady_clock::duration time_of_a_write(Context &context, const Size &size) {
+// The minimum of several writes, which is the least affected by other load.
+std::chrono::steady_clock::duration write_duration(Context &context, const Size &size) {
     auto shortest = std::chrono::steady_clock::duration::max();
     SinkRun run(context, "timed");
     run.start(0, size);
@@ -407,25 +403,25 @@ void killed(Context &context) {
     constexpr std::uint64_t frames = 4, done = 2;
     constexpr Size size{160, 120};
     const History history = history_of(context, frames, size);
-    const std::chrono::duration<double> a_frame = time_of_a_write(context, size);
+    const std::chrono::duration<double> frame_duration = write_duration(context, size);
     int i = 0;
-    for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+    for (const double fraction : {0.1, 0.3, 0.5, 0.7, 0.9}) {
         const std::string folder = fmt::format("killed-{}", i++);
         SinkProcess process(context, {folder, frames, size});
         process.wait_until_written(done);
-        std::this_thread::sleep_for(part * a_frame);
+        std::this_thread::sleep_for(fraction * frame_duration);
         process.kill();
         for (const auto &[name, bytes] : files_in(context.library.scratch() / folder))
             if (history.end.contains(name) && !history.has_been(name, bytes))
-                throw Failure(fmt::format("killed while it wrote frame {}, its file '{}' has {} bytes, unlike after "
-                                          "any frame: it is incomplete",
-                                          done, name, bytes.size()));
+                throw Failure(fmt::format(
+                    "killed while writing frame {}, it leaves '{}' with {} bytes, which matches no completed frame",
+                    done, name, bytes.size()));
     }
 }
 
 void restart(Context &context) {
     constexpr std::uint64_t frames = 8, first = 4;
-    const Files should = history_of(context, frames).end;
+    const Files expected = history_of(context, frames).end;
     {
         SinkProcess process(context, {"killed", frames, {}});
         process.wait_until_written(frames);
@@ -435,21 +431,21 @@ void restart(Context &context) {
     run.start(first);
     run.write(first, frames);
     run.stop();
-    const Files is = run.files();
-    for (const auto &[name, bytes] : should) {
-        const auto found = is.find(name);
-        if (found == is.end())
-            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is missing", first, name));
-        // Encoded again, the file differs but has as many frames.
+    const Files actual = run.files();
+    for (const auto &[name, bytes] : expected) {
+        const auto found = actual.find(name);
+        if (found == actual.end())
+            throw Failure(fmt::format("killed and restarted at frame {}: '{}' is missing", first, name));
+        // A re-encoded file has different bytes but a similar size.
         const double ratio = static_cast<double>(found->second.size()) / static_cast<double>(bytes.size());
-        if (constexpr double least = 0.8; ratio < least || ratio > 1 / least)
-            throw Failure(fmt::format("killed after {} frames, and started again at frame {}: '{}' has {} bytes, and "
-                                      "{} if uninterrupted",
-                                      frames, first, name, found->second.size(), bytes.size()));
+        if (constexpr double min_ratio = 0.8; ratio < min_ratio || ratio > 1 / min_ratio)
+            throw Failure(fmt::format(
+                "killed after {} frames and restarted at frame {}: '{}' has {} bytes, but {} if uninterrupted",
+                frames, first, name, found->second.size(), bytes.size()));
     }
-    for (const auto &[name, bytes] : is)
-        if (!should.contains(name))
-            throw Failure(fmt::format("killed, and started again at frame {}: '{}' is left over", first, name));
+    for (const auto &[name, bytes] : actual)
+        if (!expected.contains(name))
+            throw Failure(fmt::format("killed and restarted at frame {}: '{}' is left over", first, name));
 }
 
 // ---- A full disk -----------------------------------------------------------------------------------
@@ -489,21 +485,21 @@ void full_disk(Context &context) {
         status = status == ARHOST_STATUS_OK ? stopped : status;
     }
     if (status == ARHOST_STATUS_OK)
-        throw Failure(fmt::format("a file of it that grows to {} bytes may have {}, but every call returned OK",
+        throw Failure(fmt::format("its largest file has {} bytes; with a limit of {} bytes, every call returned OK",
                                   largest, largest / 2));
     if (run.instance().host().last_error().empty())
         throw Failure(fmt::format("on a full disk it returned {} without an error message", status_name(status)));
     for (const auto &[name, bytes] : run.files())
-        if (const auto whole = history.end.find(name);
-            whole != history.end.end() && whole->second.starts_with(bytes) && !history.has_been(name, bytes))
-            throw Failure(fmt::format("on a full disk, '{}' is left with {} of {} bytes", name, bytes.size(),
-                                      whole->second.size()));
+        if (const auto complete = history.end.find(name);
+            complete != history.end.end() && complete->second.starts_with(bytes) && !history.has_been(name, bytes))
+            throw Failure(fmt::format("on a full disk, it leaves '{}' with {} of {} bytes", name, bytes.size(),
+                                      complete->second.size()));
 }
 
 // ---- A slow disk -----------------------------------------------------------------------------------
 
 void slow_disk(Context &context) {
-    SlowDisk::under([&](SlowDisk &disk) {
+    SlowDisk::run([&](SlowDisk &disk) {
         require_files(context);
         require_every_frame(context);
         constexpr std::uint64_t frames = 3;
@@ -517,10 +513,10 @@ void slow_disk(Context &context) {
             Files after = run.files();
             has_delayed = has_delayed || disk.has_delayed(); // a dropped frame has no write to delay
             if (!has_delayed)
-                throw Skip("its writes cannot be delayed: memory maps, io_uring or another process");
+                throw Skip("its writes cannot be delayed: it uses memory maps, io_uring or another process");
             if (after == before)
                 throw Failure(
-                    fmt::format("on a slow disk write of frame {} returned OK, but no file has changed", n));
+                    fmt::format("on a slow disk, write of frame {} returned OK, but no file has changed", n));
             before = std::move(after);
         }
         run.stop();
@@ -555,22 +551,20 @@ constexpr arhost_kind kind = ARHOST_KIND_SINK;
 constexpr const char *gate = "sink.write", *same = "sink.files";
 constexpr Test tests[] = {
     {"sink.start", "It starts and stops.", kind, "abi.create", 30s, start},
-    {"sink.write", "It accepts frames in read-only memory and reads nothing after them.", kind, "sink.start", 30s,
+    {"sink.write", "It accepts frames in read-only memory and does not read beyond them.", kind, "sink.start", 30s,
      write},
     {"sink.sizes",
-     "It accepts frames of one pixel, one row, one column, odd and usual sizes, or rejects them with an error "
-     "message.",
+     "It accepts frames of any size, also one pixel, one row or one column, or rejects them with an error message.",
      kind, gate, 60s, sizes},
     {"sink.records", "It accepts records with any number of markers, without a camera, and with huge numbers.", kind,
      gate, 30s, records},
     {"sink.gaps", "It accepts gaps in the frames' sequence numbers.", kind, gate, 30s, gaps},
     {"sink.idle", "idle succeeds between frames.", kind, gate, 30s, idle},
-    {"sink.cancelled", "After cancellation, start, write and stop return soon, with OK or CANCELLED.", kind, gate,
-     30s, cancelled},
-    {"sink.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 60s, leaks},
-    {"sink.files",
-     "It writes files. Unless the same frames give the same files, tests that compare runs are skipped.", kind, gate,
-     30s, of_files<files>},
+    {"sink.cancelled", "After cancellation, start, write and stop promptly return OK or CANCELLED.", kind, gate, 30s,
+     cancelled},
+    {"sink.leaks", "Frames, starts and stops leak no descriptors, threads or memory.", kind, gate, 60s, leaks},
+    {"sink.files", "It writes files. If the same frames give different files, tests that compare runs are skipped.",
+     kind, gate, 30s, of_files<files>},
     {"sink.start-again", "After a stop, another instance starts and writes the same files for the same frames.", kind,
      same, 30s, of_files<start_again>},
     {"sink.two-instances", "Two simultaneous instances do not mix their files.", kind, same, 30s,
@@ -580,19 +574,19 @@ constexpr Test tests[] = {
     {"sink.order", "Each frame is stored once and in order: within a file, or in files by the number in their names.",
      kind, same, 30s, of_files<order>},
     {"sink.last-frame", "Its files contain the last frame.", kind, same, 30s, of_files<last_frame>},
-    {"sink.earlier-files", "It does not change an earlier run's files before its first frame.", kind, gate, 30s,
+    {"sink.earlier-files", "It does not change the files of an earlier run before its first frame.", kind, gate, 30s,
      of_files<earlier_files>},
-    {"sink.no-place", "start fails with an error message if nothing can be written.", kind, gate, 30s,
+    {"sink.no-place", "start fails with an error message if its output cannot be written.", kind, gate, 30s,
      of_files<no_place>},
-    {"sink.killed", "When it is killed, no incomplete file has a final file name.", kind, same, 60s, of_files<killed>,
+    {"sink.killed", "A kill leaves no incomplete file under a final file name.", kind, same, 60s, of_files<killed>,
      true},
-    {"sink.restart", "Restarted after a kill, it keeps the frames before first_sequence and replaces the rest.", kind,
+    {"sink.restart", "A restart after a kill keeps the frames before first_sequence and replaces the rest.", kind,
      gate, 60s, of_files<restart>, true},
     {"sink.full-disk", "On a full disk it reports an error and leaves no incomplete file.", kind, same, 60s,
      of_files<full_disk>},
-    {"sink.slow-disk", "On a slow disk too, the frame is in a file when write returns OK.", kind, "sink.every-frame",
+    {"sink.slow-disk", "Also on a slow disk, the frame is in a file when write returns OK.", kind, "sink.every-frame",
      60s, slow_disk},
-    {"sink.speed", "The median time of a small frame is at most 100 ms; otherwise a warning.", kind, gate, 120s,
+    {"sink.speed", "The median time of write at 640×480 is at most 100 ms; otherwise a warning.", kind, gate, 120s,
      speed},
 };
 

@@ -19,7 +19,7 @@ namespace {
 constexpr const char *writes[] = {"write", "writev",   "pwrite64",        "pwritev",   "pwritev2", "fdatasync",
                                   "fsync", "sendfile", "copy_file_range", "ftruncate", "fallocate"};
 
-// From now on the kernel notifies of each write of the calling thread. Returns the listener, or a negative value.
+// Makes the kernel report each write of the calling thread. Returns the listener's descriptor, or a negative value.
 int listen_to_writes() {
     const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW), seccomp_release);
     bool failed = !filter;
@@ -36,7 +36,7 @@ bool is_file(int fd) {
 
 } // namespace
 
-void SlowDisk::under(const std::function<void(SlowDisk &)> &work) {
+void SlowDisk::run(const std::function<void(SlowDisk &)> &work) {
     SlowDisk disk;
     std::promise<int> listening;
     std::future<void> done = std::async(std::launch::async, [&] {
@@ -58,20 +58,20 @@ bool SlowDisk::serve(int listener, const std::function<bool()> &is_done) {
     seccomp_notif_resp *response = nullptr;
     if (seccomp_notify_alloc(&request, &response) != 0)
         throw std::bad_alloc();
-    bool refused = false; // by kernels before 5.5
-    while (!refused && !is_done()) {
+    bool unsupported = false; // by kernels before 5.5
+    while (!unsupported && !is_done()) {
         pollfd ready{listener, POLLIN, 0};
         *request = {}; // required by the kernel
         if (::poll(&ready, 1, 2) != 1 || seccomp_notify_receive(listener, request) != 0)
             continue;
-        if (is_file(static_cast<int>(request->data.args[0])) && is_due_.exchange(false))
+        if (is_file(static_cast<int>(request->data.args[0])) && delay_pending_.exchange(false))
             std::this_thread::sleep_for(100ms);
         *response = {request->id, 0, 0, SECCOMP_USER_NOTIF_FLAG_CONTINUE};
-        refused =
+        unsupported =
             seccomp_notify_respond(listener, response) != 0 && errno == EINVAL; // other errors: the thread has ended
     }
     seccomp_notify_free(request, response);
-    return !refused;
+    return !unsupported;
 }
 
 } // namespace arhost::conformance

@@ -44,10 +44,10 @@ std::string Slot::damage() const {
     const std::uint8_t *begin = lines_.front().bytes, *end = begin + lines_.size() * sizeof(Line);
     for (const std::uint8_t *p = begin; p < data(); ++p)
         if (*p != guard)
-            return fmt::format("{} bytes before the slot", data() - p);
+            return fmt::format("a guard byte {} bytes before the slot", data() - p);
     for (const std::uint8_t *p = data() + size_; p < end; ++p)
         if (*p != guard)
-            return fmt::format("byte {} of a slot of {} bytes", p - data(), size_);
+            return fmt::format("a guard byte at offset {} of a slot of {} bytes", p - data(), size_);
     return {};
 }
 
@@ -78,27 +78,27 @@ arhost_status SourceRun::try_start(const Request &request) {
 
 void SourceRun::accept(arhost_status started) {
     instance_->expect_ok("start", started);
-    if (const std::string what = problem(); !what.empty())
-        throw Failure(what);
+    if (const std::string text = problem(); !text.empty())
+        throw Failure(text);
     slot_.emplace(format().byte_size);
 }
 
 std::string SourceRun::problem() const {
     const arhost_frame_format &f = properties_.format;
-    arhost_frame_format should = f;
+    arhost_frame_format expected = f;
     if (f.pixel_format < ARHOST_PIXEL_FORMAT_GREY8 || f.pixel_format > ARHOST_PIXEL_FORMAT_I420)
         return fmt::format("its pixel format {} is invalid", f.pixel_format);
-    if (!arhost_frame_layout(&should))
+    if (!arhost_frame_layout(&expected))
         return fmt::format("{}×{} is not a valid size for its pixel format", f.width, f.height);
     for (std::uint32_t plane = 0; plane < ARHOST_MAX_PLANES; ++plane)
-        if (f.stride[plane] != should.stride[plane] || f.offset[plane] != should.offset[plane])
+        if (f.stride[plane] != expected.stride[plane] || f.offset[plane] != expected.offset[plane])
             return fmt::format(
-                "plane {} begins at byte {} and has a stride of {}; arhost_frame_layout says {} and {}", plane,
-                f.offset[plane], f.stride[plane], should.offset[plane], should.stride[plane]);
-    if (f.plane_count != should.plane_count || f.byte_size != should.byte_size ||
-        f.grey_offset != should.grey_offset || f.grey_stride != should.grey_stride)
-        return fmt::format("its slots have {} planes and {} bytes; arhost_frame_layout says {} and {}", f.plane_count,
-                           f.byte_size, should.plane_count, should.byte_size);
+                "plane {} begins at byte {} and has a stride of {}; arhost_frame_layout gives {} and {}", plane,
+                f.offset[plane], f.stride[plane], expected.offset[plane], expected.stride[plane]);
+    if (f.plane_count != expected.plane_count || f.byte_size != expected.byte_size ||
+        f.grey_offset != expected.grey_offset || f.grey_stride != expected.grey_stride)
+        return fmt::format("its slots have {} planes and {} bytes; arhost_frame_layout gives {} and {}",
+                           f.plane_count, f.byte_size, expected.plane_count, expected.byte_size);
     const bool is_yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
     if (is_yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709))
         return fmt::format("its YUV matrix {} is invalid", f.yuv_matrix);

@@ -35,14 +35,14 @@ public:
     const std::uint8_t *data() const { return lines_.front().bytes + guard_size; }
     std::size_t size() const { return size_; }
     std::string
-    damage() const; // describes overwritten guard bytes, as the end of a sentence; empty if there are none
+    damage() const; // describes the first overwritten guard byte, as the end of a sentence; empty if there is none
 
 private:
     struct alignas(64) Line {
         std::uint8_t bytes[64];
     };
     static constexpr std::uint8_t guard = 0xa5;
-    static constexpr std::size_t guard_size = 64 * sizeof(Line); // before and behind
+    static constexpr std::size_t guard_size = 64 * sizeof(Line); // before and after
     std::size_t size_;
     std::vector<Line> lines_;
 };
@@ -83,7 +83,7 @@ public:
     Slot &slot() { return *slot_; }
 
 private:
-    std::string problem() const; // with the properties from start, as a sentence; empty if none
+    std::string problem() const; // of the properties from start, as a sentence; empty if none
 
     PluginLibrary &library_;
     std::optional<Instance> instance_;

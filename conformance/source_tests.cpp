@@ -17,29 +17,29 @@
 namespace arhost::conformance {
 namespace {
 
-constexpr const char *is_live = "it is live: its frames are not reproducible";
+constexpr const char *live_skip = "it is live: its frames are not reproducible";
 
 // Same pixels and capture time.
-void expect_same(const SourceRun &run, const Frame &is, const Frame &should, const std::string &what) {
-    if (is.pixels.size() != should.pixels.size())
-        throw Failure(
-            fmt::format("{}: its pixels take {} bytes instead of {}", what, is.pixels.size(), should.pixels.size()));
-    const auto at = std::mismatch(is.pixels.begin(), is.pixels.end(), should.pixels.begin());
-    if (at.first != is.pixels.end())
-        throw Failure(fmt::format("{}: {} is {} instead of {}", what,
-                                  place_of(run.format(), static_cast<std::size_t>(at.first - is.pixels.begin())),
+void expect_same(const SourceRun &run, const Frame &actual, const Frame &expected, const std::string &where) {
+    if (actual.pixels.size() != expected.pixels.size())
+        throw Failure(fmt::format("{}: its pixels take {} bytes instead of {}", where, actual.pixels.size(),
+                                  expected.pixels.size()));
+    const auto at = std::mismatch(actual.pixels.begin(), actual.pixels.end(), expected.pixels.begin());
+    if (at.first != actual.pixels.end())
+        throw Failure(fmt::format("{}: {} is {} instead of {}", where,
+                                  place_of(run.format(), static_cast<std::size_t>(at.first - actual.pixels.begin())),
                                   *at.first, *at.second));
-    if (is.info.capture_ns != should.info.capture_ns)
-        throw Failure(fmt::format("{}: its capture time is {} ns instead of {} ns", what, is.info.capture_ns,
-                                  should.info.capture_ns));
+    if (actual.info.capture_ns != expected.info.capture_ns)
+        throw Failure(fmt::format("{}: its capture time is {} ns instead of {} ns", where, actual.info.capture_ns,
+                                  expected.info.capture_ns));
 }
 
-void expect_same(const SourceRun &run, const std::vector<Frame> &is, const std::vector<Frame> &should,
-                 const std::string &what) {
-    if (is.size() != should.size())
-        throw Failure(fmt::format("{}: there are {} frames instead of {}", what, is.size(), should.size()));
-    for (std::size_t i = 0; i < is.size(); ++i)
-        expect_same(run, is[i], should[i], fmt::format("{}: frame {}", what, i));
+void expect_same(const SourceRun &run, const std::vector<Frame> &actual, const std::vector<Frame> &expected,
+                 const std::string &where) {
+    if (actual.size() != expected.size())
+        throw Failure(fmt::format("{}: there are {} frames instead of {}", where, actual.size(), expected.size()));
+    for (std::size_t i = 0; i < actual.size(); ++i)
+        expect_same(run, actual[i], expected[i], fmt::format("{}: frame {}", where, i));
 }
 
 std::int64_t now_ns() {
@@ -48,14 +48,14 @@ std::int64_t now_ns() {
     return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
-bool is_refusal(arhost_status status) {
+bool is_rejection(arhost_status status) {
     return status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION;
 }
 
-// Starts at this rate, or at the source's own if it rejects it.
+// Starts at `fps`, or at the source's default rate if it rejects that.
 void start_at(SourceRun &run, double fps, bool paced, std::uint64_t first = 0) {
     const arhost_status status = run.try_start({first, fps, paced, nullptr});
-    run.accept(is_refusal(status) ? run.try_start({first, 0, paced, nullptr}) : status);
+    run.accept(is_rejection(status) ? run.try_start({first, 0, paced, nullptr}) : status);
 }
 
 // ---- From start to stop ----------------------------------------------------------------------------
@@ -86,9 +86,9 @@ void start_again(Context &context) {
     run.start();
     const std::vector<Frame> second = run.read_up_to(count);
     if (second.empty())
-        throw Failure("started again, it ends before its first frame");
+        throw Failure("after a restart, it ends before its first frame");
     if (!run.is_live())
-        expect_same(run, second, first, "started again");
+        expect_same(run, second, first, "after a restart");
 }
 
 void leaks(Context &context) {
@@ -148,7 +148,7 @@ void writes_nothing_else(Context &context) {
     run.start();
     run.read_up_to(4);
     if (const std::string damage = run.slot().damage(); !damage.empty())
-        throw Failure("it wrote " + damage);
+        throw Failure("it overwrote " + damage);
 }
 
 void grey(Context &context) {
@@ -161,15 +161,16 @@ void grey(Context &context) {
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
     for (std::uint32_t i = 0; i < format.plane_count; ++i)
         planes[i] = run.slot().data() + format.offset[i];
-    std::vector<std::uint8_t> should(std::size_t{format.grey_stride} * format.height);
-    fill_grey_reference(format, planes, should.data());
+    std::vector<std::uint8_t> expected(std::size_t{format.grey_stride} * format.height);
+    fill_grey_reference(format, planes, expected.data());
     constexpr int tolerance = 3; // for rounding
     for (std::uint32_t y = 0; y < format.height; ++y)
         for (std::uint32_t x = 0; x < format.width; ++x) {
             const std::size_t at = std::size_t{format.grey_stride} * y + x;
-            if (const int is = run.slot().data()[format.grey_offset + at]; std::abs(is - should[at]) > tolerance)
-                throw Failure(
-                    fmt::format("pixel ({}, {}): its grey is {}, and by its colour it is {}", x, y, is, should[at]));
+            if (const int actual = run.slot().data()[format.grey_offset + at];
+                std::abs(actual - expected[at]) > tolerance)
+                throw Failure(fmt::format("pixel ({}, {}): its grey is {}; expected {} by its colour", x, y, actual,
+                                          expected[at]));
         }
 }
 
@@ -185,7 +186,7 @@ void times(Context &context) {
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const arhost_frame_info &info = frames[i].info;
         if (info.clock != frames[0].info.clock)
-            throw Failure(fmt::format("frame {} has the clock {}, those before it had {}", i, info.clock,
+            throw Failure(fmt::format("frame {} has the clock {}; previous frames had {}", i, info.clock,
                                       frames[0].info.clock));
         if (i > 0 && info.capture_ns < frames[i - 1].info.capture_ns)
             throw Failure(fmt::format("frame {} has a capture time of {} ns, less than the previous frame's {} ns", i,
@@ -194,8 +195,9 @@ void times(Context &context) {
         constexpr std::int64_t buffered_ns = 10'000'000'000;
         if (info.clock == ARHOST_CLOCK_MONOTONIC &&
             (info.capture_ns < begin_ns - buffered_ns || info.capture_ns > end_ns))
-            throw Failure(fmt::format("frame {} was captured {:.1f} s after the source was started, by its time", i,
-                                      static_cast<double>(info.capture_ns - begin_ns) / 1e9));
+            throw Failure(
+                fmt::format("frame {} has an implausible capture time, {:.1f} s after the source was started", i,
+                            static_cast<double>(info.capture_ns - begin_ns) / 1e9));
         if (info.clock == ARHOST_CLOCK_MEDIA && info.capture_ns < 0)
             throw Failure(fmt::format("frame {} has a negative capture time of {} ns", i, info.capture_ns));
     }
@@ -210,21 +212,20 @@ void times(Context &context) {
     constexpr double factor = 4;
     if (const double nominal_ns = 1e9 / run.format().fps;
         period_ns > factor * nominal_ns || period_ns < nominal_ns / factor)
-        throw Failure(fmt::format("from frame to frame it is {:.3f} ms, and with its {} frames a second it should be "
-                                  "{:.3f} ms",
+        throw Failure(fmt::format("the mean frame period is {:.3f} ms; the reported {} frames/s give {:.3f} ms",
                                   period_ns / 1e6, run.format().fps, nominal_ns / 1e6));
 }
 
 void rate(Context &context) {
     SourceRun run(context);
     if (run.is_live())
-        throw Skip(is_live);
-    std::string refused, reason;
-    bool given = false;
+        throw Skip(live_skip);
+    std::string rejected, reason;
+    bool accepted = false;
     for (const double fps : {10.0, 48.0}) {
         const arhost_status status = run.try_start({0, fps, false, nullptr});
-        if (is_refusal(status)) {
-            refused += fmt::format("{}{}", refused.empty() ? "" : " and ", fps);
+        if (is_rejection(status)) {
+            rejected += fmt::format("{}{}", rejected.empty() ? "" : " and ", fps);
             reason = call_result("start", status, run.instance().host());
             continue;
         }
@@ -238,18 +239,18 @@ void rate(Context &context) {
                 throw Failure(fmt::format("with {} frames/s requested, frame {} is {:.3f} ms after the previous one",
                                           fps, i, ms));
         }
-        given = true;
+        accepted = true;
     }
-    if (!given)
-        throw Skip(fmt::format("it refuses {} frames a second: {}", refused, reason));
-    if (!refused.empty())
-        context.note = fmt::format("it refuses {} frames a second", refused);
+    if (!accepted)
+        throw Skip(fmt::format("it rejects {} frames/s: {}", rejected, reason));
+    if (!rejected.empty())
+        context.note = fmt::format("it rejects {} frames/s", rejected);
 }
 
 void late_reader(Context &context) {
-    SourceRun in_time(context), run(context);
+    SourceRun unpaced(context), run(context);
     if (run.is_live())
-        throw Skip(is_live);
+        throw Skip(live_skip);
     constexpr double fps = 50;
     start_at(run, fps, true);
     std::vector<Frame> frames = run.read_up_to(2);
@@ -257,63 +258,61 @@ void late_reader(Context &context) {
     constexpr std::size_t count = 3;
     std::vector<Frame> late = run.read_up_to(count);
     std::move(late.begin(), late.end(), std::back_inserter(frames));
-    const std::size_t without_restart = frames.size();
+    const std::size_t count_before_restart = frames.size();
     if (run.can_seek() && late.size() == count) { // as after a worker's crash
         start_at(run, fps, true, run.next());
         if (std::optional<Frame> frame = run.read())
             frames.push_back(std::move(*frame));
     }
-    start_at(in_time, fps, false);
-    std::optional<Frame> should = in_time.read();
+    start_at(unpaced, fps, false);
+    std::optional<Frame> expected = unpaced.read();
     for (std::size_t i = 0; i < frames.size(); ++i) {
-        while (should && should->info.capture_ns < frames[i].info.capture_ns)
-            should = in_time.read();
-        if (!should)
-            throw Failure(fmt::format("in mode live, read late, it gives a frame of {} ns, which without haste there "
-                                      "is not",
+        while (expected && expected->info.capture_ns < frames[i].info.capture_ns)
+            expected = unpaced.read();
+        if (!expected)
+            throw Failure(fmt::format("in live mode, a late reader gets a frame with the capture time {} ns, which "
+                                      "an unpaced run does not deliver",
                                       frames[i].info.capture_ns));
-        const bool is_restarted = i >= without_restart;
-        expect_same(run, frames[i], *should,
-                    is_restarted
-                        ? "in mode live, read late and started again behind the frames given and skipped, its "
-                          "first frame"
-                        : fmt::format("in mode live, read late, frame {}", i));
+        const bool is_restarted = i >= count_before_restart;
+        expect_same(run, frames[i], *expected,
+                    is_restarted ? "in live mode, the first frame after a late read and a restart"
+                                 : fmt::format("in live mode with a late reader, frame {}", i));
     }
 }
 
 // ---- The end ---------------------------------------------------------------------------------------
 
 void end(Context &context) {
-    constexpr std::uint64_t most = 400; // frames to read
+    constexpr std::uint64_t max_frames = 400;
     SourceRun run(context);
     run.start();
     const std::uint64_t count = run.properties().frame_count;
     const std::uint64_t first = run.can_seek() && count > 3 ? count - 3 : 0;
-    if (run.is_live() || count == 0 || count - first > most)
-        throw Skip(run.is_live() ? is_live
+    if (run.is_live() || count == 0 || count - first > max_frames)
+        throw Skip(run.is_live() ? live_skip
                    : count == 0  ? "it does not report a frame count"
-                                 : "it has too many frames to read them all, and cannot seek");
+                                 : "it has too many frames to read them all and cannot seek");
     run.start({first, 0, false, nullptr});
     for (std::uint64_t i = first; i < count; ++i)
         if (!run.read())
             throw Failure(fmt::format("start reports {} frames, but it ends before frame {}", count, i));
     const arhost_status status = run.try_read();
     if (status != ARHOST_STATUS_END && status != ARHOST_STATUS_END_TRUNCATED)
-        throw Failure(fmt::format("start reports {} frames, but after them {}", count,
+        throw Failure(fmt::format("start reports {} frames, but after those {}", count,
                                   call_result("read", status, run.instance().host())));
     for (int again = 0; again < 3; ++again)
         if (const arhost_status then = run.try_read(); then != status)
             throw Failure(
-                fmt::format("at the end read returned {}, and then {}", status_name(status), status_name(then)));
+                fmt::format("at the end, read returned {}, and then {}", status_name(status), status_name(then)));
 }
 
-// ---- The same frames again -------------------------------------------------------------------------
+// ---- Determinism -----------------------------------------------------------------------------------
 
 void deterministic(Context &context) {
     constexpr std::size_t count = 4;
     SourceRun run(context), other(context);
     if (run.is_live())
-        throw Skip(is_live);
+        throw Skip(live_skip);
     run.start();
     const std::vector<Frame> first = run.read_up_to(count);
     run.stop();
@@ -324,18 +323,18 @@ void deterministic(Context &context) {
 void two_instances(Context &context) {
     SourceRun first(context), second(context), alone(context);
     if (first.is_live())
-        throw Skip(is_live);
+        throw Skip(live_skip);
     alone.start();
-    const std::vector<Frame> should = alone.read_up_to(3);
+    const std::vector<Frame> expected = alone.read_up_to(3);
     alone.stop();
     first.start();
     second.start();
-    for (std::size_t i = 0; i < should.size(); ++i)
+    for (std::size_t i = 0; i < expected.size(); ++i)
         for (SourceRun *run : {&first, &second}) {
             const std::optional<Frame> frame = run->read();
             if (!frame)
                 throw Failure(fmt::format("of two instances read alternately, one ends before frame {}", i));
-            expect_same(*run, *frame, should[i], fmt::format("of two instances read alternately, frame {}", i));
+            expect_same(*run, *frame, expected[i], fmt::format("of two instances read alternately, frame {}", i));
         }
 }
 
@@ -358,7 +357,7 @@ void seek(Context &context) {
     }
 }
 
-// ---- Cancelling ------------------------------------------------------------------------------------
+// ---- Cancellation ----------------------------------------------------------------------------------
 
 void cancelled(Context &context) {
     SourceRun running(context);
@@ -374,14 +373,14 @@ void cancelled(Context &context) {
 
 void cancel_while_waiting(Context &context) {
     SourceRun run(context);
-    constexpr double fps = 0.01; // the second frame is due in 100 s, long after this test's time
+    constexpr double fps = 0.01; // the second frame is due in 100 s, after this test's deadline
     start_at(run, fps, true);
     if (run.format().fps != fps)
-        context.note = fmt::format("it refuses {} frames a second: cancelled at its own {}", fps, run.format().fps);
+        context.note = fmt::format("it rejects {} frames/s: cancelled at its {} frames/s", fps, run.format().fps);
     expect_to_be_cancelled(context, run.instance().host(), "read", [&] { return run.try_read(); });
 }
 
-// ---- camera ----
+// ---- Camera ----------------------------------------------------------------------------------------
 
 void intrinsics(Context &context) {
     SourceRun run(context);
@@ -391,8 +390,8 @@ void intrinsics(Context &context) {
     const arhost_intrinsics &camera = run.properties().intrinsics;
     const arhost_frame_format &format = run.format();
     if (camera.width != format.width || camera.height != format.height)
-        throw Failure(fmt::format("its camera has {}×{} px and its frames {}×{}", camera.width, camera.height,
-                                  format.width, format.height));
+        throw Failure(fmt::format("its intrinsics are for {}×{} px, but its frames have {}×{}", camera.width,
+                                  camera.height, format.width, format.height));
     if (!(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy)))
         throw Failure(fmt::format("its focal lengths are {} and {} px", camera.fx, camera.fy));
     if (!(std::isfinite(camera.cx) && std::isfinite(camera.cy))) // may be outside the frame, as in a crop
@@ -402,7 +401,8 @@ void intrinsics(Context &context) {
                       (camera.distortion == ARHOST_DISTORTION_BROWN && (n == 4 || n == 5 || n == 8 || n == 12)) ||
                       (camera.distortion == ARHOST_DISTORTION_FISHEYE && n == 4);
     if (!fits)
-        throw Failure(fmt::format("its lens is of the kind {} with {} coefficients", camera.distortion, n));
+        throw Failure(fmt::format("its lens has the invalid combination of model {} and {} coefficients",
+                                  camera.distortion, n));
     for (std::uint32_t i = 0; i < n; ++i)
         if (!std::isfinite(camera.coefficients[i]))
             throw Failure(fmt::format("coefficient {} of its lens is not finite", i));
@@ -418,7 +418,7 @@ void truth(Context &context) {
         has_truth = true;
         const double *m = frame.info.true_mt; // column-major
         if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
-            throw Failure(fmt::format("the last row of its true pose is {} {} {} {}, and must be 0 0 0 1", m[3], m[7],
+            throw Failure(fmt::format("the last row of its true pose is {} {} {} {}; expected 0 0 0 1", m[3], m[7],
                                       m[11], m[15]));
         double worst = 0;
         for (int a = 0; a < 3; ++a)
@@ -427,10 +427,9 @@ void truth(Context &context) {
                 worst = std::max(worst, std::abs(dot - (a == b)));
             }
         if (!(worst < 1e-9))
-            throw Failure(fmt::format("the rotation of its true pose is {:.2g} from an orthonormal one", worst));
+            throw Failure(fmt::format("the rotation of its true pose deviates from orthonormality by {:.2g}", worst));
         if (!(m[14] < 0))
-            throw Failure(fmt::format(
-                "the marker of its true pose is at z = {} mm; z is negative in front of the camera", m[14]));
+            throw Failure(fmt::format("its true pose has z = {} mm; z is negative in front of the camera", m[14]));
     }
     if (!has_truth)
         throw Skip("it does not report true poses");
@@ -451,8 +450,7 @@ void speed(Context &context) {
 constexpr arhost_kind kind = ARHOST_KIND_SOURCE;
 constexpr const char *gate = "source.read";
 constexpr Test tests[] = {
-    {"source.start", "It starts with a pixel format and layout of the ABI, and stops.", kind, "abi.create", 30s,
-     start},
+    {"source.start", "It starts with a valid pixel format and layout, and stops.", kind, "abi.create", 30s, start},
     {"source.read", "It delivers a frame with a valid clock.", kind, "source.start", 30s, read},
     {"source.deterministic",
      "Another instance delivers the same frames with the same capture times; not checked for live sources.", kind,
@@ -462,26 +460,27 @@ constexpr Test tests[] = {
     {"source.two-instances",
      "Two instances read alternately deliver the frames of a single one; not checked for live sources.", kind,
      "source.deterministic", 30s, two_instances},
-    {"source.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 120s, leaks},
+    {"source.leaks", "Frames, starts and stops leak no descriptors, threads or memory.", kind, gate, 120s, leaks},
     {"source.writes-every-pixel", "Every pixel of a frame is written.", kind, gate, 30s, writes_every_pixel},
     {"source.writes-nothing-else", "No byte before or after the slot is written.", kind, gate, 30s,
      writes_nothing_else},
-    {"source.grey", "A grey plane that it writes equals the frame's luma.", kind, gate, 30s, grey},
+    {"source.grey", "The grey plane, if written, equals the frame's luma.", kind, gate, 30s, grey},
     {"source.times", "Capture times never decrease, and roughly match the reported rate.", kind, gate, 30s, times},
     {"source.rate", "A source that is not live delivers the requested frame rate, or rejects it.", kind, gate, 30s,
      rate},
-    {"source.late-reader", "In live mode a late reader gets frames with matching times, also after a restart.", kind,
+    {"source.late-reader",
+     "In live mode, a late reader gets frames with correct capture times, also after a restart.", kind,
      "source.deterministic", 30s, late_reader},
     {"source.end", "It delivers the reported number of frames, and read keeps returning END after them.", kind, gate,
      60s, end},
     {"source.seek", "Started at any frame, it delivers the frames of an uninterrupted run.", kind, gate, 30s, seek},
-    {"source.cancelled", "After cancellation, start and read return soon, with OK or CANCELLED.", kind, gate, 20s,
+    {"source.cancelled", "After cancellation, start and read promptly return OK or CANCELLED.", kind, gate, 20s,
      cancelled},
-    {"source.cancel-while-waiting", "Cancelled while waiting for a frame, read returns within 2 s.", kind, gate, 20s,
-     cancel_while_waiting},
-    {"source.intrinsics", "Reported intrinsics are valid and have the frames' size.", kind, gate, 20s, intrinsics},
+    {"source.cancel-while-waiting", "When cancelled while waiting for a frame, read returns within 2 s.", kind, gate,
+     20s, cancel_while_waiting},
+    {"source.intrinsics", "Reported intrinsics are valid and match the frame size.", kind, gate, 20s, intrinsics},
     {"source.truth", "A reported true pose is rigid and in front of the camera.", kind, gate, 20s, truth},
-    {"source.speed", "The median time of a frame is at most 100 ms; otherwise a warning.", kind, gate, 60s, speed},
+    {"source.speed", "The median time of read is at most 100 ms; otherwise a warning.", kind, gate, 60s, speed},
 };
 
 } // namespace

@@ -19,8 +19,8 @@
 
 namespace arhost::conformance {
 
-// The plugin violates the requirement: a sentence with numbers, and images that show it. Any other std::exception is
-// an error of the suite.
+// The plugin violates the requirement: a sentence with numbers, and images that show the violation. Any other
+// std::exception is an error of the suite.
 class Failure : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -49,7 +49,7 @@ struct Context {
     std::mt19937_64 random;                // seeded the same for every test
     ipc::Json facts = ipc::Json::object(); // set by abi.load: the plugin's description
     std::string note{};                    // reported with a pass: measurements
-    double timeout_factor = 1;             // multiplies the times that a test allows
+    double timeout_factor = 1;             // multiplies each time limit
     PrintFiles prints{};                   // markers that the tracker detects; empty: the suite's tags
 
     double uniform(double low, double high) {
@@ -84,7 +84,7 @@ std::span<const Test> tracker_pose_tests();
 std::span<const Test> source_tests();
 std::span<const Test> sink_tests();
 
-// Run by tests in further processes; not listed.
+// Run by tests in additional processes; not listed.
 std::span<const Test> helper_tests();
 
 inline std::vector<Test> all_tests() {

@@ -13,7 +13,7 @@
 
 namespace arhost::conformance {
 
-// A scene in read-only memory, as the host's: a write crashes.
+// A scene in read-only memory, like the host's: writes crash.
 class SealedScene {
 public:
     explicit SealedScene(scene::ArenaBuilder builder);

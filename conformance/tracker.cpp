@@ -177,12 +177,12 @@ void expect_pose(const arhost_marker &marker, const Pose &expected, const Bounds
     const double error = glm::distance(at, expected_at) / glm::length(expected_at);
     if (!(error <= bounds.share))
         throw Failure(fmt::format("{}, marker {} is at ({:.2f}, {:.2f}, {:.2f}) mm instead of ({:.2f}, {:.2f}, "
-                                  "{:.2f}): an error of {:.2f} % of the distance, {} % are allowed",
+                                  "{:.2f}): an error of {:.2f} % of the distance; the limit is {} %",
                                   where, marker.id, at.x, at.y, at.z, expected_at.x, expected_at.y, expected_at.z,
                                   100 * error, 100 * bounds.share))
             .with("frame", image.picture());
     if (const double angle = angle_degrees(actual, expected); !(angle <= bounds.degrees))
-        throw Failure(fmt::format("{}, the rotation of marker {} is off by {:.2f}°; {}° are allowed", where,
+        throw Failure(fmt::format("{}, the rotation of marker {} is off by {:.2f}°; the limit is {}°", where,
                                   marker.id, angle, bounds.degrees))
             .with("frame", image.picture());
 }

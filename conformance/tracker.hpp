@@ -100,7 +100,7 @@ Pose pose_of(const arhost_marker &marker);
 // Returns the only marker in `found`; throws Failure if there is not exactly one, with this id.
 arhost_marker expect_one(const std::vector<arhost_marker> &found, int id, const std::string &where,
                          const Grey &image);
-void expect_pose(const arhost_marker &marker, const Pose &should, const Bounds &bounds, const std::string &where,
+void expect_pose(const arhost_marker &marker, const Pose &expected, const Bounds &bounds, const std::string &where,
                  const Grey &image);
 void expect_none(const std::vector<arhost_marker> &found, const std::string &where, const Grey &image);
 // `tracker` must have been started with this marker.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detection of markers in good and bad frames, and false positives.
+// Detection of markers in good and degraded frames, and false positives.
 #include "conformance/tracker.hpp"
 
 #include <fmt/format.h>
@@ -31,7 +31,7 @@ Grey noisy(const Grey &image, double sigma, Context &context) {
     });
 }
 
-// ---- Bad frames ------------------------------------------------------------------------------------
+// ---- Degraded frames -------------------------------------------------------------------------------
 
 // Expects the first print at several poses in images degraded by `change`.
 template <class Change> void expect_found_in(Context &context, const std::string &where, Change &&change) {
@@ -50,18 +50,18 @@ void blur(Context &context) {
 }
 
 void noise(Context &context) {
-    expect_found_in(context, "in noise of 7 codes", [&](const Grey &image) { return noisy(image, 7, context); });
+    expect_found_in(context, "with noise of 7 codes", [&](const Grey &image) { return noisy(image, 7, context); });
 }
 
 void exposure(Context &context) {
     struct Light {
-        const char *what;
+        const char *name;
         double gain, offset, slope; // codes are gain · code + offset, times 1 ± slope from left to right
     };
     for (const Light &light :
          {Light{"in the dark, codes up to 66", 0.3, 0, 0}, Light{"overexposed", 1.35, 0, 0},
           Light{"behind haze, codes 133 to 199", 0.35, 122, 0}, Light{"lit from the side", 0.8, 0, 0.45}})
-        expect_found_in(context, light.what, [&](const Grey &image) {
+        expect_found_in(context, light.name, [&](const Grey &image) {
             return filled(image.width, image.height, [&](auto x, auto y) {
                 const double side = 2.0 * x / image.width - 1;
                 return static_cast<int>(
@@ -81,7 +81,7 @@ void occlusion(Context &context) {
         for (const double radius : {5.0, 14.0, 30.0})
             for (const int code : {ink_code, background_code, paper_code}) {
                 const std::string where =
-                    fmt::format("with corner {} under a disc of {} px and code {}", corner, radius, code);
+                    fmt::format("with corner {} hidden by a disc of {} px radius and code {}", corner, radius, code);
                 const Grey image = filled(whole.width, whole.height, [&](auto x, auto y) {
                     return glm::distance(glm::dvec2(x, y), hidden[corner]) < radius ? code : whole.at(x, y);
                 });
@@ -91,7 +91,7 @@ void occlusion(Context &context) {
 }
 
 void recall(Context &context) {
-    constexpr int count = 20, least = 19;
+    constexpr int count = 20, min_found = 19;
     const Print print = prints_of(context.prints).front();
     Tracker tracker(context);
     tracker.start(wide_camera(), {{print.id, side_mm}});
@@ -110,17 +110,19 @@ void recall(Context &context) {
             continue;
         }
         ++found;
-        const glm::dvec3 is = pose_of(markers[0])[3];
-        if (!(glm::distance(is, centre) < 0.1 * distance))
-            throw Failure(fmt::format("a marker is reported {:.0f} mm beside the only one, {:.0f} mm away",
-                                      glm::distance(is, centre), distance))
+        const glm::dvec3 actual = pose_of(markers[0])[3];
+        if (!(glm::distance(actual, centre) < 0.1 * distance))
+            throw Failure(
+                fmt::format("the reported position is {:.0f} mm away from the marker, at a distance of {:.0f} mm",
+                            glm::distance(actual, centre), distance))
                 .with("frame", image.picture());
     }
     context.note = fmt::format("{} of {} found", found, count);
-    if (found < least)
-        throw Failure(fmt::format("of {} frames with a marker 50 to 140 px wide, it is found in {}; {} are the least",
-                                  count, found, least))
-            .with("a frame where it is not found", missed->picture());
+    if (found < min_found)
+        throw Failure(
+            fmt::format("of {} frames with a marker 50 to 140 px wide, it is detected in {}; the minimum is {}",
+                        count, found, min_found))
+            .with("a frame where it is missed", missed->picture());
 }
 
 // ---- Several markers -------------------------------------------------------------------------------
@@ -130,7 +132,7 @@ struct Group {
     explicit Group(Context &context) {
         std::vector<Print> prints = prints_of(context.prints);
         if (prints.size() < 3)
-            throw Skip("it needs three prints");
+            throw Skip("the test needs three prints");
         prints.resize(std::min<std::size_t>(prints.size(), 4), prints[0]);
         const glm::dvec3 places[] = {{-62, 45, -250}, {62, 45, -250}, {62, -48, -260}, {-62, -48, -240}};
         for (std::size_t i = 0; i < prints.size(); ++i) {
@@ -146,9 +148,9 @@ void several(Context &context) {
     const Group group(context);
     const Grey image = draw(wide_camera(), group.markers);
     Tracker tracker(context);
-    for (const bool backwards : {false, true}) {
+    for (const bool reversed : {false, true}) {
         std::vector<Placed> order = group.markers;
-        if (backwards)
+        if (reversed)
             std::ranges::reverse(order);
         std::vector<Listed> list;
         list.reserve(order.size());
@@ -161,10 +163,10 @@ void several(Context &context) {
                 .with("frame", image.picture());
         for (std::size_t i = 0; i < order.size(); ++i) {
             if (found[i].id != order[i].print.id)
-                throw Failure(fmt::format("record {} is of marker {}; in the order of the list it must be of {}", i,
-                                          found[i].id, order[i].print.id))
+                throw Failure(fmt::format("record {} is of marker {}; expected marker {}, in the order of the list",
+                                          i, found[i].id, order[i].print.id))
                     .with("frame", image.picture());
-            expect_pose(found[i], order[i].camera_from_marker, roughly, "among others", image);
+            expect_pose(found[i], order[i].camera_from_marker, roughly, "with several markers in view", image);
         }
     }
 }
@@ -174,8 +176,7 @@ void unlisted(Context &context) {
     const Grey image = draw(wide_camera(), group.markers);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{group.markers[1].print.id, group.markers[1].side_mm}});
-    expect_one(tracker.track_first(image), group.markers[1].print.id, "with others in view that are not listed",
-               image);
+    expect_one(tracker.track_first(image), group.markers[1].print.id, "with unlisted markers in view", image);
 }
 
 void seen_twice(Context &context) {
@@ -185,7 +186,7 @@ void seen_twice(Context &context) {
     const Grey image = draw(wide_camera(), twice);
     Tracker tracker(context);
     tracker.start(wide_camera(), {{print.id, 60}});
-    expect_one(tracker.track_first(image), print.id, "with the same print seen twice", image);
+    expect_one(tracker.track_first(image), print.id, "with the same print visible twice", image);
 }
 
 void mirrored(Context &context) {
@@ -194,19 +195,19 @@ void mirrored(Context &context) {
     tracker.start(wide_camera(), listed(prints));
     for (const Print &print : prints) {
         const Grey image = draw(wide_camera(), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
-        expect_none(tracker.track_first(image), "of a mirrored print", image);
+        expect_none(tracker.track_first(image), "for a mirrored print", image);
     }
 }
 
-// ---- Nothing to be found ---------------------------------------------------------------------------
+// ---- False positives -------------------------------------------------------------------------------
 
 void no_marker(Context &context) {
     const std::vector<Print> prints = prints_of(context.prints);
     Tracker tracker(context);
     tracker.start(wide_camera(), listed(prints));
-    const auto expect_nothing = [&](const std::string &what, const auto &code) {
+    const auto expect_nothing = [&](const std::string &content, const auto &code) {
         const Grey image = filled(320, 256, code);
-        expect_none(tracker.track_first(image), "in " + what, image);
+        expect_none(tracker.track_first(image), "in " + content, image);
     };
     for (const int grey : {0, 255, 128})
         expect_nothing(fmt::format("an image of code {}", grey), [&](auto, auto) { return grey; });
@@ -268,8 +269,8 @@ void stride(Context &context) {
     for (const std::uint64_t filler : {1, 2}) {
         const arhost_marker found =
             expect_one(tracker.track_first(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8, filler)), marker.print.id,
-                       "in rows with bytes between them", image);
-        expect_pose(found, marker.camera_from_marker, roughly, "in rows with bytes between them", image);
+                       "with padding between rows", image);
+        expect_pose(found, marker.camera_from_marker, roughly, "with padding between rows", image);
     }
 }
 
@@ -294,29 +295,31 @@ void formats(Context &context) {
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
 constexpr const char *gate = "tracker.track", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
-    {"tracker.blur", "A marker blurred by 1.5 px is detected, to 3° and 2 % of the distance.", kind, pose_gate, 20s,
-     blur},
-    {"tracker.noise", "A marker in noise of 7 codes is detected, to 3° and 2 % of the distance.", kind, pose_gate,
-     20s, noise},
+    {"tracker.blur", "A marker blurred by 1.5 px is detected, accurate to 3° and 2 % of the distance.", kind,
+     pose_gate, 20s, blur},
+    {"tracker.noise", "A marker in noise of 7 codes is detected, accurate to 3° and 2 % of the distance.", kind,
+     pose_gate, 20s, noise},
     {"tracker.exposure",
      "A marker is detected with a correct pose in the dark, overexposed, behind haze and lit from the side.", kind,
      pose_gate, 20s, exposure},
-    {"tracker.occlusion", "A marker with a hidden corner is not detected, or to 5° and 3 % of the distance.", kind,
+    {"tracker.occlusion", "A marker with a hidden corner is missed, or detected to 5° and 3 % of the distance.", kind,
      pose_gate, 20s, occlusion},
     {"tracker.recall",
-     "Of 20 random views of a marker 50 to 140 px wide, 19 are detected, all at the right position.", kind, pose_gate,
-     30s, recall},
-    {"tracker.several", "Each of several markers has its id, side and pose, in the order of the list.", kind,
+     "In at least 19 of 20 random views, a marker 50 to 140 px wide is detected, always at the correct position.",
+     kind, pose_gate, 30s, recall},
+    {"tracker.several",
+     "Several markers have records in the order of the list, each with its id and a pose for its side.", kind,
      pose_gate, 20s, several},
     {"tracker.unlisted", "Markers that are not listed are not reported.", kind, gate, 20s, unlisted},
     {"tracker.seen-twice", "A marker visible twice has one record.", kind, gate, 20s, seen_twice},
     {"tracker.mirrored", "A mirrored marker is not detected.", kind, gate, 20s, mirrored},
-    {"tracker.no-marker", "Nothing is detected in black, white, noise and clutter.", kind, gate, 20s, no_marker},
+    {"tracker.no-marker", "Nothing is detected in uniform, noisy and cluttered frames without markers.", kind, gate,
+     20s, no_marker},
     {"tracker.sizes",
      "Images of one pixel, one row, one column and other small sizes are rejected, or nothing is detected.", kind,
      gate, 20s, sizes},
     {"tracker.stride", "Padding between rows is ignored.", kind, pose_gate, 20s, stride},
-    {"tracker.formats", "For colour frames the grey plane is read, wherever it is.", kind, pose_gate, 20s, formats},
+    {"tracker.formats", "In colour formats, it reads the separate grey plane.", kind, pose_gate, 20s, formats},
 };
 
 } // namespace

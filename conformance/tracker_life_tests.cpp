@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tracker from start to stop: rejected input, records, and independence of earlier frames.
+// Life cycle of a tracker: restarts, rejected input, records, and independence of earlier frames.
 #include "conformance/cancelling.hpp"
 #include "conformance/frame_times.hpp"
 #include "conformance/process_usage.hpp"
@@ -22,7 +22,7 @@ Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25,
     return {prints_of(context.prints).front(), side_mm, at};
 }
 
-// A tracker started with only that print.
+// A tracker started with the first print.
 struct Started {
     explicit Started(Context &context, Settings overrides = {})
         : marker(first_print(context)), tracker(context, std::move(overrides)) {
@@ -34,11 +34,12 @@ struct Started {
     Tracker tracker;
 };
 
-// The pose from a new instance.
-Pose found_by_new(Context &context, const arhost_intrinsics &camera, const Placed &marker, const Grey &image) {
+// The pose that a new instance reports.
+Pose pose_from_new_instance(Context &context, const arhost_intrinsics &camera, const Placed &marker,
+                            const Grey &image) {
     Tracker tracker(context);
     tracker.start(camera, {{marker.print.id, marker.side_mm}});
-    return pose_of(expect_one(tracker.track(image), marker.print.id, "to a new instance", image));
+    return pose_of(expect_one(tracker.track(image), marker.print.id, "in a new instance", image));
 }
 
 void start(Context &context) {
@@ -51,26 +52,26 @@ void track(Context &context) {
     expect_one(started.tracker.track(image), started.marker.print.id, "facing the camera", image);
 }
 
-// ---- What it refuses -------------------------------------------------------------------------------
+// ---- Rejected input --------------------------------------------------------------------------------
 
 void unknown_id(Context &context) {
     Tracker tracker(context);
     for (const int id : {-1, std::numeric_limits<int>::max()})
         if (const arhost_status status = tracker.try_start(wide_camera(), {{id, side_mm}});
             status != ARHOST_STATUS_ERROR_CONFIGURATION)
-            throw Failure(fmt::format("with marker {}, which no dictionary has, start returned {}; it must be "
-                                      "CONFIGURATION",
-                                      id, status_name(status)));
+            throw Failure(
+                fmt::format("with marker {}, which is in no dictionary, start returned {}; expected CONFIGURATION",
+                            id, status_name(status)));
 }
 
 void unusable_lens(Context &context) {
     const Print print = prints_of(context.prints).front();
     Tracker tracker(context);
-    const auto expect_refused = [&](const char *what, const arhost_intrinsics &camera) {
+    const auto expect_rejected = [&](const char *description, const arhost_intrinsics &camera) {
         if (const arhost_status status = tracker.try_start(camera, {{print.id, side_mm}});
             status != ARHOST_STATUS_ERROR_CONFIGURATION && status != ARHOST_STATUS_ERROR_UNSUPPORTED)
-            throw Failure(fmt::format("with {}, start returned {}; it must be CONFIGURATION or UNSUPPORTED", what,
-                                      status_name(status)));
+            throw Failure(fmt::format("with {}, start returned {}; expected CONFIGURATION or UNSUPPORTED",
+                                      description, status_name(status)));
     };
     const auto lens = [](arhost_distortion model, std::uint32_t count) {
         arhost_intrinsics camera = wide_camera();
@@ -78,9 +79,9 @@ void unusable_lens(Context &context) {
         camera.coefficient_count = count;
         return camera;
     };
-    expect_refused("a distortion model of number 99", lens(99, 4));
-    expect_refused("Brown's model with 3 coefficients", lens(ARHOST_DISTORTION_BROWN, 3));
-    expect_refused("a fisheye lens with 5 coefficients", lens(ARHOST_DISTORTION_FISHEYE, 5));
+    expect_rejected("the unknown distortion model 99", lens(99, 4));
+    expect_rejected("Brown's model with 3 coefficients", lens(ARHOST_DISTORTION_BROWN, 3));
+    expect_rejected("a fisheye lens with 5 coefficients", lens(ARHOST_DISTORTION_FISHEYE, 5));
 }
 
 void cancelled(Context &context) {
@@ -93,7 +94,7 @@ void cancelled(Context &context) {
     expect_ok_or_cancelled("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
 }
 
-// ---- Again and again -------------------------------------------------------------------------------
+// ---- Restarts --------------------------------------------------------------------------------------
 
 void start_again(Context &context) {
     Started started(context);
@@ -102,7 +103,7 @@ void start_again(Context &context) {
     const arhost_intrinsics camera = pinhole(240, 200, 250);
     const Grey image = draw(camera, marker);
     started.tracker.start(camera, {{marker.print.id, marker.side_mm}});
-    expect_one(started.tracker.track(image), marker.print.id, "stopped, and started with another camera and marker",
+    expect_one(started.tracker.track(image), marker.print.id, "after a restart with another camera and marker",
                image);
 }
 
@@ -126,7 +127,7 @@ void longer_structs(Context &context) {
     };
     const std::vector<Print> prints = prints_of(context.prints);
     if (prints.size() < 2)
-        throw Skip("it needs two prints");
+        throw Skip("the test needs two prints");
     const std::uint64_t garbage = 0xa5a5a5a5a5a5a5a5;
     std::vector<Longer> listed;
     listed.reserve(2);
@@ -140,28 +141,30 @@ void longer_structs(Context &context) {
         tracker.start_with({sizeof(arhost_tracker_setup), 2, &format, &camera, &listed[0].known}));
     const Placed marker = first_print(context);
     const Grey image = draw(camera, marker);
-    constexpr const char *where = "listed with a longer struct_size";
+    constexpr const char *where = "with markers of a longer struct_size";
     expect_pose(expect_one(tracker.track(image), marker.print.id, where, image),
-                found_by_new(context, camera, marker, image), roughly, where, image);
+                pose_from_new_instance(context, camera, marker, image), roughly, where, image);
 }
 
-// ---- Sameness --------------------------------------------------------------------------------------
+// ---- Determinism -----------------------------------------------------------------------------------
 
 bool same_bytes(const arhost_marker &a, const arhost_marker &b) {
     return std::ranges::equal(std::as_bytes(std::span(&a, 1)), std::as_bytes(std::span(&b, 1)));
 }
 
-void expect_same(std::span<const arhost_marker> is, std::span<const arhost_marker> should, const std::string &where) {
-    if (is.size() != should.size())
+void expect_same(std::span<const arhost_marker> actual, std::span<const arhost_marker> expected,
+                 const std::string &where) {
+    if (actual.size() != expected.size())
         throw Failure(
-            fmt::format("{}, the same frame has {} records and must have {}", where, is.size(), should.size()));
-    for (std::size_t i = 0; i < is.size(); ++i)
-        if (!same_bytes(is[i], should[i]))
-            throw Failure(fmt::format("{}, the same frame gives another record of marker {}: its place differs by "
-                                      "{:.3g} mm, its first corner by {:.3g} px",
-                                      where, should[i].id, glm::distance(pose_of(is[i])[3], pose_of(should[i])[3]),
-                                      std::hypot(is[i].corners_px[0][0] - should[i].corners_px[0][0],
-                                                 is[i].corners_px[0][1] - should[i].corners_px[0][1])));
+            fmt::format("{}, the same frame gives {} records; expected {}", where, actual.size(), expected.size()));
+    for (std::size_t i = 0; i < actual.size(); ++i)
+        if (!same_bytes(actual[i], expected[i]))
+            throw Failure(fmt::format("{}, the same frame gives a different record of marker {}: the position "
+                                      "differs by {:.3g} mm, the first corner by {:.3g} px",
+                                      where, expected[i].id,
+                                      glm::distance(pose_of(actual[i])[3], pose_of(expected[i])[3]),
+                                      std::hypot(actual[i].corners_px[0][0] - expected[i].corners_px[0][0],
+                                                 actual[i].corners_px[0][1] - expected[i].corners_px[0][1])));
 }
 
 Grey without_print() {
@@ -170,19 +173,19 @@ Grey without_print() {
 
 void deterministic(Context &context) {
     Started one(context), other(context);
-    const Grey here = one.at(one.marker.camera_from_marker), beside = one.at(tilted({-15, 20, -280}, 30, 70, 30));
+    const Grey here = one.at(one.marker.camera_from_marker), elsewhere = one.at(tilted({-15, 20, -280}, 30, 70, 30));
     const Grey empty_frame = without_print();
     std::vector<arhost_marker> before;
     int number = 0;
-    for (const Grey *image : {&here, &here, &here, &beside, &empty_frame, &here}) {
+    for (const Grey *image : {&here, &here, &here, &elsewhere, &empty_frame, &here}) {
         const std::string frame = fmt::format("in frame {}", ++number);
         one.tracker.track(*image);
         other.tracker.track(*image);
         const std::vector<arhost_marker> records = one.tracker.records();
         expect_same(other.tracker.records(), records, frame + " of another instance");
         if (number == 2 || number == 3)
-            if (const arhost_marker &is = expect_one(one.tracker.seen(), one.marker.print.id, frame, *image);
-                is.state == ARHOST_MARKER_DETECTED)
+            if (const arhost_marker &record = expect_one(one.tracker.seen(), one.marker.print.id, frame, *image);
+                record.state == ARHOST_MARKER_DETECTED)
                 expect_same(records, before, frame);
         before = records;
     }
@@ -197,20 +200,20 @@ void threads(Context &context) {
     const std::vector<arhost_marker> alone = one.tracker.track(image);
     for (const char *count : {"2", "3"})
         expect_same(Started(context, {{"threads", count}}).tracker.track(image), alone,
-                    fmt::format("on {} threads", count));
+                    fmt::format("with {} threads", count));
 }
 
 arhost_marker detect_with_new(Context &context, const Started &started, const Grey &image) {
     Started other(context);
-    return expect_one(other.tracker.track(image), started.marker.print.id, "to a new instance", image);
+    return expect_one(other.tracker.track(image), started.marker.print.id, "in a new instance", image);
 }
 
 // The record of this frame equals that of a new instance, unless it is smoothed.
 void expect_as_new(Context &context, const Started &started, const Grey &image, const std::string &when) {
-    const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
-    const arhost_marker should = detect_with_new(context, started, image);
-    if (is.state == ARHOST_MARKER_DETECTED && should.state == ARHOST_MARKER_DETECTED)
-        expect_same({&is, 1}, {&should, 1}, when);
+    const arhost_marker actual = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
+    const arhost_marker expected = detect_with_new(context, started, image);
+    if (actual.state == ARHOST_MARKER_DETECTED && expected.state == ARHOST_MARKER_DETECTED)
+        expect_same({&actual, 1}, {&expected, 1}, when);
 }
 
 void frames_before(Context &context) {
@@ -223,10 +226,10 @@ void frames_before(Context &context) {
         expect_as_new(context, started, image, when);
     };
     expect_at(here, "in the first frame");
-    expect_at(there, "elsewhere in the next frame");
-    expect_none(started.tracker.track(empty), "taken away", empty);
-    expect_none(started.tracker.track(empty), "taken away", empty);
-    expect_at(here, "there again");
+    expect_at(there, "after a move in the next frame");
+    expect_none(started.tracker.track(empty), "with the marker removed", empty);
+    expect_none(started.tracker.track(empty), "with the marker removed", empty);
+    expect_at(here, "with the marker back in view");
 }
 
 void settles(Context &context) {
@@ -238,16 +241,16 @@ void settles(Context &context) {
         started.tracker.track(elsewhere);
     for (int i = 0; i < still; ++i)
         started.tracker.track(image);
-    const std::string when = fmt::format("standing still for {} frames", still);
-    const arhost_marker is = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
-    if (is.state == ARHOST_MARKER_DETECTED)
+    const std::string when = fmt::format("at rest for {} frames", still);
+    const arhost_marker found = expect_one(started.tracker.seen(), started.marker.print.id, when, image);
+    if (found.state == ARHOST_MARKER_DETECTED)
         return; // not smoothed: covered by other tests
-    expect_pose(is, pose_of(detect_with_new(context, started, image)), roughly, when, image);
+    expect_pose(found, pose_of(detect_with_new(context, started, image)), roughly, when, image);
 }
 
 void out_of_order(Context &context) {
     struct Stamp {
-        const char *what;
+        const char *when;
         std::uint64_t sequence;
         std::int64_t capture_ns;
     };
@@ -257,15 +260,15 @@ void out_of_order(Context &context) {
     std::size_t count = 0;
     for (const Stamp &stamp :
          {Stamp{"in the first frame", 0, 0}, Stamp{"in the second frame", 1, frame_ns},
-          Stamp{"in the same frame once more", 1, frame_ns}, Stamp{"after 7 dropped frames", 9, 9 * frame_ns},
-          Stamp{"in a frame of 4 frames ago", 5, 5 * frame_ns},
-          Stamp{"in another frame of the same time", 6, 5 * frame_ns},
-          Stamp{"after an hour", 108'000, 108'000 * frame_ns}, Stamp{"in the sequence's first frame again", 0, 0}}) {
+          Stamp{"in a repeated frame", 1, frame_ns}, Stamp{"after 7 dropped frames", 9, 9 * frame_ns},
+          Stamp{"in a frame 4 frames older", 5, 5 * frame_ns},
+          Stamp{"in another frame with the same capture time", 6, 5 * frame_ns},
+          Stamp{"after an hour", 108'000, 108'000 * frame_ns}, Stamp{"in frame 0 again", 0, 0}}) {
         const Grey &image = images[count++ % 2];
-        started.tracker.instance().expect_ok(fmt::format("{}, track", stamp.what).c_str(),
+        started.tracker.instance().expect_ok(fmt::format("{}, track", stamp.when).c_str(),
                                              started.tracker.try_track(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8),
                                                                        stamp.sequence, stamp.capture_ns));
-        expect_as_new(context, started, image, stamp.what);
+        expect_as_new(context, started, image, stamp.when);
     }
 }
 
@@ -278,19 +281,19 @@ std::string not_rigid(const double *m, double tolerance) {
     if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
         return "is not finite";
     if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
-        return fmt::format("has the last row ({}, {}, {}, {}), which must be (0, 0, 0, 1)", m[3], m[7], m[11], m[15]);
+        return fmt::format("has the last row ({}, {}, {}, {}); expected (0, 0, 0, 1)", m[3], m[7], m[11], m[15]);
     const glm::dvec3 axis[] = {{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}};
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j)
             if (const double off = glm::dot(axis[i], axis[j]) - (i == j ? 1 : 0); !(std::abs(off) <= tolerance))
-                return fmt::format("has a rotation that is {:.3g} off orthonormal; {} are allowed", std::abs(off),
-                                   tolerance);
+                return fmt::format("has a rotation that deviates from orthonormality by {:.3g}; the limit is {}",
+                                   std::abs(off), tolerance);
     if (glm::dot(glm::cross(axis[0], axis[1]), axis[2]) < 0)
         return "mirrors: its determinant is −1";
     return "";
 }
 
-template <class Check> void of_several_poses(Context &context, Check &&check) {
+template <class Check> void check_several_records(Context &context, Check &&check) {
     Started started(context);
     for (const Pose &at :
          {pose({0, 0, -250}), tilted({40, 30, -300}, 50, 20, 90), tilted({-60, -20, -280}, 40, 250, 200)}) {
@@ -303,26 +306,26 @@ template <class Check> void of_several_poses(Context &context, Check &&check) {
 }
 
 void rigid(Context &context) {
-    of_several_poses(context, [](const arhost_marker &marker) {
+    check_several_records(context, [](const arhost_marker &marker) {
         const std::string problem = not_rigid(marker.mt, orthonormal);
         return problem.empty() ? "" : "mt " + problem;
     });
 }
 
 void record(Context &context) {
-    of_several_poses(context, [](const arhost_marker &marker) -> std::string {
+    check_several_records(context, [](const arhost_marker &marker) -> std::string {
         if (marker.struct_size != sizeof marker)
-            return fmt::format("struct_size is {} and must be {}", marker.struct_size, sizeof marker);
+            return fmt::format("struct_size is {}; expected {}", marker.struct_size, sizeof marker);
         const auto *end = static_cast<const char *>(std::memchr(marker.family, 0, sizeof marker.family));
         if (!end || end == marker.family)
-            return end ? "family is empty" : "family does not end within its 32 bytes";
+            return end ? "family is empty" : "family has no NUL within its 32 bytes";
         if (marker.age_frames != 0)
-            return fmt::format("age_frames is {} in a frame where it is seen, and must be 0", marker.age_frames);
+            return fmt::format("age_frames is {} in a frame where the marker is visible; expected 0",
+                               marker.age_frames);
         if (!(marker.reprojection_px >= 0 && marker.reprojection_px <= 1))
-            return fmt::format("reprojection_px is {} and must be from 0 to 1 in a sharp frame",
-                               marker.reprojection_px);
+            return fmt::format("reprojection_px is {}; expected 0 to 1 in a sharp frame", marker.reprojection_px);
         if (!(marker.ambiguity >= 0 && marker.ambiguity <= 1))
-            return fmt::format("ambiguity is {} and must be from 0 to 1", marker.ambiguity);
+            return fmt::format("ambiguity is {}; expected 0 to 1", marker.ambiguity);
         const double *other = marker.mt_alternative;
         if (std::any_of(other, other + 16, [](double value) { return value != 0; }))
             if (const std::string problem = not_rigid(other, orthonormal); !problem.empty())
@@ -342,9 +345,9 @@ void not_seen(Context &context) {
         for (std::uint32_t i = 0; i < visible_for; ++i) {
             started.tracker.track(here);
             last = last_seen = started.tracker.records();
-            if (const arhost_marker is = expect_one(last, started.marker.print.id, "in view", here);
-                is.age_frames != 0)
-                throw Failure(fmt::format("seen, it has age_frames {} and must have 0", is.age_frames));
+            if (const arhost_marker found = expect_one(last, started.marker.print.id, "in view", here);
+                found.age_frames != 0)
+                throw Failure(fmt::format("while visible, its age_frames is {}; expected 0", found.age_frames));
         }
         for (std::uint32_t age = 1; age <= lost_for; ++age) {
             started.tracker.track(empty_frame);
@@ -353,16 +356,16 @@ void not_seen(Context &context) {
                 continue;
             reported = true;
             const std::string when = fmt::format("{} frames after it was last seen", age);
-            const arhost_marker is = expect_one(records, started.marker.print.id, when, empty_frame);
-            if (is.state != ARHOST_MARKER_PREDICTED && is.state != ARHOST_MARKER_LOST)
-                throw Failure(fmt::format("{}, its state is {}; it must be PREDICTED or LOST", when, is.state));
-            if (is.age_frames != age)
-                throw Failure(fmt::format("{}, its age_frames is {}", when, is.age_frames));
-            if (const std::string problem = not_rigid(is.mt, orthonormal); !problem.empty())
+            const arhost_marker found = expect_one(records, started.marker.print.id, when, empty_frame);
+            if (found.state != ARHOST_MARKER_PREDICTED && found.state != ARHOST_MARKER_LOST)
+                throw Failure(fmt::format("{}, its state is {}; expected PREDICTED or LOST", when, found.state));
+            if (found.age_frames != age)
+                throw Failure(fmt::format("{}, its age_frames is {}; expected {}", when, found.age_frames, age));
+            if (const std::string problem = not_rigid(found.mt, orthonormal); !problem.empty())
                 throw Failure(fmt::format("{}, its mt {}", when, problem));
-            if (is.state == ARHOST_MARKER_LOST && !std::equal(is.mt, is.mt + 16, last[0].mt) &&
-                !std::equal(is.mt, is.mt + 16, last_seen[0].mt))
-                throw Failure(fmt::format("{}, it is LOST, and its mt is not the last one that was known", when));
+            if (found.state == ARHOST_MARKER_LOST && !std::equal(found.mt, found.mt + 16, last[0].mt) &&
+                !std::equal(found.mt, found.mt + 16, last_seen[0].mt))
+                throw Failure(fmt::format("{}, it is LOST, but its mt is not the last known one", when));
             last = records;
         }
     }
@@ -390,20 +393,22 @@ constexpr Test tests[] = {
      kind, "tracker.start", 30s, track},
     {"tracker.start-again", "After a stop, another instance starts with another camera and marker.", kind, gate, 30s,
      start_again},
-    {"tracker.leaks", "Frames, starts and stops leak no descriptor, thread or memory.", kind, gate, 60s, leaks},
-    {"tracker.unknown-id", "An id outside every dictionary is rejected with CONFIGURATION.", kind, gate, 20s,
+    {"tracker.leaks", "Frames, starts and stops leak no descriptors, threads or memory.", kind, gate, 60s, leaks},
+    {"tracker.unknown-id", "A marker id that is in no dictionary is rejected with CONFIGURATION.", kind, gate, 20s,
      unknown_id},
     {"tracker.unusable-lens", "A lens with an unknown model, or the wrong number of coefficients, is rejected.", kind,
      gate, 20s, unusable_lens},
-    {"tracker.longer-structs", "It steps through the markers by their struct_size.", kind, gate, 20s, longer_structs},
-    {"tracker.cancelled", "After cancellation, start and track return soon, with OK or CANCELLED.", kind, gate, 20s,
+    {"tracker.longer-structs", "It uses struct_size as the stride of the markers array.", kind, gate, 20s,
+     longer_structs},
+    {"tracker.cancelled", "After cancellation, start and track promptly return OK or CANCELLED.", kind, gate, 20s,
      cancelled},
-    {"tracker.record", "A record is complete: size, family, age 0, error and ambiguity within their ranges.", kind,
+    {"tracker.record",
+     "A record is complete: struct_size, family, age 0, reprojection error and ambiguity within their ranges.", kind,
      gate, 20s, record},
     {"tracker.rigid", "A pose is finite, orthonormal to 1e-9, with determinant 1 and last row 0 0 0 1.", kind, gate,
      20s, rigid},
     {"tracker.deterministic",
-     "The same frames give the same bytes in another instance; a repeated frame does too if DETECTED.", kind, gate,
+     "The same frames give the same records in another instance; so does a repeated frame if DETECTED.", kind, gate,
      20s, deterministic},
     {"tracker.threads", "The result does not depend on the number of threads.", kind, gate, 20s, threads},
     {"tracker.frames-before", "A DETECTED record depends only on the current frame.", kind, "tracker.deterministic",
@@ -414,7 +419,7 @@ constexpr Test tests[] = {
      settles},
     {"tracker.out-of-order", "Dropped, repeated and older frames are handled like any other.", kind,
      "tracker.deterministic", 20s, out_of_order},
-    {"tracker.speed", "The median time of a frame of 640×480 is at most 50 ms; otherwise a warning.", kind, gate, 60s,
+    {"tracker.speed", "The median time of track at 640×480 is at most 50 ms; otherwise a warning.", kind, gate, 60s,
      speed},
 };
 

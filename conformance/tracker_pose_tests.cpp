@@ -50,13 +50,14 @@ void axes(Context &context) {
     Studio studio(context);
     for (const double turn : {0.0, 90.0, 180.0, 270.0}) {
         const Pose at = tilted({15, 20, -260}, 20, 30, turn);
-        const Studio::Shot shot = studio.shoot(at, fmt::format("turned by {}°", turn));
-        const Pose is = pose_of(shot.found);
+        const Studio::Shot shot = studio.shoot(at, fmt::format("rotated by {}°", turn));
+        const Pose found = pose_of(shot.found);
         for (int axis = 0; axis < 3; ++axis)
-            if (const glm::dvec3 a = is[axis], must = at[axis]; !(glm::dot(a, must) > std::cos(glm::radians(5.0))))
-                throw Failure(fmt::format("of a print turned by {}°, the {} axis points to {} and must point to {} "
-                                          "(x right, y up, z to the viewer)",
-                                          turn, "xyz"[axis], text_of(a), text_of(must)))
+            if (const glm::dvec3 actual = found[axis], expected = at[axis];
+                !(glm::dot(actual, expected) > std::cos(glm::radians(5.0))))
+                throw Failure(fmt::format("with a print rotated by {}°, the {} axis is {}; expected {} (x right, y "
+                                          "up, z to the viewer)",
+                                          turn, "xyz"[axis], text_of(actual), text_of(expected)))
                     .with("frame", shot.image.picture());
     }
 }
@@ -68,11 +69,11 @@ void millimetres(Context &context) {
     Tracker tracker(context);
     for (const double factor : {1.0, 0.5, 3.0}) {
         tracker.start(wide_camera(), {{print.id, factor * side_mm}});
-        const glm::dvec3 is = pose_of(expect_one(tracker.track_first(image), print.id, "in view", image))[3],
-                         must = factor * glm::dvec3(at[3]);
-        if (!(glm::distance(is, must) <= 0.02 * glm::length(must)))
-            throw Failure(fmt::format("listed with a side of {} mm, the marker is at {} mm and must be at {}",
-                                      factor * side_mm, text_of(is), text_of(must)))
+        const glm::dvec3 actual = pose_of(expect_one(tracker.track_first(image), print.id, "in view", image))[3],
+                         expected = factor * glm::dvec3(at[3]);
+        if (!(glm::distance(actual, expected) <= 0.02 * glm::length(expected)))
+            throw Failure(fmt::format("configured with a side of {} mm, the marker is at {} mm; expected {}",
+                                      factor * side_mm, text_of(actual), text_of(expected)))
                 .with("frame", image.picture());
     }
 }
@@ -91,8 +92,8 @@ void near_frontal(Context &context) {
     for (const double towards : {0.0, 90.0, 180.0, 270.0})
         studio.expect_found(tilted({0, 0, -240}, 8, towards), {4, 0.01},
                             fmt::format("nearly facing the camera, tilted by 8° towards {}°", towards));
-    for (const glm::dvec3 &aside : {glm::dvec3(75, 50, -240), {-75, 45, -240}, {-70, -50, -240}, {75, -45, -240}})
-        studio.expect_found(pose(aside), {4, 0.01}, "parallel to the image, aside of the axis");
+    for (const glm::dvec3 &centre : {glm::dvec3(75, 50, -240), {-75, 45, -240}, {-70, -50, -240}, {75, -45, -240}})
+        studio.expect_found(pose(centre), {4, 0.01}, "parallel to the image plane, off the axis");
 }
 
 void corners(Context &context) {
@@ -104,22 +105,23 @@ void corners(Context &context) {
     for (int i = 0; i < count; ++i) {
         const Pose at = tilted({5 * (i % 5) - 10, 4 * (i % 3) - 4, -220 - 15 * i}, 15 + 3 * i, 67 * i, 40 * i);
         const Studio::Shot shot = studio.shoot(at, "in view");
-        const auto must = corners_of(studio.camera(), shot.marker);
+        const auto expected = corners_of(studio.camera(), shot.marker);
         for (int k = 0; k < 4; ++k) {
-            const glm::dvec2 is(shot.found.corners_px[k][0], shot.found.corners_px[k][1]);
-            sum += is - must[k];
-            if (!(glm::distance(is, must[k]) <= bound_px))
+            const glm::dvec2 actual(shot.found.corners_px[k][0], shot.found.corners_px[k][1]);
+            sum += actual - expected[k];
+            if (!(glm::distance(actual, expected[k]) <= bound_px))
                 throw Failure(
                     fmt::format("the {} corner is reported at ({:.2f}, {:.2f}) px instead of ({:.2f}, {:.2f})",
-                                names[k], is.x, is.y, must[k].x, must[k].y))
+                                names[k], actual.x, actual.y, expected[k].x, expected[k].y))
                     .with("frame", shot.image.picture())
-                    .at(static_cast<unsigned>(std::lround(must[k].x)), static_cast<unsigned>(std::lround(must[k].y)));
+                    .at(static_cast<unsigned>(std::lround(expected[k].x)),
+                        static_cast<unsigned>(std::lround(expected[k].y)));
         }
     }
     const glm::dvec2 mean = sum / (4.0 * count);
     if (glm::length(mean) > bound_mean_px)
         throw Failure(fmt::format(
-            "the mean error of {} corners is ({:.3f}, {:.3f}) px; {} px are allowed (pixel centres are at integers)",
+            "the mean error of {} corners is ({:.3f}, {:.3f}) px; the limit is {} px (pixel centres are at integers)",
             4 * count, mean.x, mean.y, bound_mean_px));
 }
 
@@ -131,20 +133,21 @@ void pixel_centres(Context &context) {
     for (int i = 0; i < count; ++i) {
         const Pose at = tilted({6 * (i % 4) - 9, 4 * (i % 3) - 4, -220 - 15 * i}, 12 + 3 * i, 71 * i, 31 * i);
         const Studio::Shot shot = studio.shoot(at, "in view");
-        const Pose is = pose_of(shot.found);
-        if (!(is[3].z < 0))
-            throw Failure(fmt::format("the marker is at {} mm; what is seen has a negative z", text_of(is[3])));
-        sum += pixel_of(studio.camera(), is[3]) - pixel_of(studio.camera(), at[3]);
+        const Pose found = pose_of(shot.found);
+        if (!(found[3].z < 0))
+            throw Failure(
+                fmt::format("the marker is at {} mm; z is negative in front of the camera", text_of(found[3])));
+        sum += pixel_of(studio.camera(), found[3]) - pixel_of(studio.camera(), at[3]);
     }
     const glm::dvec2 mean = sum / static_cast<double>(count);
     if (!(glm::length(mean) <= bound_px))
         throw Failure(fmt::format("over {} poses, the mean error of the marker's projected centre is ({:.3f}, "
-                                  "{:.3f}) px; {} px are allowed (pixel centres are at integers)",
+                                  "{:.3f}) px; the limit is {} px (pixel centres are at integers)",
                                   count, mean.x, mean.y, bound_px));
 }
 
 void focal_length(Context &context) {
-    constexpr double share = 0.004;
+    constexpr double tolerance = 0.004;
     for (const auto &[fx, fy] : {std::pair{330.0, 290.0}, {280.0, 320.0}}) {
         arhost_intrinsics camera = wide_camera();
         camera.fx = fx;
@@ -156,10 +159,10 @@ void focal_length(Context &context) {
             const Pose at = tilted({0, 0, -230 - 8 * i}, 15, 90 * i, 25 * i);
             ratio += pose_of(studio.shoot(at, "in view").found)[3].z / at[3].z / count;
         }
-        if (!(std::abs(ratio - 1) <= share))
+        if (!(std::abs(ratio - 1) <= tolerance))
             throw Failure(fmt::format("with fx = {} px and fy = {} px, distances are {:.4f} times the truth on "
-                                      "average; {} to {} are allowed",
-                                      fx, fy, ratio, 1 - share, 1 + share));
+                                      "average; the limits are {} and {}",
+                                      fx, fy, ratio, 1 - tolerance, 1 + tolerance));
     }
 }
 
@@ -180,13 +183,13 @@ void principal_point(Context &context) {
     const Grey cropped = draw(wide_camera(), marker).part(x0, y0, part.width, part.height);
     Tracker tracker(context);
     tracker.start(part, {{marker.print.id, side_mm}});
-    expect_found(tracker, marker, cropped, {2, 0.01}, "in a part of the image, with the camera of that part");
+    expect_found(tracker, marker, cropped, {2, 0.01}, "in a crop of the image, with the intrinsics of the crop");
 }
 
 void through_lens(Context &context, const arhost_intrinsics &camera, const std::string &lens) {
     Studio studio(context, camera);
     for (const glm::dvec3 &at : {glm::dvec3(75, 50, -250), {-80, -45, -260}, {-10, 55, -240}})
-        studio.expect_found(tilted(at, 25, 50, 10), {1.5, 0.01}, "through " + lens);
+        studio.expect_found(tilted(at, 25, 50, 10), {1.5, 0.01}, "with " + lens);
 }
 
 arhost_intrinsics with_lens(arhost_distortion model, std::initializer_list<double> coefficients) {
@@ -198,9 +201,9 @@ arhost_intrinsics with_lens(arhost_distortion model, std::initializer_list<doubl
 }
 
 void lens(Context &context) {
-    through_lens(context, with_lens(ARHOST_DISTORTION_BROWN, {-0.28, 0.09, 0.015, -0.02}), "Brown's lens");
+    through_lens(context, with_lens(ARHOST_DISTORTION_BROWN, {-0.28, 0.09, 0.015, -0.02}), "Brown's model");
     through_lens(context, with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.05, 0.5, -0.1, 0.02}),
-                 "Brown's lens with 8 coefficients");
+                 "Brown's model with 8 coefficients");
 }
 
 void fisheye(Context &context) {
@@ -215,7 +218,7 @@ void fisheye(Context &context) {
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
-// If these fail, all poses are wrong for the same reason.
+// Without these, all poses are wrong for the same reason.
 constexpr const char *gate = "tracker.track", *axes_gate = "tracker.axes", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
     {"tracker.axes",
@@ -226,8 +229,8 @@ constexpr Test tests[] = {
     {"tracker.tilt-and-distance",
      "Poses of markers 30 to 130 px wide, tilted by 20° to 60°, are accurate to 1.5° and 1 % of the distance.", kind,
      pose_gate, 30s, tilt_and_distance},
-    {"tracker.near-frontal", "A nearly frontal marker is not tilted to the wrong side: 4° are allowed.", kind,
-     pose_gate, 20s, near_frontal},
+    {"tracker.near-frontal", "The pose of a nearly frontal marker is accurate to 4°, not tilted to the wrong side.",
+     kind, pose_gate, 20s, near_frontal},
     {"tracker.corners", "Corners are in the specified order, accurate to 0.3 px each and 0.06 px on average.", kind,
      gate, 20s, corners},
     {"tracker.pixel-centres", "Poses project to the marker's position, to 0.06 px on average.", kind, pose_gate, 20s,

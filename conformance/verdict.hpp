@@ -29,7 +29,7 @@ inline std::string_view to_text(Verdict verdict) {
 }
 
 // An image for the report.
-struct Exhibit {
+struct ReportImage {
     std::string label;
     std::string png; // base64
     unsigned width = 0, height = 0;
@@ -38,10 +38,10 @@ struct Exhibit {
 struct Result {
     std::string test;
     Verdict verdict = Verdict::error;
-    std::string message; // one sentence, or empty
+    std::string message; // a sentence, or empty
     double seconds = 0;
-    std::vector<Exhibit> exhibits{};
-    std::optional<std::array<unsigned, 2>> wrong_pixel{}; // in the exhibits
+    std::vector<ReportImage> images{};
+    std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the images
     ipc::Json facts = ipc::Json::object();                // set by abi.load: the descriptor
 };
 

@@ -47,16 +47,16 @@ def install():
             subprocess.run([*as_root, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-q", "-y",
                             "--no-install-recommends", llvm_package], check=False)
     if not os.path.exists(venv_python):
-        fitting = [path for path in (sys.executable, "/usr/bin/python3", shutil.which("python3.11"))
-                   if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
+        suitable = [path for path in (sys.executable, "/usr/bin/python3", shutil.which("python3.11"))
+                    if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
                                               stderr=subprocess.DEVNULL, check=False).returncode == 0]
-        if not fitting:
+        if not suitable:
             raise SystemExit("peers: Python 3.11 with venv is required (Debian 12: python3-venv)")
-        subprocess.run([fitting[0], "-m", "venv", venv], check=True)
+        subprocess.run([suitable[0], "-m", "venv", venv], check=True)
     for name, version in packages.items():
-        there = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
+        installed = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
                                capture_output=True, text=True, check=False).stdout.strip()
-        if there == version:
+        if installed == version:
             continue
         print(f"Installing with pip into {os.path.relpath(venv, root)}: {name} {version}", flush=True)
         if subprocess.run([venv_python, "-m", "pip", "install", "-q", "--disable-pip-version-check",
@@ -193,15 +193,15 @@ def main():
               f"{targets[name][ours_alone]}: {'met' if met else 'MISSED'}")
     same = True
     for name, by_case in differences.items():
-        print(f"  {name}'s pictures: " + ", ".join(
-            f"{case} {100 * d['mask']:.2f} % of the mask, light {d['light']:.3f} to our {d['our_light']:.3f}"
+        print(f"  {name}'s pictures: " + "; ".join(
+            f"{case}: {100 * d['mask']:.2f} % of the mask differ, mean radiance {d['light']:.3f} (rt_embree: {d['our_light']:.3f})"
             for case, d in by_case.items()))
         same &= all(d["mask"] < largest_mask_difference for d in by_case.values())
     with open(os.path.join(folder, "peers.json"), "w", encoding="utf-8") as file:
         json.dump({"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "quick": quick, "cpu": cpu_model(),
                    "processors": len(available), "load": load, "threads": threads, "scene": scene,
                    "versions": {name: renderer.about for name, renderer in renderers.items()},
-                   "median": medians, "times": times, "rays": rays, "rays_a_second": rates, "pictures": differences,
+                   "median": medians, "times": times, "rays": rays, "rays_per_second": rates, "pictures": differences,
                    "results": results}, file, indent=1)
     print("  all numbers: build/peers/peers.json; pictures: build/peers/peers.png")
     if not same:

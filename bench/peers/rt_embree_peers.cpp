@@ -115,7 +115,7 @@ Case make_case(const std::string &name, const TriangleMesh &mesh, unsigned threa
         material = grey(ARHOST_MATERIAL_GLASS, glass_grey);
         material.index = glass_index;
         material.fresnel_minimum = std::pow((glass_index - 1) / (glass_index + 1), 2.0f);
-        // "path": limited by depth only, as in the peers; "tree": the customary cutoff of a hundredth.
+        // glass-path: limited by depth only, as in the peers. glass-tree: the default cutoff of 0.01.
         material.importance_cutoff = name == "glass-tree" ? 0.01f : 0;
         builder.settings.max_depth = glass_depth;
         made.settings.single_path = name == "glass-path";

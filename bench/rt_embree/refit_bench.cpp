@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Determines the degradation at which rebuilding a BVH pays off: for increasingly deformed meshes, prints
-// BvhQuality's measure and the trace times through the refitted and through a rebuilt BVH. `rt-embree-refit`
+// BvhQuality's measure and the trace times through the refitted and through a rebuilt BVH.
 #include "bunny.hpp"
 #include "embree_scene.hpp"
 

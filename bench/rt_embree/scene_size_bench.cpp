@@ -51,7 +51,7 @@ double resident_mb() {
     return 0;
 }
 
-// Measures in a separate process: having built a BVH of 10M triangles affects later measurements.
+// Measures in a separate process: a BVH of 10M triangles affects later measurements in the same one.
 template <class Result> Result in_a_process(const std::function<Result()> &measure) {
     int ends[2];
     if (::pipe(ends) != 0)
@@ -153,7 +153,7 @@ Ours trace(const Arena &arena) {
     rt_embree::Settings settings;
     settings.threads = threads;
     Ours ours{};
-    // 800×600 first: its start-up is timed.
+    // 800×600 first, as its start-up is timed.
     for (const std::size_t i : {std::size_t{1}, std::size_t{0}, std::size_t{2}}) {
         const arhost_camera camera = camera_of(sizes[i]);
         const auto [width, height] = sizes[i];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The baseline of the speed comparison: the plugin's primary rays through the same trace(), and nothing else. Writes
-// the hit's distance to the image, infinity for a miss.
+// The baseline of the speed comparison: only traces the plugin's primary rays with the same trace(). Writes the hit
+// distance to the image; infinity for a miss.
 
 void write_distance(uvec2 position) {
     position.y += band.first_row;

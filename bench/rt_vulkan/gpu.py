@@ -18,7 +18,7 @@ HERE = pathlib.Path(__file__).resolve()
 sys.path[:0] = [str(HERE.parents[1] / "tables"), str(HERE.parents[1]), str(HERE.parents[2] / "tools")]
 from replays import BUILD, ROOT  # noqa: E402
 from scene_views import VIEWS  # noqa: E402
-from tables import TABLES, coarser, scene_file  # noqa: E402
+from tables import TABLES, face_count_note, scene_file  # noqa: E402
 
 OUT = ROOT / "build/gpu"
 PROGRAM = BUILD / "bin/rt-vulkan-bench"
@@ -36,11 +36,11 @@ def traced(scene, size, rounds, paths, view=None):
 
 
 def note(scene, log):
-    return "   a stand-in for the scan" if "stand-in" in log else coarser(scene, log)
+    return "   a stand-in for the scan" if "stand-in" in log else face_count_note(scene, log)
 
 
 def compare_with_bare(is_gpu):
-    """The unlit bunny measures visibility only; the other scenes are for orientation."""
+    """The unlit bunny mainly measures visibility; the other scenes are for orientation."""
     size, rounds, paths = ((800, 600), 101, "all") if is_gpu else ((400, 300), 31, "auto")
     rounds = 3 if QUICK else rounds
     print(f"time per image of rt_vulkan and of a bare trace of its primary rays, {size[0]}x{size[1]}, 1 sample, medians of "

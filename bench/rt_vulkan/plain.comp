@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The bare trace, by the plain path.
+// The bare trace of the path `plain`.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "arhost/shading/glsl.h"

@@ -29,7 +29,7 @@ namespace {
 using namespace arhost;
 
 arhost_camera camera_from(const double *eye_and_target, bool z_up, std::uint32_t width, std::uint32_t height) {
-    const double f = height / 2 / 0.41421356237309503; // the dissertation's lens of 45 degrees
+    const double f = height / 2 / 0.41421356237309503; // the dissertation's field of view of 45°
     const double *p = eye_and_target;
     return test::camera({p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {0, z_up ? 0.0 : 1.0, z_up ? 1.0 : 0.0},
                         test::pinhole(width, height, f));
@@ -50,7 +50,7 @@ void sort_along_morton_curve(scene::TriangleMesh &mesh) {
               [&](const auto &a, const auto &b) { return morton_code(a) < morton_code(b); });
 }
 
-// The unlit bunny measures little but visibility (rt_embree_bench.cpp, `primary`).
+// The unlit bunny mainly measures visibility (rt_embree_bench.cpp, `primary`).
 scene::Arena unlit_bunny() {
     auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);
     mesh.normals.clear();
@@ -100,7 +100,7 @@ private:
     std::unique_ptr<std::uint8_t, decltype(&std::free)> bytes_;
 };
 
-// The plugin's shaders, with the bare trace in place of the image's.
+// The plugin's shaders, with the bare trace as the main shader.
 rt_vulkan::Shaders bare_shaders(rt_vulkan::Path path) {
     rt_vulkan::Shaders shaders = rt_vulkan::shaders_of(path);
     using Words = std::span<const std::uint32_t>;
@@ -185,7 +185,7 @@ int trace(const std::vector<std::string> &words) {
     return 0;
 }
 
-// Once without the validation layers, whose own memory would count, and once with them.
+// One run without the validation layers, as they allocate memory, and one with them.
 int run(const std::vector<std::string> &words) {
     constexpr double max_growth_mib = 2;
     const int images = std::stoi(words[1]), every = std::stoi(words[2]);

@@ -62,10 +62,10 @@ outputs: [{{plugin: sink_images, path: "{FRAME}"}}]
     subprocess.run([BUILD / "bin/arhost", "--config", OUT / "frame.yaml"], check=True, stderr=subprocess.DEVNULL)
 
 
-def coarser(scene, said):
+def face_count_note(scene, log):
     """A note if the mesh has fewer faces than the dissertation's, as counted by the loader."""
     wanted = re.search(r"stand_in: \{faces: (\d+)", scene_file(scene).read_text())
-    found = [int(count) for count in re.findall(r"models/\S+: (\d+) triangles", said)]
+    found = [int(count) for count in re.findall(r"models/\S+: (\d+) triangles", log)]
     if wanted and found and found[0] < 0.99 * int(wanted[1]):
         return f"   {found[0]:,} faces, the dissertation's has {int(wanted[1]):,}"
     return ""
@@ -76,18 +76,18 @@ def print_tables(seconds):
     for title, scenes in TABLES.items():
         print(f"{title}: {WIDTH}x{HEIGHT}, frames per second\n"
               f"  {'scene':6} {'dissertation':^24}   {'arhost with rt_embree, ' + str(os.cpu_count()) + ' cores':^34}\n"
-              f"  {'':6} {'whole':>7} {'alone':>7} {'ratio':>7}   {'whole':>8} {'alone':>8} {'ratio':>7}  tracer's ms")
+              f"  {'':6} {'whole':>7} {'alone':>7} {'ratio':>7}   {'whole':>8} {'alone':>8} {'ratio':>7}  ray tracer, ms")
         for name, (scene, view, whole, alone) in scenes.items():
             trajectory = OUT / "still.jsonl"
             write_trajectory(trajectory, [VIEWS[scene][view]] * 2000, scene.startswith("vkray"))
             probe = frames_per_second(replay(scene, trajectory, 12, False)[1])
             frames = max(24, min(2000, int(seconds * probe)))
-            _, rows_alone, said = replay(scene, trajectory, frames, False)
+            _, rows_alone, log = replay(scene, trajectory, frames, False)
             _, rows_whole, _ = replay(scene, trajectory, frames, True)
             ours_alone, ours_whole = frames_per_second(rows_alone), frames_per_second(rows_whole)
             tracer = [statistics.median(row["raytracer_ms"] for row in rows) for rows in (rows_whole, rows_alone)]
-            stand_in = "   a stand-in for the scan" if "stand-in" in said else ""
-            note = stand_in or coarser(scene, said)
+            stand_in = "   a stand-in for the scan" if "stand-in" in log else ""
+            note = stand_in or face_count_note(scene, log)
             print(f"  {name:6} {whole:7.2f} {alone:7.2f} {whole / alone:7.3f}   {ours_whole:8.2f} {ours_alone:8.2f} "
                   f"{ours_whole / ours_alone:7.3f}  {tracer[0]:.2f} / {tracer[1]:.2f}{note}", flush=True)
             results[f"{title}, {name}"] = {
@@ -158,8 +158,9 @@ def draw_figures(frames):
             scene = TABLES[table][far][0]
             trajectory = OUT / "approach.jsonl"
             write_trajectory(trajectory, list(approach(scene, frames)), scene.startswith("vkray"))
-            whole, alone = (replay(scene, trajectory, frames, chain)[1] for chain in (True, False))
-            curves += [(f"{far}, whole chain", strong, False, smoothed(whole)), (f"{far}, tracer alone", strong, True, smoothed(alone))]
+            whole, alone = (replay(scene, trajectory, frames, with_pipeline)[1] for with_pipeline in (True, False))
+            curves += [(f"{far}, whole pipeline", strong, False, smoothed(whole)),
+                       (f"{far}, ray tracer alone", strong, True, smoothed(alone))]
             for name, x in ((far, 0), (close, 1)):
                 if name:
                     marks += [(f"{far}, dissertation (GTX 1060)", pale, x, TABLES[table][name][3])]
@@ -185,7 +186,7 @@ def print_overhead(frames, rounds):
     """The middleware's overhead in CPU time, which is less sensitive to other load than wall time."""
     results, missed = {}, []
     print(f"arhost's overhead: CPU time per frame, {WIDTH}x{HEIGHT}, medians of {rounds} alternating rounds (target 1.03):\n"
-          f"  {'scene':8} {'tracer: whole, alone, ratio':^32}   {'all: whole, sum of parts, ratio':^34}")
+          f"  {'scene':8} {'ray tracer: whole, alone, ratio':^32}   {'all: whole, sum of parts, ratio':^34}")
     for scene in ("optix-cs", "optix-b", "vkray-b"):
         trajectory = OUT / "approach.jsonl"
         write_trajectory(trajectory, list(approach(scene, 10)) * 100, scene.startswith("vkray"))

@@ -72,7 +72,7 @@ CommandLine CommandLine::subcommand(const std::string &name, const std::string &
 }
 
 CommandLine CommandLine::raw_subcommand(const std::string &name, const std::string &description) {
-    const CommandLine command = subcommand(name, description);
+    CommandLine command = subcommand(name, description);
     command.app_->set_help_flag();
     command.app_->prefix_command();
     return command;

@@ -22,7 +22,7 @@ void exec_child(const char *program, char *const argv[], std::span<const int> fd
     // Duplicates all descriptors to numbers from 10 on and from there to 0, 1, 2, …, so dup2 does not overwrite a
     // descriptor that is still needed. dup2 also clears close-on-exec.
     constexpr int first_free = 10, max_fds = 8;
-    int high[max_fds];
+    int high[max_fds] = {};
     if (fds.size() > max_fds)
         return;
     for (std::size_t i = 0; i < fds.size(); ++i)
@@ -31,8 +31,8 @@ void exec_child(const char *program, char *const argv[], std::span<const int> fd
     for (std::size_t i = 0; i < fds.size(); ++i)
         if (::dup2(high[i], static_cast<int>(i)) < 0)
             return;
-    ::syscall(SYS_close_range, static_cast<unsigned>(fds.size()), ~0u, 0u);
-    ::execv(program, argv);
+    if (::syscall(SYS_close_range, static_cast<unsigned>(fds.size()), ~0u, 0u) == 0)
+        ::execv(program, argv);
 }
 
 } // namespace arhost::base

@@ -34,7 +34,8 @@ supervise::Context make_context(ipc::Reactor &reactor, supervise::Starter &launc
             }};
 }
 
-// The options of the dissertation's figure 7; they override the file's `coordinates:`.
+// Returns the coordinates set with the options of the dissertation's figure 7, which override `coordinates:` in the
+// configuration; nullopt if none of these options is given.
 std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     const auto is_set = [](const double(&a)[3]) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };
     if (!arguments.ar && !arguments.rt && !arguments.g1 && !arguments.g2 && !is_set(arguments.axis1) &&
@@ -53,7 +54,7 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     if (!arguments.g2 && is_set(arguments.axis2))
         throw yaml::Error("--x2, --y2 and --z2 need --g2, the angle in degrees");
     if (arguments.g2 && !arguments.g1)
-        throw yaml::Error("--g2 needs --g1: the first rotation comes first");
+        throw yaml::Error("--g2 sets the second rotation and needs --g1, the first rotation");
     if (const std::string problem = camera::problem_with(coordinates); !problem.empty())
         throw yaml::Error("--ar … --z2: " + problem);
     return coordinates;
@@ -97,7 +98,7 @@ run_config::Configuration read_configuration(const Arguments &arguments) {
     return parse_configuration(root, arguments);
 }
 
-// The sink for a file name extension.
+// Returns the sink plugin that writes files with the extension of `file`.
 std::string sink_for(const fs::path &file) {
     const std::string extension = file.extension().string();
     for (const char *picture : {".png", ".jpg", ".jpeg"})
@@ -108,11 +109,11 @@ std::string sink_for(const fs::path &file) {
     if (extension.empty())
         throw yaml::Error("--output " + file.string() +
                           ": add an extension: .mp4 or .mkv for video, .png or .jpg for images, .jsonl for poses");
-    return "sink_video"; // rejects extensions that it does not support
+    return "sink_video"; // sink_video itself rejects extensions that it does not support
 }
 
-// The trajectory in the pipeline of `arguments.file`, or in a default pipeline. The file's outputs are ignored, as
-// they may be those of the recorded run.
+// Returns a configuration that plays the trajectory in the pipeline of `arguments.file`, or in a default pipeline.
+// The file's outputs are ignored because they may be the outputs of the recorded run.
 run_config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
     constexpr const char *default_raytracer = "version: 1\nraytracer: {plugin: rt_embree}\n";
     constexpr const char *default_pipeline =
@@ -152,9 +153,11 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
         root.override_text("timeline", replay.timeline, "--timeline");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
-        throw yaml::Error("--width, --height: " + replay.trajectory + " contains an image size; remove them");
+        throw yaml::Error("--width, --height: " + replay.trajectory +
+                          " contains the image size; remove --width and --height");
     if (replay.with_pipeline && !(configuration.source && configuration.tracker))
-        throw yaml::Error("--with-pipeline needs a 'source' and a 'tracker'; " + arguments.file + " lacks them");
+        throw yaml::Error("--with-pipeline needs a 'source' and a 'tracker'; " + arguments.file +
+                          " lacks at least one of them");
     if (!replay.with_pipeline) {
         configuration.source.reset();
         configuration.tracker.reset();
@@ -182,7 +185,7 @@ double cpu_seconds_of_host() {
 
 bool write_file(const fs::path &file, const char *key, Console &console, const std::string &text) {
     try {
-        std::error_code ignored; // reported by AtomicFile
+        std::error_code ignored; // AtomicFile reports the error
         fs::create_directories(file.parent_path(), ignored);
         base::AtomicFile(file).write(text);
         return true;
@@ -198,7 +201,7 @@ void log_contract_checks(const ContractChecks &checks, Console &console) {
         passed += check.violations == 0;
         if (check.violations > 0)
             console.log(ARHOST_SEVERITY_WARNING, "conform",
-                        name + ": violated in " + std::to_string(check.violations) + " of " +
+                        name + ": contract violated in " + std::to_string(check.violations) + " of " +
                             std::to_string(check.checked) + " frames");
     }
     if (!checks.all().empty())
@@ -213,7 +216,9 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     ::sigaddset(&signals, SIGINT);
     ::sigaddset(&signals, SIGTERM);
     ::sigaddset(&signals, SIGHUP);
-    ::sigprocmask(SIG_BLOCK, &signals, nullptr); // before the console's thread starts, which must not receive them
+    ::sigprocmask(
+        SIG_BLOCK, &signals,
+        nullptr); // blocked before the console's thread starts, because that thread must not receive these signals
     const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
     Console console(verbose);
@@ -228,7 +233,8 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     const auto watch = reactor.watch(signal_fd.get(), [&] {
         signalfd_siginfo info;
         while (::read(signal_fd.get(), &info, sizeof info) > 0) {
-            // A second signal ends the run at once, unless it follows within a second: timeout(1) sends two.
+            // A second signal ends the run immediately, unless it arrives within a second of the first one:
+            // timeout(1) sends two signals.
             const auto now = std::chrono::steady_clock::now();
             if (stopped_by_signal && now - first_signal < std::chrono::seconds(1))
                 continue;
@@ -256,7 +262,7 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
                                  "\n");
     if (configuration.timeline && statistics.frames_in > 0)
         written &= write_file(*configuration.timeline, "timeline", console, timeline_csv(statistics));
-    // From here on, signals end the process at once: a stopped terminal may block the last log lines.
+    // From here on, signals end the process immediately, because a stopped terminal may block the last log lines.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {
     }
@@ -268,15 +274,15 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     return stopped_by_signal ? interrupted : success;
 }
 
-// The lines that `arhost plugins --devices` prints for a plugin; none if it does not support listing devices.
+// Returns the lines that `arhost plugins --devices` prints for a plugin; empty if the plugin cannot list devices.
 std::vector<std::string> lines_of(const DevicesResult &result) {
     if (const auto *reason = std::get_if<std::string>(&result))
-        return {"its devices cannot be listed: " + *reason};
+        return {"cannot list the devices: " + *reason};
     const auto &list = std::get<std::optional<ipc::DeviceList>>(result);
     if (!list)
         return {};
     if (list->devices.empty())
-        return {"no device that it can run on"};
+        return {"found no device that the plugin can run on"};
     std::vector<std::string> lines;
     for (const ipc::DeviceDescription &device : list->devices) {
         lines.push_back(fmt::format("device {}: {} ({}{}{}){}", device.index, device.name,
@@ -298,7 +304,7 @@ fs::path own_prefix() {
 
 fs::path own_folder() {
     fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-    if (!base::is_utf8(folder.native())) // workers get paths as UTF-8
+    if (!base::is_utf8(folder.native())) // the protocol of the workers requires UTF-8 paths
         throw std::runtime_error("arhost is in a folder whose path is not UTF-8: " + folder.string());
     return folder;
 }

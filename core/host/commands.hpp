@@ -15,7 +15,7 @@ namespace arhost::host {
 
 enum ExitStatus { success = 0, run_failed = 1, bad_configuration = 2, interrupted = 130 };
 
-// Options of commands that take a configuration.
+// Command-line options of the subcommands that read a configuration.
 struct Arguments {
     std::string file;
     std::vector<std::string> settings; // "key.path=value"
@@ -24,20 +24,20 @@ struct Arguments {
     std::optional<double> g1, g2;
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
-    bool in_process = false; // plugins run in this process: no deadlines, no sandbox
+    bool in_process = false; // run the plugins in the host's process, without timeouts and sandbox
 };
 
-// `arhost replay`.
+// Command-line options of `arhost replay`.
 struct ReplayArguments {
-    std::string trajectory, scene, raytracer, output, stats, timeline; // "": not set
+    std::string trajectory, scene, raytracer, output, stats, timeline; // "" if not given
     std::optional<std::uint32_t> width, height;                        // px
     bool with_pipeline = false;
 };
 
-// `arhost plugins`.
+// Command-line options of `arhost plugins`.
 struct PluginsArguments {
     bool with_options = false;
-    bool with_devices = false; // slow if drivers must be loaded
+    bool with_devices = false; // listing devices is slow if drivers must be loaded
     std::vector<std::filesystem::path> reads;
 };
 
@@ -46,10 +46,11 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 int check(const Arguments &arguments, supervise::Starter &launcher);
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
 int print_schema(bool markdown);
-// Replaces this process by arhost-conform: the host itself opens no plugin.
+// Replaces this process with arhost-conform (exec), because the host process never loads a plugin itself.
 int conform(std::vector<std::string> arguments);
 
-// This program is <prefix>/bin/arhost; the programs that it starts are in the same folder.
+// own_folder() is the folder of this executable, which also contains the programs that arhost starts. own_prefix() is
+// the folder above it: the executable is <prefix>/bin/arhost.
 std::filesystem::path own_prefix();
 std::filesystem::path own_folder();
 

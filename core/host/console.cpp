@@ -39,7 +39,7 @@ Console::~Console() {
     clear_line();
     if (const std::size_t lost = thread_->overrun_counter())
         log_->warn("{} lines were dropped because stderr was not read", lost);
-    thread_.reset(); // flushes and joins, so that the loggers are no longer in use
+    thread_.reset(); // flushes and joins the thread, which uses the loggers
 }
 
 void Console::clear_line() {
@@ -83,7 +83,7 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
     if (terminal_) {
         winsize size{};
         if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)
-            line.resize(size.ws_col - 1u); // a wrapped line could not be redrawn
+            line.resize(size.ws_col - 1u); // a line that wraps cannot be redrawn
         line_->info("\r\033[K{}", line);
         line_shown_ = true;
     } else {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Log and progress on stderr. On a terminal, progress is one line that is redrawn; otherwise a line every few
-// seconds. A thread writes the output, so that a stopped terminal (Ctrl-S) does not stop the video; when its queue is
-// full, lines are dropped.
+// Writes log messages and progress to stderr. On a terminal, the progress is a single line that is redrawn; otherwise
+// a new line is printed every few seconds. A separate thread writes the output, so a stopped terminal (Ctrl-S) does
+// not stop the video. If the thread's queue is full, lines are dropped.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -22,7 +22,7 @@ struct Statistics;
 class Console {
 public:
     explicit Console(bool verbose);
-    ~Console(); // clears the progress line; waits until the queue is written
+    ~Console(); // clears the progress line and waits until all queued lines are written
 
     void log(arhost_severity severity, const std::string &component, const std::string &text);
     void show(const Progress &progress, const Statistics &statistics);
@@ -33,7 +33,7 @@ private:
     bool terminal_;
     bool line_shown_ = false;
     std::shared_ptr<spdlog::details::thread_pool> thread_;
-    std::shared_ptr<spdlog::logger> log_, line_; // formatted lines; raw text
+    std::shared_ptr<spdlog::logger> log_, line_; // `log_` formats its lines; `line_` writes raw text
     std::chrono::steady_clock::time_point last_shown_{};
     std::uint64_t last_frame_ = 0;
 };

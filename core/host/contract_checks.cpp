@@ -13,9 +13,10 @@
 namespace arhost::host {
 namespace {
 
-constexpr std::uint32_t sample_step = 16; // checks one of 16 rows, or blocks of bytes, of a frame
+constexpr std::uint32_t sample_step = 16; // checks every 16th row or block of bytes of a frame
 
-// The first one. Different for each frame, also if only every fourth frame is checked.
+// Returns the index of the first row or block to check. It varies from frame to frame, even if only every fourth
+// frame is checked.
 std::uint32_t first_of(std::uint64_t frame) {
     return static_cast<std::uint32_t>((frame + frame / sample_step) % sample_step);
 }
@@ -33,7 +34,8 @@ std::string problem_with_order(std::span<const arhost_marker> markers, std::span
     for (const arhost_marker &marker : markers) {
         next = std::find_if(next, listed.end(), [&](const auto &one) { return one.id == marker.id; });
         if (next == listed.end())
-            return name_of(marker) + " is not in the order of the configuration's list";
+            return name_of(marker) +
+                   " is reported out of order; markers must be in the order of the configuration's list";
     }
     return {};
 }
@@ -53,7 +55,7 @@ std::string problem_with_numbers(const arhost_marker &marker) {
     return {};
 }
 
-// RMS over the corners in px; nullopt if a corner is behind the camera.
+// Returns the RMS reprojection error of the marker's corners, in px; nullopt if a corner is behind the camera.
 std::optional<double> reprojection_px(const arhost_marker &marker, const arhost_intrinsics &intrinsics,
                                       double side_mm) {
     const double s = side_mm / 2;
@@ -77,13 +79,13 @@ std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsi
     const auto error_px = reprojection_px(marker, intrinsics, side_mm);
     if (!error_px)
         return name_of(marker) + " is detected, but its pose is behind the camera";
-    if (!(std::abs(*error_px - marker.reprojection_px) <= 0.05 + 0.02 * marker.reprojection_px)) // also if NaN
-        return fmt::format("{}: its reprojection error is reported as {:.3f} px and is {:.3f} px", name_of(marker),
-                           marker.reprojection_px, *error_px);
+    if (!(std::abs(*error_px - marker.reprojection_px) <= 0.05 + 0.02 * marker.reprojection_px)) // true also for NaN
+        return fmt::format("{}: the reported reprojection error is {:.3f} px, but the actual one is {:.3f} px",
+                           name_of(marker), marker.reprojection_px, *error_px);
     return {};
 }
 
-// The box's bounds in a pinhole's image; nullopt if a part of the box is not in front of the camera.
+// Bounding rectangle of a projected box, in px.
 struct Rectangle {
     glm::dvec2 min{1e30}, max{-1e30};
 };
@@ -98,7 +100,7 @@ std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera
         bounds.min = glm::min(bounds.min, *at);
         bounds.max = glm::max(bounds.max, *at);
     }
-    constexpr double margin = 1.5; // px: samples are spread around the pixel's centre
+    constexpr double margin = 1.5; // px; the ray tracer's samples are spread around the pixel's centre
     return Rectangle{bounds.min - margin, bounds.max + margin};
 }
 
@@ -123,11 +125,11 @@ void SourceChecks::check(ContractChecks &checks, const arhost_record &record, st
                record.clock == clock_ ? ""
                                       : fmt::format("has the clock {}, earlier frames had {}", record.clock, clock_));
 
-    // In floating point, which cannot overflow: a source may report any time.
+    // A source may report any number as the time; the floating-point difference cannot overflow.
     const double capture_s = seconds(record.capture_ns), age_s = seconds(now_ns) - capture_s;
     std::string problem;
     if (record.clock == ARHOST_CLOCK_MONOTONIC && age_s < 0)
-        problem = fmt::format("was captured {:.3f} s after its arrival", -age_s);
+        problem = fmt::format("has a capture time {:.3f} s after its arrival at the host", -age_s);
     if (record.clock == ARHOST_CLOCK_MEDIA && capture_s < 0)
         problem = fmt::format("has the media time {:.3f} s, which must not be negative", capture_s);
     checks.add("source.capture-time", record.sequence, problem);
@@ -142,16 +144,19 @@ void SourceChecks::check(ContractChecks &checks, const arhost_record &record, st
 
 std::string SourceChecks::problem_with_rate(double since_first_s, double since_last_s, std::uint32_t skipped,
                                             std::int64_t now_ns) const {
-    // The resolution of media clocks; and how far a source may run ahead before its start returns.
+    // tolerance_s: resolution of media clocks. head_start_s: media time that a source may be ahead because it began
+    // to produce frames before the host recorded the start.
     constexpr double tolerance_s = 0.001, head_start_s = 1;
     const double step_s = (1.0 + skipped) / rate_.fps;
     if (rate_.is_configured && std::abs(since_last_s - step_s) > tolerance_s)
-        return fmt::format("is {:.3f} s after the previous frame; {:g} fps and {} skipped frames require {:.3f} s",
-                           since_last_s, rate_.fps, skipped, step_s);
+        return fmt::format(
+            "has a media time {:.3f} s after the previous frame, but {:g} fps and {} skipped frames require {:.3f} s",
+            since_last_s, rate_.fps, skipped, step_s);
     const double elapsed_s = seconds(now_ns) - seconds(started_ns_);
     if (rate_.is_paced && since_first_s > elapsed_s + head_start_s)
-        return fmt::format("is {:.3f} s after the first frame, but arrived {:.3f} s after the start", since_first_s,
-                           elapsed_s);
+        return fmt::format(
+            "has a media time {:.3f} s after the first frame, but arrived only {:.3f} s after the start",
+            since_first_s, elapsed_s);
     return {};
 }
 
@@ -192,7 +197,7 @@ OverlayChecks::OverlayChecks(const arhost_scene &scene) {
                          buffer.count);
     };
     const auto geometries = array(scene.geometries, static_cast<const arhost_geometry *>(nullptr));
-    std::map<std::uint32_t, scene::Box> boxes; // by geometry, which objects may share
+    std::map<std::uint32_t, scene::Box> boxes; // bounding box of each geometry; several objects may share a geometry
     for (const arhost_object &object : array(scene.objects, static_cast<const arhost_object *>(nullptr))) {
         const arhost_geometry &geometry = geometries[object.geometry];
         if (object.role != ARHOST_ROLE_VIRTUAL || geometry.positions.count == 0)
@@ -210,7 +215,7 @@ OverlayChecks::OverlayChecks(const arhost_scene &scene) {
 
 void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera,
                           const Region &region, const ImageView &overlay) const {
-    // A distorted lens may map points far outside the image into it (camera/lens.hpp).
+    // With lens distortion, points far outside the image may be projected into it (camera/lens.hpp).
     const bool is_pinhole = camera.intrinsics.distortion == ARHOST_DISTORTION_NONE;
     const std::optional<Rectangle> rectangle = virtual_box_ ? rectangle_of(*virtual_box_, camera) : Rectangle();
     const bool can_check_place = checks_place_ && is_pinhole && rectangle;
@@ -220,12 +225,12 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
         for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x, alpha += 4) {
             if (*alpha == 0)
                 continue;
-            const bool in_region = x - region.x < region.width && y - region.y < region.height; // unsigned
+            const bool in_region = x - region.x < region.width && y - region.y < region.height; // unsigned arithmetic
             if (outside_region.empty() && !in_region)
-                outside_region =
-                    fmt::format("pixel ({}, {}): alpha is {} outside the region, which is {} x {} px from "
-                                "({}, {})",
-                                x, y, *alpha, region.width, region.height, region.x, region.y);
+                outside_region = fmt::format(
+                    "pixel ({}, {}) is outside the reported region, but has alpha {}; the region is {} x {} px at "
+                    "({}, {})",
+                    x, y, *alpha, region.width, region.height, region.x, region.y);
             if (misplaced.empty() && can_check_place && *alpha == 255 && in_region &&
                 (x < rectangle->min.x || x > rectangle->max.x || y < rectangle->min.y || y > rectangle->max.y))
                 misplaced = fmt::format("pixel ({}, {}): alpha is 255, but {}", x, y,

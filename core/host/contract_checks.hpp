@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The contract checks of `conform: true` (docs/conformance.md): samples real frames and reports violations of the ABI
-// without any other effect. What could harm the host is rejected even without them (frames.hpp).
+// The contract checks that `conform: true` enables (docs/conformance.md). They inspect a sample of the run's frames
+// and report violations of the ABI; they do not change the run. Values that could harm the host are always rejected,
+// with or without these checks (frames.hpp).
 #pragma once
 
 #include "compositor/compositor.hpp"
@@ -23,17 +24,17 @@
 namespace arhost::host {
 
 struct ContractCheck {
-    std::uint64_t checked = 0, violations = 0; // frames
-    std::string first_violation;               // "frame 3: …"
+    std::uint64_t checked = 0, violations = 0; // numbers of frames
+    std::string first_violation;               // such as "frame 3: …"; "" if there is none
 };
 
 class ContractChecks {
 public:
-    // Calls `on_first` at the first violation of each check: ("tracker.order", "frame 3: …").
+    // Calls `on_first` at the first violation of each check, for example with ("tracker.order", "frame 3: …").
     explicit ContractChecks(std::function<void(const std::string &name, const std::string &violation)> on_first = {})
         : on_first_(std::move(on_first)) {}
 
-    // Counts a frame. `problem` is empty if the frame conforms.
+    // Records that the check `name` examined a frame. `problem` is "" if the frame conforms.
     void add(const std::string &name, std::uint64_t frame, const std::string &problem);
 
     const std::map<std::string, ContractCheck> &all() const { return all_; }
@@ -43,18 +44,20 @@ private:
     std::map<std::string, ContractCheck> all_;
 };
 
+// Checks the frames of a source:
 // source.clock: all frames have the same clock.
-// source.capture-time: monotonic capture times are not in the future; media time starts at 0 or later.
-// source.rate: media time advances according to `Rate`, including skipped frames.
+// source.capture-time: capture times of CLOCK_MONOTONIC are not in the future; media times are not negative.
+// source.rate: media times increase according to `Rate`; skipped frames count as frames.
 class SourceChecks {
 public:
     struct Rate {
-        double fps = 0;             // reported by the source; 0: none, or it is live
-        bool is_configured = false; // frames are 1/fps apart; otherwise a film's frames may be unevenly spaced
-        bool is_paced = false;      // mode live: no faster than the clock
+        double fps = 0;             // reported by the source; 0: the source is live or reports no rate
+        bool is_configured = false; // the user set `fps`, so frames are 1/fps apart; otherwise spacing may vary
+        bool is_paced = false;      // mode live: media time must not run ahead of the real time
     };
     SourceChecks(const Rate &rate, std::int64_t now_ns) : rate_(rate), started_ns_(now_ns) {}
-    // For a frame received at `now_ns` of CLOCK_MONOTONIC. Uses the record's sequence, clock and time.
+    // Checks a frame that the host received at `now_ns` of CLOCK_MONOTONIC. Reads only the record's sequence number,
+    // clock and capture time.
     void check(ContractChecks &checks, const arhost_record &record, std::uint32_t skipped, std::int64_t now_ns);
 
 private:
@@ -63,29 +66,35 @@ private:
 
     Rate rate_;
     std::int64_t started_ns_;
-    arhost_clock clock_ = 0; // of the first frame; 0: no frame yet
+    arhost_clock clock_ = 0; // clock of the first frame; 0 before the first frame
     double first_s_ = 0, last_s_ = 0;
 };
 
-// tracker.order, tracker.numbers and tracker.pose (the pose's reprojection error is as reported).
+// Checks a tracker's result:
+// tracker.order: markers are in the order of the configuration.
+// tracker.numbers: numbers are in their ranges.
+// tracker.pose: the actual reprojection error of the pose equals the reported one.
 void check_markers(ContractChecks &checks, const arhost_record &record, const arhost_intrinsics &intrinsics,
                    std::span<const arhost_marker_config> markers);
 
-// Hash of a sample of the bytes, a different one for each frame: detects changes after hand-over.
+// Returns a hash of some of the bytes; `frame` selects which. If two calls for the same frame return different
+// values, the buffer was modified after hand-over.
 std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame);
 
+// Checks the images of a ray tracer:
 // raytracer.region: alpha is 0 outside the reported region.
-// raytracer.place: alpha is 255 only inside the projected bounds of virtual objects; static scenes and pinholes only.
+// raytracer.place: alpha is 255 only inside the projected bounding box of the virtual objects. Checked only for
+// static scenes and cameras without lens distortion.
 class OverlayChecks {
 public:
     explicit OverlayChecks(const arhost_scene &scene);
-    // `overlay` has the camera's size.
+    // `overlay` must have the camera's image size.
     void check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera, const Region &region,
                const ImageView &overlay) const;
 
 private:
-    bool checks_place_ = false;             // otherwise opaque pixels may be anywhere
-    std::optional<scene::Box> virtual_box_; // world, mm; none: no virtual object
+    bool checks_place_ = false;             // whether raytracer.place is checked
+    std::optional<scene::Box> virtual_box_; // world coordinates, mm; nullopt if the scene has no virtual object
 };
 
 } // namespace arhost::host

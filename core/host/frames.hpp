@@ -20,10 +20,10 @@ struct Frame {
     using Clock = std::chrono::steady_clock;
 
     enum class Stage {
-        to_track,  // waits for the tracker
-        tracking,  // in the tracker
-        to_render, // waits for the ray tracer, with a camera
-        rendering, // in the ray tracer
+        to_track,  // waiting for the tracker
+        tracking,  // being processed by the tracker
+        to_render, // has a camera; waiting for the ray tracer
+        rendering, // being processed by the ray tracer
         done       // ready for compositing, with or without `overlay`
     };
 
@@ -34,45 +34,47 @@ struct Frame {
     }
 
     Stage stage = Stage::to_track;
-    bool overtaken = false;     // live: a newer frame was shown; dropped once its worker returns it
+    bool overtaken = false;     // mode live: a newer frame was shown; this one is dropped when its worker returns it
     bool held = false;          // uses the camera of an earlier frame
-    std::uint32_t attempts = 0; // of the current stage that ended with the worker's death
-    Lease pixels;               // in the source's memory
-    Lease result;               // in the tracker's memory, while tracking
-    Lease overlay;              // in the ray tracer's memory
+    std::uint32_t attempts = 0; // how often the worker died while processing this frame in the current stage
+    Lease pixels;               // slot in the source's memory
+    Lease result;               // slot in the tracker's memory, while tracking
+    Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
     std::shared_ptr<LensWarp> warp; // lens distortion to apply to the overlay, or null
     arhost_record record{};
-    std::optional<std::size_t> pixels_sample, overlay_sample; // for contract checks
+    std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point received;
-    FrameTimes times; // except `shown` and `latency`
+    FrameTimes times; // `shown` and `latency` are not set here
 
     bool in_worker() const { return stage == Stage::tracking || stage == Stage::rendering; }
 };
 
-// Now on CLOCK_MONOTONIC.
+// Returns the current time of CLOCK_MONOTONIC.
 inline std::int64_t monotonic_ns() {
     return std::chrono::nanoseconds(Frame::Clock::now().time_since_epoch()).count();
 }
 
-// A composited frame, held by the sinks that have not written it yet.
+// A composited frame. Shared by all sinks that have not written it yet.
 struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 
-// Copies a tracker's result into the record and validates the copy. Returns the contract violation, or nullptr; then
-// the markers have known and unique ids, finite numbers and valid poses.
+// Copies a tracker's result into the record and validates the copy. Returns nullptr if the copy is valid (known and
+// unique marker ids, finite numbers, valid poses), otherwise a description of the contract violation.
 const char *accept_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
                                   arhost_record &record);
 
-// Likewise for a source's frame info, received at `now_ns` of CLOCK_MONOTONIC. Rejects times far in the future, as
-// all later correct times would then run backwards.
+// Copies and validates a source's frame info, which the host received at `now_ns` of CLOCK_MONOTONIC. Returns nullptr
+// or the contract violation. Rejects capture times far in the future, because later frames with correct times would
+// then seem to run backwards.
 const char *accept_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
                               arhost_record &record);
 
-// The reported device time of an image, or 0 if there is none or it exceeds `busy`, the duration of the render call.
+// Returns the reported device time of an image. Returns 0 if none was reported or if it is longer than `busy`, the
+// duration of the render call.
 std::chrono::nanoseconds device_time(const arhost_render_info &info, std::chrono::nanoseconds busy);
 
 } // namespace arhost::host

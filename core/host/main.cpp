@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost: command line.
+// Command line of arhost.
 #include "base/command_line.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
@@ -16,8 +16,9 @@
 
 namespace {
 
-// Undoes what the parent process may have set up: reopens closed standard streams, so that no socket gets their
-// numbers, and resets signals. Ignored SIGPIPE and SIGXFSZ become error values.
+// Establishes a known state, whatever the parent process has set up: reopens standard streams that are closed, so
+// that no socket gets descriptor 0, 1 or 2, and resets the signal handling. Ignores SIGPIPE and SIGXFSZ, so that the
+// failing system calls return an error instead.
 void prepare_process() {
     int fd = ::open("/dev/null", O_RDWR);
     while (fd >= 0 && fd <= 2)
@@ -25,10 +26,10 @@ void prepare_process() {
     ::close(fd);
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
-    std::signal(SIGCHLD, SIG_DFL); // else waitpid fails
+    std::signal(SIGCHLD, SIG_DFL); // waitpid() fails if SIGCHLD is ignored
 }
 
-// Prints one line, even if a file name contains a line break.
+// Prints the error as a single line, even if a file name in it contains a line break. Returns `exit_status`.
 int print_error(const std::string &why, int exit_status) {
     std::fprintf(stderr, "error: %s\n", arhost::base::printable(why).c_str());
     return exit_status;
@@ -61,17 +62,18 @@ int main(int argc, char **argv) {
     app.option("--config", arguments.file, "The configuration to run (docs/config.md)").type_name("FILE");
     add_configuration_options(app);
     app.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
-    CommandLine axes = app.group(
-        "Coordinates", "The dissertation's options (docs/camera.md); they override 'coordinates:' in the file");
+    CommandLine axes =
+        app.group("Coordinates",
+                  "The dissertation's options (docs/camera.md); they override 'coordinates:' in the configuration");
     axes.option("--ar", arguments.ar,
                 "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");
     axes.option("--rt", arguments.rt, "Profile of the scene");
     axes.option("--g1,--g", arguments.g1, "First rotation, in degrees");
-    axes.option("--x1,--x", arguments.axis1[0], "Its axis");
+    axes.option("--x1,--x", arguments.axis1[0], "Axis of the rotation");
     axes.option("--y1,--y", arguments.axis1[1]);
     axes.option("--z1,--z", arguments.axis1[2]);
     axes.option("--g2", arguments.g2, "Second rotation, in degrees");
-    axes.option("--x2", arguments.axis2[0], "Its axis");
+    axes.option("--x2", arguments.axis2[0], "Axis of the rotation");
     axes.option("--y2", arguments.axis2[1]);
     axes.option("--z2", arguments.axis2[2]);
 
@@ -87,9 +89,12 @@ int main(int argc, char **argv) {
     replay_command
         .option("--config", arguments.file, "Configuration for components and scene; its outputs are ignored")
         .type_name("FILE");
-    replay_command.option("--width", replay_arguments.width, "Image width in px, if FILE has none (default 800)")
+    replay_command
+        .option("--width", replay_arguments.width, "Image width in px, if the trajectory has none (default 800)")
         .range(1, 16384);
-    replay_command.option("--height", replay_arguments.height, "Image height in px (default 600)").range(1, 16384);
+    replay_command
+        .option("--height", replay_arguments.height, "Image height in px, if the trajectory has none (default 600)")
+        .range(1, 16384);
     replay_command.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
     replay_command.option("--output", replay_arguments.output, "Video, images or poses, by file extension")
         .type_name("FILE|none");
@@ -103,18 +108,19 @@ int main(int argc, char **argv) {
     add_configuration_options(check_command);
 
     PluginsArguments plugins_arguments;
-    CommandLine plugins_command = app.subcommand("plugins", "List the plugins, or why one cannot be used");
-    plugins_command.flag("--options", plugins_arguments.with_options, "Also list their options");
+    CommandLine plugins_command = app.subcommand("plugins", "List the plugins; for unusable ones, print the reason");
+    plugins_command.flag("--options", plugins_arguments.with_options, "Also list the options of each plugin");
     plugins_command.flag("--devices", plugins_arguments.with_devices,
-                         "Also list the devices they can run on (loading drivers may be slow)");
-    plugins_command.option("--reads", plugins_arguments.reads, "A folder with libraries that they need (repeatable)")
+                         "Also list the devices that each plugin can run on (loading drivers may be slow)");
+    plugins_command
+        .option("--reads", plugins_arguments.reads, "A folder with libraries that the plugins need (repeatable)")
         .existing_path()
         .type_name("FOLDER")
         .one_value_each();
 
     bool markdown = false;
     CommandLine schema_command = app.subcommand("schema", "Print the JSON Schema of configurations, for editors");
-    schema_command.flag("--markdown", markdown, "As the table in docs/config.md");
+    schema_command.flag("--markdown", markdown, "Print the Markdown table of docs/config.md instead");
 
     NewPlugin plugin;
     CommandLine new_plugin_command =
@@ -154,7 +160,8 @@ int main(int argc, char **argv) {
         return checked_output(command());
     } catch (const arhost::yaml::Error &error) {
         return print_error(error.what(), bad_configuration);
-    } catch (const std::filesystem::filesystem_error &error) { // such as a name too long, or an unreadable folder
+    } catch (const std::filesystem::filesystem_error
+                 &error) { // for example: a file name is too long, or a folder is unreadable
         return print_error(error.path1().string() + ": " + error.code().message(), bad_configuration);
     } catch (const std::exception &error) {
         return print_error(error.what(), run_failed);

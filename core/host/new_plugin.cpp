@@ -19,13 +19,13 @@ namespace arhost::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Words = std::map<std::string, std::string>; // "@NAME@" → its replacement
+using Words = std::map<std::string, std::string>; // maps placeholders such as "@NAME@" to their replacements
 
-// Names related to a plugin kind.
+// The words of the templates that depend on the kind of plugin.
 struct Kind {
-    const char *section; // in a configuration
+    const char *section; // the configuration key of such a component
     const char *python;  // the plugin that runs Python classes of this kind
-    const char *count;   // in the statistics: frames that passed through it
+    const char *count;   // the statistics' counter of frames that passed through such a component
 };
 const std::map<std::string, Kind> kinds = {{"raytracer", {"raytracer", "rt_python", "augmented"}},
                                            {"tracker", {"tracker", "tracker_python", "tracked"}},
@@ -46,7 +46,7 @@ void check_name(const std::string &name, const std::string &language, const fs::
         refuse(
             name,
             "must be 1 to 64 lower-case letters, digits and underscores, starting with a letter, as in 'my_tracer'");
-    // CMake targets and libraries, Rust crates, build folders.
+    // Names of CMake targets, libraries, Rust crates and build folders.
     for (const char *taken :
          {"all",   "alloc",  "arhost",  "arhost_sys",     "build",      "clean",         "core",
           "crate", "depend", "deps",    "edit_cache",     "help",       "install",       "list_install_components",
@@ -54,9 +54,10 @@ void check_name(const std::string &name, const std::string &language, const fs::
           "std",   "super",  "test"})
         if (name == taken)
             refuse_taken(name, "is reserved by a build tool or a language");
-    // A script's folder precedes the standard library, whose modules have no underscore except for the second list.
+    // Python searches the script's folder before the standard library. Standard modules have no underscore in their
+    // names, except for those in the second list.
     if (language == "python" && name.find('_') == std::string::npos)
-        refuse_taken(name, "has no underscore, which is required in Python: it might hide a standard module");
+        refuse_taken(name, "has no underscore; a Python plugin needs one, so that it cannot hide a standard module");
     for (const char *module : {"py_compile", "pydoc_data", "sre_compile", "sre_constants", "sre_parse"})
         if (language == "python" && name == module)
             refuse_taken(name, "is a standard Python module");
@@ -110,7 +111,7 @@ void copy_file(const fs::path &from, const fs::path &to, const Words &words) {
     text << std::ifstream(from, std::ios::binary).rdbuf();
     const std::string &name = words.at("@NAME@"), &type = words.at("@CLASS@");
     if (text.str().find("@CLASS@") != std::string::npos && has_word(text.str(), type))
-        refuse_taken(name, "results in the class name '" + type + "', which the skeleton uses already");
+        refuse_taken(name, "results in the class name '" + type + "', which the skeleton already uses");
     if (fs::exists(to))
         refuse_taken(name, "is the name of another file of the skeleton");
     fs::create_directories(to.parent_path());

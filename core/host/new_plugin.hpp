@@ -17,8 +17,8 @@ struct NewPlugin {
     std::filesystem::path into = "."; // parent of the new folder
 };
 
-// Creates the folder atomically. `prefix`: where arhost is installed. Returns the exit status; throws
-// std::runtime_error.
+// Creates the plugin's folder atomically. `prefix` is the folder in which arhost is installed. Returns the exit
+// status; throws std::runtime_error.
 int new_plugin(const NewPlugin &plugin, const std::filesystem::path &prefix);
 
 } // namespace arhost::host

@@ -99,7 +99,7 @@ void Pipeline::advance_phase() {
         phase_ = Phase::stages;
     }
     if (phase_ == Phase::stages && is_ready(tracker_) && is_ready(raytracer_)) {
-        make_outputs(); // last, so that a run that cannot start touches no file
+        make_outputs(); // created last, so that a run that cannot start does not touch any file
         phase_ = Phase::outputs;
     }
     if (phase_ == Phase::outputs &&
@@ -117,7 +117,7 @@ void Pipeline::end_run() {
         source_->cancel_call();
 }
 
-// Cancels calls for frames that will not be shown.
+// Cancels the tracker's and the ray tracer's calls for frames that will not be shown.
 void Pipeline::cancel_stages() {
     for (Component *stage : {tracker_.get(), raytracer_.get()})
         if (stage)
@@ -125,7 +125,7 @@ void Pipeline::cancel_stages() {
 }
 
 void Pipeline::interrupt() {
-    // Before the first frame no output was written, so there is nothing to finish.
+    // Before the first frame nothing was written to the outputs, so there is nothing to finish.
     abandoned_ = interrupted_ || phase_ < Phase::running;
     interrupted_ = true;
     end_run();
@@ -140,7 +140,7 @@ void Pipeline::stop_components() {
     for (Component *stage : {source_.get(), tracker_.get(), raytracer_.get()})
         if (stage)
             stage->running() ? stage->stop() : stage->kill();
-    // A sink that is not running is restarted once more to finish its files.
+    // A sink that is not running is restarted once more, so that it can finish its files.
     for (const auto &sink : sinks_)
         if (sink->component->state() != Component::State::stopped)
             sink->component->stop();

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One run of a configuration: source → tracker → camera → ray tracer → composite → outputs. A trajectory can replace
-// the tracker, and the source. Workers do everything except compositing; the pipeline runs on the thread that calls
-// run(), one event at a time.
+// the tracker and also the source. Workers do everything except compositing; the pipeline runs on the thread that
+// calls run(), one event at a time.
 //
-// Events only record results; `pump` then advances every frame as far as possible. In lockstep, frames wait for each
-// stage and leave in order. In mode live, a newer frame replaces a waiting one, and frames skip a stage that is down.
+// Event handlers only record results; `pump` then advances every frame as far as possible. In mode lockstep, every
+// frame passes through all stages, and frames are output in order. In mode live, a newer frame replaces a frame that
+// is still waiting, and frames skip a stage whose worker is down.
 //
 // pipeline.cpp has the phases of a run, pipeline_components.cpp creates the components, pipeline_frames.cpp moves
 // frames through the stages.
@@ -23,8 +24,8 @@
 namespace arhost::host {
 
 struct Progress {
-    std::uint64_t frame = 0;       // composited so far
-    std::uint64_t frame_count = 0; // in total; 0: unknown
+    std::uint64_t frame = 0;       // frames composited so far
+    std::uint64_t frame_count = 0; // total number of frames; 0: unknown
     bool finishing = false;        // closing the outputs
 };
 
@@ -33,13 +34,14 @@ public:
     Pipeline(const run_config::Configuration &configuration, supervise::Context context,
              std::function<void(const Progress &)> on_progress);
 
-    // Runs to the end. Returns false if the run failed or a component was disabled; failure() then has the reason, a
-    // message for the user.
+    // Runs until all frames are output. Returns false if the run failed or a component was disabled; failure() then
+    // returns the reason as a message for the user.
     bool run();
     const std::string &failure() const { return failure_; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
-    // For Ctrl-C: finishes the frames in progress and ends; a second call ends at once. Call from the reactor.
+    // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run; a second call ends the
+    // run immediately. Must be called from the reactor.
     void interrupt();
 
     const Statistics &statistics() const { return statistics_; }
@@ -59,7 +61,7 @@ private:
 
     void pump();
     void advance_phase();
-    void end_run(); // as if the source had ended
+    void end_run(); // has the same effect as the end of the source
     bool no_more_frames() const;
     bool read();
     bool read_from_trajectory();
@@ -82,7 +84,7 @@ private:
     void on_rendered(const ipc::Command &command, const ipc::Result &result);
     void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
 
-    // Whether a frame may continue without a stage that is down.
+    // Returns whether a frame may skip `stage` because the stage's worker is down.
     bool may_skip(const supervise::Component *stage) const;
     bool is_behind() const;
     void skip(Frame &frame, const char *stage);
@@ -115,18 +117,18 @@ private:
     std::shared_ptr<LensWarp> warp_; // null if the ray tracer supports lens distortion
     std::set<std::int32_t> marker_ids_;
 
-    std::deque<Lease> reads_; // slots of the reads in flight, oldest first
+    std::deque<Lease> reads_; // slots of the pending read commands, oldest first
     std::uint64_t next_read_ = 0;
-    std::uint64_t skipped_ = 0; // by the source, before next_read_
+    std::uint64_t skipped_ = 0; // number of frames before next_read_ that the source skipped
     std::int64_t last_capture_ns_ = INT64_MIN;
-    bool input_ended_ = false; // the source has ended, or is read no further
+    bool input_ended_ = false; // the source has ended, or no more frames are to be read from it
     bool interrupted_ = false;
-    bool abandoned_ = false; // end at once
+    bool abandoned_ = false; // the run must end immediately
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
-    std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the frame it belongs to
+    std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 
     Statistics statistics_;
-    std::optional<SourceChecks> source_checks_; // of the current plugin, across restarts
+    std::optional<SourceChecks> source_checks_; // for the current plugin; survives restarts
     std::optional<OverlayChecks> overlay_checks_;
     std::string failure_;
     bool failed_by_configuration_ = false;

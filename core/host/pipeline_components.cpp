@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Creates the components of a pipeline: what each is created with, and how the pipeline reacts to its state.
+// Creates the components of a pipeline and defines how the pipeline reacts to changes of their state.
 #include "host/pipeline.hpp"
 
 #include "camera/calibration.hpp"
@@ -44,7 +44,7 @@ void Pipeline::make_source() {
     callbacks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &plugin,
                                                              std::size_t candidate) mutable {
         if (std::exchange(last, candidate) != candidate)
-            source_checks_.reset(); // another plugin
+            source_checks_.reset(); // the checks apply to one plugin; this is a different one
         return Component::Create{
             {run_config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate),
              messages::SourceSetup{next_read_ + skipped_, source.fps, live_, configuration_.camera}},
@@ -68,8 +68,8 @@ void Pipeline::make_source() {
         else if (ready.intrinsics)
             intrinsics_ = *ready.intrinsics;
         else if (configuration_.tracker)
-            source.node.fail(
-                "this source does not report its camera: add 'camera: {file: calibration.yaml}' (docs/camera.md)");
+            source.node.fail("this source does not report camera intrinsics: add 'camera: {file: calibration.yaml}' "
+                             "(docs/camera.md)");
         if (configuration_.tracker || configuration_.trajectory) {
             try {
                 camera::check_size(intrinsics_, format.width, format.height);
@@ -86,18 +86,18 @@ void Pipeline::make_source() {
         source_slots_.reset();
         for (const Command &command : unanswered)
             next_read_ = std::min(next_read_, command.sequence);
-        const PluginDescription &plugin = source_->description(); // empty if it died before hello
+        const PluginDescription &plugin = source_->description(); // empty if the worker died before its hello message
         if (next_read_ > 0 && !plugin.id.empty() &&
             !(plugin.capabilities & (ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE)) && !input_ended_) {
             input_ended_ = true;
-            fail("source: " + plugin.id + " died, and cannot continue at a later frame", false);
+            fail("source: " + plugin.id + " died, and after a restart it cannot continue at a later frame", false);
         }
     };
     source_ = std::make_unique<Component>(context_, "source", source.plugins, source.limits, source.policy,
                                           std::move(callbacks));
 }
 
-// The background of a trajectory without a source.
+// Creates the black background frames of a trajectory without a source.
 void Pipeline::make_black_frames() {
     intrinsics_ = *configuration_.camera;
     arhost_frame_format format{};
@@ -106,7 +106,7 @@ void Pipeline::make_black_frames() {
     format.width = intrinsics_.width;
     format.height = intrinsics_.height;
     format.fps = configuration_.trajectory->fps;
-    arhost_frame_layout(&format); // the configuration has validated the size
+    arhost_frame_layout(&format); // cannot fail, because the size was validated with the configuration
     format_ = format;
     source_slots_ = std::make_shared<SlotPool>(
         supervise::make_host_region("arhost-black", {format.byte_size, source_slot_count}));
@@ -163,8 +163,9 @@ void Pipeline::make_raytracer() {
             !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION)) {
             warp_ = std::make_shared<LensWarp>(intrinsics_);
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
-                         plugin.id + " does not support lens distortion: the host distorts its images, which costs "
-                                     "sharpness and time");
+                         plugin.id +
+                             " does not support lens distortion: the host warps the rendered images, which costs "
+                             "sharpness and time");
         }
         const arhost_intrinsics &traced = warp_ ? warp_->pinhole() : intrinsics_;
         return Component::Create{
@@ -184,9 +185,10 @@ void Pipeline::make_raytracer() {
 
 void Pipeline::make_outputs() {
     output_slots_ = std::make_shared<SlotPool>(supervise::make_host_region(
-        "arhost-outputs", {OutputSlot::byte_size(format_->width, format_->height),
-                           // Sinks that lag differently hold different frames: enough slots for each of them.
-                           static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
+        "arhost-outputs",
+        {OutputSlot::byte_size(format_->width, format_->height),
+         // Sinks may lag by different amounts and hold different frames, so each sink needs slots of its own.
+         static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
     for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
         const run_config::ComponentConfiguration &output = configuration_.outputs[i];
         std::string name = output.plugins.front().stem().string();
@@ -204,14 +206,13 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
     Component::Callbacks callbacks = common_callbacks(name, output.node);
     callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
         if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
-            sink->max_waiting = live_sink_depth; // a window must not delay a video file
+            sink->max_waiting = live_sink_depth; // a window drops frames instead of delaying other outputs
         messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {}};
         if (configuration_.source && configuration_.source->fps > 0)
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)
             setup.intrinsics = intrinsics_;
-        return Component::Create{
-            {run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate), std::move(setup)}, {}};
+        return Component::Create{{run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate), setup}, {}};
     };
     callbacks.result = [this, sink, name](const Command &command, const Result &result) {
         sink->on_result(command, result);
@@ -219,10 +220,10 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
             end_run();
         if (result.status >= 0 || sink->failed)
             return;
-        // A retry would not help, e.g. with a full disk: keep the complete files, and continue with the other
-        // outputs.
+        // A restart would not help, for example if the disk is full. Keeps the files that are complete and continues
+        // with the other outputs.
         const std::string reason = "cannot write frame " + std::to_string(command.sequence) + ": " +
-                                   status_text(result.status) + "; see its messages above";
+                                   status_text(result.status) + "; see the output's messages above";
         context_.log(ARHOST_SEVERITY_ERROR, name, reason);
         fail(name + ": " + reason, false);
         disable_sink(*sink);
@@ -249,7 +250,7 @@ void Pipeline::disable_sink(SinkQueue &sink) {
 
 void Pipeline::on_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
                            bool is_configuration_error) {
-    // Errors from the configuration already start with their place in the file.
+    // Configuration errors already start with a position in the file or with an option's name.
     const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--");
     fail(located ? reason : node.where() + ": " + name + ": " + reason, is_configuration_error);
     if (phase_ != Phase::running)

@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr std::size_t max_reads_in_flight = 2;
-constexpr std::uint32_t max_attempts = 2; // for a frame whose worker dies
+constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
 const char *name_of_stage(Frame::Stage waiting) {
     return waiting == Frame::Stage::to_track ? "tracker" : "raytracer";
@@ -42,7 +42,8 @@ bool Pipeline::read() {
     return true;
 }
 
-// Without a source, the frames are those of the trajectory; frames that the recorded run dropped are not traced.
+// Creates the next frame of a run without a source: one for each frame of the trajectory. Frames that the recorded
+// run dropped are not rendered.
 bool Pipeline::read_from_trajectory() {
     if (no_more_frames())
         return false;
@@ -51,7 +52,8 @@ bool Pipeline::read_from_trajectory() {
         return false;
     const camera::Trajectory &trajectory = *configuration_.trajectory;
     const camera::TrajectoryFrame *recorded = trajectory.at_or_after(next_read_);
-    if (recorded->frame >= configuration_.frames) { // the configured limit lies within the trajectory
+    if (recorded->frame >=
+        configuration_.frames) { // the configured frame limit is reached before the end of the trajectory
         input_ended_ = true;
         return false;
     }
@@ -67,10 +69,11 @@ bool Pipeline::read_from_trajectory() {
 void Pipeline::on_read(const Command &command, const Result &result) {
     Lease pixels = std::move(reads_.front());
     reads_.pop_front();
-    if (command.sequence >= next_read_) // read ahead of a failed frame, which is read again first
+    if (command.sequence >= next_read_) // a read after the failed frame: the failed frame must be read again first
         return;
     if (result.status == ARHOST_STATUS_END_TRUNCATED && !input_ended_)
-        fail(configuration_.source->node.where() + ": source: its input is truncated; the frames before are kept",
+        fail(configuration_.source->node.where() +
+                 ": source: the input is truncated; the frames before the truncation are kept",
              false);
     if (result.status >= ARHOST_STATUS_END || (input_ended_ && result.status < 0)) {
         input_ended_ = true;
@@ -79,7 +82,7 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     if (input_ended_ && interrupted_ && live_)
         return;
     if (result.status < 0) {
-        next_read_ = command.sequence; // read again after the restart
+        next_read_ = command.sequence; // reads this frame again after the restart
         return source_->end_process(std::string("read failed: ") + status_text(result.status));
     }
     auto frame = std::make_unique<Frame>(command.sequence);
@@ -142,7 +145,7 @@ bool Pipeline::track() {
     return true;
 }
 
-// Counts a stage's result and returns its frame, or null if the frame was overtaken or the stage failed.
+// Records the result of a stage and returns the result's frame; null if the frame was overtaken or the stage failed.
 Frame *Pipeline::accept_result(const Command &command, const Result &result, const char *stage) {
     statistics_.stages[stage].add(std::chrono::nanoseconds(result.busy_ns));
     const auto found = frames_.find(command.sequence);
@@ -183,7 +186,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
 }
 
 void Pipeline::set_camera_from_markers(Frame &frame) {
-    // The first marker that is not lost, in the order of the configuration, in which trackers report them.
+    // Uses the first marker that is not lost. Trackers report markers in the order of the configuration.
     const std::span markers(frame.record.markers, frame.record.marker_count);
     const auto anchor = std::find_if(markers.begin(), markers.end(),
                                      [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
@@ -200,8 +203,8 @@ void Pipeline::set_camera_from_markers(Frame &frame) {
     frame.record.has_camera = 1;
 }
 
-// Also restores the recorded time, which determines the positions of animated objects. A frame that the recorded run
-// dropped has no camera.
+// Sets the recorded camera and also the recorded time, which determines the positions of animated objects. A frame
+// that the recorded run dropped gets no camera.
 void Pipeline::set_camera_from_trajectory(Frame &frame) const {
     const camera::Trajectory &trajectory = *configuration_.trajectory;
     const camera::TrajectoryFrame *recorded = trajectory.at_or_after(frame.record.sequence);
@@ -276,7 +279,7 @@ ImageView Pipeline::overlay_of(const Frame &frame) const {
     return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
 }
 
-// Buffers must not change after hand-over.
+// Reports a contract violation if a buffer changed after hand-over.
 void Pipeline::check_buffers_unmodified(const Frame &frame) {
     const std::uint64_t sequence = frame.record.sequence;
     if (frame.pixels_sample)
@@ -300,7 +303,7 @@ void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stag
         Frame &frame = *found->second;
         frame.result = Lease();
         frame.overlay = Lease();
-        // The worker was executing the oldest command when it died.
+        // The worker was executing the oldest unanswered command when it died.
         const bool was_executing = &command == &unanswered.front();
         if (frame.overtaken)
             frames_.erase(found);
@@ -330,7 +333,7 @@ void Pipeline::skip(Frame &frame, const char *stage) {
     ++statistics_.skipped[stage];
 }
 
-// In mode live, a frame replaces an older one that waits for the same stage.
+// Lets a frame wait for a stage. In mode live, it replaces an older frame that is waiting for the same stage.
 void Pipeline::enqueue(Frame &frame, Frame::Stage stage) {
     if (live_)
         for (auto it = frames_.begin(); it != frames_.end();) {
@@ -350,7 +353,7 @@ Frame *Pipeline::next_waiting(Frame::Stage stage) {
 }
 
 bool Pipeline::compose() {
-    // The oldest frame; in mode live the newest one that is done.
+    // Selects the oldest frame; in mode live, the newest frame that is done.
     auto ready = frames_.begin();
     if (live_)
         for (auto it = frames_.begin(); it != frames_.end(); ++it)
@@ -363,7 +366,7 @@ bool Pipeline::compose() {
     if (has_sink) {
         std::optional<Lease> slot = output_slots_->acquire();
         if (!slot && !live_)
-            return false; // waits for the outputs, and so does the source
+            return false; // no free slot: waits for the outputs, and the source has to wait, too
         is_shown = slot.has_value();
         if (slot) {
             auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
@@ -412,7 +415,7 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
             region = {0, 0, format_->width, format_->height};
         }
     }
-    // Copies only the used markers.
+    // Copies the record only up to its last used marker.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
     std::memcpy(slot.data(), &frame.record, used);
     composite(*format_, planes, overlay, region,

@@ -7,8 +7,8 @@ using namespace ipc;
 
 namespace {
 
-// Opens the plugin in a worker and calls `on_message` for its messages until that returns true. Returns "", or the
-// reason of a failure, which is `late` after `timeout`.
+// Opens the plugin in a worker and passes the worker's messages to `on_message` until it returns true. Returns "" or
+// the reason for the failure; if the timeout expires, the reason starts with `late`.
 std::string query(supervise::Context &context, const std::filesystem::path &plugin, const sandbox::Policy &policy,
                   std::chrono::seconds timeout, const std::string &late,
                   const std::function<bool(supervise::Process &, const Message &)> &on_message) {
@@ -23,7 +23,7 @@ std::string query(supervise::Context &context, const std::filesystem::path &plug
             else if (!done)
                 done = on_message(*running, message);
         } catch (const std::exception &error) {
-            reason = std::string("its response is invalid: ") + error.what();
+            reason = std::string("the worker's response is invalid: ") + error.what();
         }
         if (done || !reason.empty())
             running->kill_now();
@@ -72,7 +72,7 @@ DevicesResult list_devices(supervise::Context &context, const std::filesystem::p
         if (need == "video" || need == "usb" || need == "gpu")
             policy.allow.insert(need);
     std::optional<DeviceList> list;
-    const std::string reason = query(context, plugin, policy, timeout, "no answer",
+    const std::string reason = query(context, plugin, policy, timeout, "did not respond",
                                      [&](supervise::Process &process, const Message &message) {
                                          if (is<messages::Hello>(message))
                                              process.send(messages::ListDevices{});

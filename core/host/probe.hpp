@@ -15,19 +15,21 @@
 
 namespace arhost::host {
 
-// The description, or why the plugin cannot be used.
+// The plugin's description, or the reason why the plugin cannot be used.
 using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
 
-// The plugin may read what `policy` permits and write nothing. On success, `level` receives the sandbox level
-// reached.
+// Opens the plugin in a worker and returns its description. The plugin may read what `policy` permits, but write
+// nothing. On success, the sandbox level that the worker reached is stored in `level`.
 ProbeResult probe(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                   std::string *level = nullptr);
 
-// The devices, nullopt if the plugin lacks the extension (arhost/devices.h), or why they cannot be listed.
+// The plugin's devices; nullopt if the plugin does not implement arhost/devices.h; or the reason why the devices
+// cannot be listed.
 using DevicesResult = std::variant<std::optional<ipc::DeviceList>, std::string>;
 
-// From `needs` (of the descriptor) it grants access to devices only, and not to network, processes and display. The
-// timeout is long, as drivers may load slowly.
+// Asks the plugin in a worker for its devices. Of the permissions in `needs` (from the plugin's descriptor), only
+// those for devices are granted, and not network, processes and display. The timeout is long because drivers may load
+// slowly.
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                            const std::vector<std::string> &needs,
                            std::chrono::seconds timeout = std::chrono::seconds(20));

@@ -9,8 +9,8 @@ using namespace ipc;
 
 namespace {
 
-// The files that a scene and its meshes reference are known only after parsing. So the loader may read all files
-// except those of the kernel and devices; its only output is the arena.
+// Returns the sandbox policy of the scene loader. Which files a scene and its meshes refer to is known only after
+// parsing, so the loader may read everything except /proc, /sys and devices. Its only output is the arena.
 sandbox::Policy policy_of(sandbox::Mode mode) {
     sandbox::Policy policy;
     policy.mode = mode;
@@ -18,7 +18,7 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
     for (const auto &entry : std::filesystem::directory_iterator("/"))
         if (const auto name = entry.path().filename(); name != "proc" && name != "sys" && name != "dev")
             policy.readable.push_back(entry.path());
-    policy.readable.push_back("/dev/shm"); // files in memory, not devices
+    policy.readable.push_back("/dev/shm"); // contains files in memory, not devices
     return policy;
 }
 
@@ -53,7 +53,7 @@ void SceneLoading::on_message(Message &message) {
 
 void SceneLoading::restart_deadline() {
     deadline_ = context_.reactor.at(Reactor::Clock::now() + timeout_, [this] {
-        process_->end("made no progress for " + std::to_string(timeout_.count()) +
+        process_->end("the scene loader made no progress for " + std::to_string(timeout_.count()) +
                       " ms (raytracer.start_deadline_ms)");
     });
 }
@@ -68,7 +68,7 @@ void SceneLoading::check_read(const base::FileIdentity &file) {
 }
 
 void SceneLoading::fail(const std::string &reason) {
-    if (failure_.empty()) // the first failure is the cause
+    if (failure_.empty()) // keep the first reason, as later failures may only be its consequences
         failure_ = reason;
 }
 
@@ -78,7 +78,8 @@ void SceneLoading::on_died(const supervise::Death &death) {
     if (!failure_.empty() || !death.clean || !arena_)
         return callbacks.failed(failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : failure_);
     try {
-        // The loader has exited, so no writable mapping should exist; adopt_and_freeze throws if one does.
+        // The loader has exited, so no writable mapping of the arena should exist. adopt_and_freeze throws if one
+        // does.
         SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
         const Mapping mapping = arena.map(Access::read_only);
         if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())

@@ -18,13 +18,13 @@ namespace arhost::host {
 
 class SceneLoading {
 public:
-    // Exactly one is called, from the reactor; it may destroy the SceneLoading.
+    // The reactor calls exactly one of these callbacks, which may destroy the SceneLoading.
     struct Callbacks {
-        std::function<void(ipc::SharedMemory arena)> loaded; // frozen and valid
+        std::function<void(ipc::SharedMemory arena)> loaded; // `arena` is frozen and validated
         std::function<void(const std::string &reason)> failed;
     };
-    // `timeout` limits the time between messages of the loader. Fails if the scene reads one of `files` that the run
-    // writes.
+    // `timeout` is the maximum time between two messages of the loader. Loading fails if the scene refers to a file
+    // that the run writes, according to `files`.
     SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
                  std::chrono::milliseconds timeout, run_config::FilesInUse files, Callbacks callbacks);
 

@@ -48,7 +48,7 @@ void SinkQueue::clear() {
 
 std::uint64_t SinkQueue::first_sequence() const {
     if (next_sequence_ == 0)
-        return 0; // nothing was written: a new start
+        return 0; // no frame was confirmed, so the sink starts from the beginning
     if (!unconfirmed_.empty())
         return unconfirmed_.front()->sequence;
     return waiting_.empty() ? next_sequence_ : waiting_.front()->sequence;

@@ -15,26 +15,27 @@ public:
     explicit SinkQueue(Statistics &statistics) : statistics_(statistics) {}
 
     std::unique_ptr<supervise::Component> component;
-    // The queue drops its oldest frame beyond this many. 0: unlimited, the run waits for the sink.
+    // Maximum number of waiting frames; if there are more, the queue drops the oldest. 0: unlimited, the run waits
+    // for the sink.
     std::size_t max_waiting = 0;
     bool failed = false; // accepts no more frames
 
     void offer(OutputFramePointer frame);
     void pump(); // submits waiting frames to the sink
-    // Callbacks of the component.
+    // To be called by the component's callbacks of the same names.
     void on_result(const ipc::Command &command, const ipc::Result &result);
     void on_lost();
 
     bool empty() const { return waiting_.empty() && unconfirmed_.empty(); }
     void clear();
-    // The first unconfirmed frame, with which a restarted sink continues.
+    // Returns the number of the first unconfirmed frame, with which a restarted sink continues.
     std::uint64_t first_sequence() const;
 
 private:
     static constexpr std::size_t max_in_flight = 2;
     Statistics &statistics_;
     std::deque<OutputFramePointer> waiting_, unconfirmed_;
-    std::uint64_t next_sequence_ = 0; // after the last confirmed frame
+    std::uint64_t next_sequence_ = 0; // number of the frame that follows the last confirmed one
 };
 
 } // namespace arhost::host

@@ -14,7 +14,7 @@ namespace arhost::host {
 
 class SlotPool;
 
-// Exclusive use of one slot; releases it on destruction.
+// Represents exclusive use of one slot. Releases the slot on destruction.
 class Lease {
 public:
     Lease() = default;
@@ -37,8 +37,8 @@ private:
     std::uint32_t index_ = 0;
 };
 
-// The slots of one region. A restarted component gets a new region and pool; leases keep the old memory alive until
-// the last frame in it is done.
+// The slots of one shared-memory region. A restarted component gets a new region and a new pool; the leases of the
+// old pool keep the old region mapped until its last frame is done.
 class SlotPool : public std::enable_shared_from_this<SlotPool> {
 public:
     explicit SlotPool(supervise::RegionPointer region) : region_(std::move(region)), in_use_(region_->layout.count) {}

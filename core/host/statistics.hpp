@@ -16,12 +16,13 @@
 
 namespace arhost::host {
 
-// Histogram of a stage's durations with buckets that grow by 1 %: bounded memory for runs of any length.
+// Histogram of a stage's durations. Each bucket is 1 % wider than the previous one, so memory use is bounded for runs
+// of any length.
 class Timing {
 public:
     void add(std::chrono::nanoseconds time);
     std::uint64_t count() const { return count_; }
-    double percentile_ms(double share) const; // nearest rank, within 0.5 %; 0 without samples
+    double percentile_ms(double share) const; // nearest-rank percentile, accurate to 0.5 %; 0 without samples
     double max_ms() const { return 1e-6 * static_cast<double>(max_ns_); }
     nlohmann::ordered_json to_json() const; // count, p50, p95, p99, max in ms
 
@@ -31,7 +32,8 @@ private:
     std::int64_t max_ns_ = 0;
 };
 
-// One frame that was sent to the outputs. Times are 0 for stages that it skipped and for an unreported device time.
+// Times of a frame that was sent to the outputs. The time of a stage that the frame skipped is 0; so is the device
+// time if the ray tracer reported none.
 struct FrameTimes {
     std::uint64_t frame = 0;
     std::chrono::steady_clock::time_point shown{};
@@ -39,23 +41,23 @@ struct FrameTimes {
 };
 
 struct Statistics {
-    std::uint64_t frames_in = 0;                  // from the source
-    std::uint64_t tracked = 0;                    // with at least one marker
-    std::uint64_t augmented = 0;                  // composited with an overlay
-    std::uint64_t composited = 0;                 // sent to the outputs, augmented or not
-    std::map<std::string, std::uint64_t> dropped; // by stage
-    std::map<std::string, std::uint64_t> skipped; // by the failed stage, for which the frame is unaugmented
+    std::uint64_t frames_in = 0;                  // frames received from the source
+    std::uint64_t tracked = 0;                    // frames with at least one detected marker
+    std::uint64_t augmented = 0;                  // frames composited with an overlay
+    std::uint64_t composited = 0;                 // frames sent to the outputs, augmented or not
+    std::map<std::string, std::uint64_t> dropped; // number of dropped frames by stage
+    std::map<std::string, std::uint64_t> skipped; // number of unaugmented frames by the failed stage
     std::map<std::string, Timing> stages; // by name: source, tracker, raytracer, device, composite, latency, …
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
-    ContractChecks contract_checks;   // of components with `conform: true`
+    ContractChecks contract_checks;   // checks of the components with `conform: true`
     std::vector<FrameTimes> timeline; // only if the configuration requests it
 
     double fps() const;
 };
 
-// CSV with a header and one line per frame:
-// frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms. shown_s is relative to the first
-// frame's arrival.
+// Returns CSV with a header and one line per frame:
+// frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms. shown_s counts from the arrival
+// of the first frame.
 std::string timeline_csv(const Statistics &statistics);
 
 nlohmann::ordered_json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,

@@ -16,14 +16,16 @@ extern "C" {
 
 namespace arhost::libav {
 
+struct CloseInput {
+    void operator()(AVFormatContext *p) const { avformat_close_input(&p); }
+};
 struct Delete {
-    void operator()(AVFormatContext *p) const { avformat_close_input(&p); } // of a demuxer
     void operator()(AVCodecContext *p) const { avcodec_free_context(&p); }
     void operator()(AVFrame *p) const { av_frame_free(&p); }
     void operator()(AVPacket *p) const { av_packet_free(&p); }
     void operator()(SwsContext *p) const { sws_freeContext(p); }
 };
-using InputPointer = std::unique_ptr<AVFormatContext, Delete>;
+using InputPointer = std::unique_ptr<AVFormatContext, CloseInput>; // demuxers only
 using CodecPointer = std::unique_ptr<AVCodecContext, Delete>;
 using FramePointer = std::unique_ptr<AVFrame, Delete>;
 using PacketPointer = std::unique_ptr<AVPacket, Delete>;

@@ -24,6 +24,32 @@ Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::u
     return {device, memory};
 }
 
+// The first function that `path` needs and the driver lacks though it announces the extension, or nullptr.
+const char *missing_function(const VolkDeviceTable &functions, Path path, bool imports_host_memory) {
+    const struct {
+        const char *name;
+        bool is_needed, is_present;
+    } of_extensions[] = {
+        {"vkGetMemoryHostPointerPropertiesEXT", imports_host_memory,
+         functions.vkGetMemoryHostPointerPropertiesEXT != nullptr},
+        {"vkCreateAccelerationStructureKHR", path != Path::plain,
+         functions.vkCreateAccelerationStructureKHR != nullptr},
+        {"vkGetAccelerationStructureBuildSizesKHR", path != Path::plain,
+         functions.vkGetAccelerationStructureBuildSizesKHR != nullptr},
+        {"vkCmdBuildAccelerationStructuresKHR", path != Path::plain,
+         functions.vkCmdBuildAccelerationStructuresKHR != nullptr},
+        {"vkCreateRayTracingPipelinesKHR", path == Path::pipeline,
+         functions.vkCreateRayTracingPipelinesKHR != nullptr},
+        {"vkGetRayTracingShaderGroupHandlesKHR", path == Path::pipeline,
+         functions.vkGetRayTracingShaderGroupHandlesKHR != nullptr},
+        {"vkCmdTraceRaysKHR", path == Path::pipeline, functions.vkCmdTraceRaysKHR != nullptr},
+    };
+    for (const auto &function : of_extensions)
+        if (function.is_needed && !function.is_present)
+            return function.name;
+    return nullptr;
+}
+
 } // namespace
 
 Device::Device(const PhysicalDevice &physical, Path path) : physical_(physical) {
@@ -61,6 +87,11 @@ Device::Device(const PhysicalDevice &physical, Path path) : physical_(physical) 
                                   .ppEnabledExtensionNames = extensions.data()};
     check(vkCreateDevice(physical.handle, &info, nullptr, &device_), "opening the Vulkan device");
     volkLoadDeviceTable(&functions_, device_);
+    if (const char *missing = missing_function(functions_, path, physical.imports_host_memory)) {
+        functions_.vkDestroyDevice(device_, nullptr);
+        throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                      "the Vulkan driver lacks " + std::string(missing) + "; reinstall or update the driver");
+    }
     functions_.vkGetDeviceQueue(device_, physical.queue_family, 0, &queue_);
 }
 

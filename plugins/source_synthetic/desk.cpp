@@ -24,7 +24,7 @@ namespace {
 
 constexpr float atlas_texel = 0.25f; // of the first image
 constexpr float card_texel = 0.5f;
-constexpr double ink = 0.175; // relative to paper, in sRGB codes
+constexpr int ink_permille = 175; // of the paper, in sRGB codes
 
 cv::Mat load_atlas() {
     const std::unique_ptr<void, int (*)(void *)> decoder(tjInitDecompress(), tjDestroy);
@@ -70,12 +70,18 @@ void print_caption(const MarkerSheet &sheet, cv::Mat &image) {
 // The marker in the middle of `image`: each texel is the exact mean of what the cells cover of it.
 void print_marker(const cv::Mat &cells, cv::Mat &image, float texel) {
     const int side = static_cast<int>(marker_side / texel), cell_px = side / cells.cols + 1;
-    cv::Mat white, factor, paper = centre(image, side);
+    cv::Mat white, paper = centre(image, side);
     cv::resize(cells, white, {}, cell_px, cell_px, cv::INTER_NEAREST);
     cv::resize(white, white, {side, side}, 0, 0, cv::INTER_AREA);
-    white.convertTo(factor, CV_32F, (1 - ink) / 255, ink);
-    cv::merge(std::vector(4, factor), factor);
-    cv::multiply(paper, factor, paper, 1, CV_8U);
+    // In integers: OpenCV rounds products of floats differently on different instruction sets.
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            const int factor = ink_permille * 255 + (1000 - ink_permille) * white.at<std::uint8_t>(y, x);
+            for (int c = 0; c < 4; ++c) {
+                std::uint8_t &code = paper.at<cv::Vec4b>(y, x)[c];
+                code = static_cast<std::uint8_t>((code * factor + 127'500) / 255'000);
+            }
+        }
 }
 
 // The window: an upright rectangle in the wall, from the marker.

@@ -9,9 +9,9 @@
 namespace arhost::synthetic {
 namespace {
 
-using Vec3 = shading::Vec3T<double>;
+using Vec3d = shading::Vec3T<double>;
 
-Vec3 normalized(Vec3 v) {
+Vec3d normalized(Vec3d v) {
     return v * (1 / std::sqrt(dot(v, v)));
 }
 
@@ -56,20 +56,20 @@ Mt pose_on_path(PathKind kind, double phase, double distance_scale, double unit_
     roll += hand * 0.35 * tremor(phase, 4.1);
 
     const double a = azimuth * degree, t = tilt * degree;
-    const Vec3 back{std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
+    const Vec3d back{std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
     // Looks slightly above the marker, where virtual objects will stand.
-    Vec3 target{6 * wave(phase, 1, 1.1), 6 * wave(phase, 2, 0.2), 16};
+    Vec3d target{6 * wave(phase, 1, 1.1), 6 * wave(phase, 2, 0.2), 16};
     if (kind == PathKind::still)
         target = {0, 0, 16};
-    target = target + Vec3{tremor(phase, 5.3), tremor(phase, 0.9), 0} * (hand * 1.2);
-    const Vec3 eye = target + back * (distance * distance_scale);
+    target = target + Vec3d{tremor(phase, 5.3), tremor(phase, 0.9), 0} * (hand * 1.2);
+    const Vec3d eye = target + back * (distance * distance_scale);
 
-    const Vec3 right_level = normalized(cross({0, 0, 1}, back)), up_level = cross(back, right_level);
+    const Vec3d right_level = normalized(cross({0, 0, 1}, back)), up_level = cross(back, right_level);
     const double c = std::cos(roll * degree), s = std::sin(roll * degree);
-    const Vec3 right = right_level * c + up_level * s, up = up_level * c - right_level * s;
-    const auto column = [&](double Vec3::*axis) { return std::array{right.*axis, up.*axis, back.*axis}; };
-    const auto x = column(&Vec3::x), y = column(&Vec3::y), z = column(&Vec3::z);
-    const Vec3 origin = eye * -unit_mm;
+    const Vec3d right = right_level * c + up_level * s, up = up_level * c - right_level * s;
+    const auto column = [&](double Vec3d::*axis) { return std::array{right.*axis, up.*axis, back.*axis}; };
+    const auto x = column(&Vec3d::x), y = column(&Vec3d::y), z = column(&Vec3d::z);
+    const Vec3d origin = eye * -unit_mm;
     return {x[0],
             x[1],
             x[2],

@@ -31,12 +31,12 @@ TEST(Conform, ReportsTheFailureAndTheCommandToRepeatIt) {
     ConformRun run;
     const std::string plugin = run.link_wrong("miss_alpha_1").string();
     EXPECT_EQ(run.run({plugin, "--only", "raytracer.miss-alpha", "--seed", "7", "--set", "samples=2"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("pixel (0, 0): no ray hit, alpha is 1 and must be 0"));
+    EXPECT_THAT(run.output(), HasSubstr("pixel (0, 0): no ray hit, alpha is 1; expected 0"));
     EXPECT_THAT(run.output(),
                 HasSubstr("arhost conform " + plugin + " --only raytracer.miss-alpha --seed 7 --set samples=2"));
 }
 
-TEST(Conform, NamesTheSignalAndTheCall) {
+TEST(Conform, ReportsTheSignalAndTheCallOfACrash) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("crash_in_render").string(), "--only", "raytracer.render"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.render\n         SIGSEGV in render"));
@@ -78,7 +78,7 @@ TEST(Conform, FailsIfTheReferenceIsMissing) {
 }
 
 // An invalid reference is not the plugin's fault.
-TEST(Conform, FailsIfTheReferenceCantBeUsed) {
+TEST(Conform, FailsIfTheReferenceCannotBeUsed) {
     ConformRun run;
     run.write("text.so", "no library");
     const std::string crashing = run.link_wrong("crash_in_render").string();
@@ -107,7 +107,7 @@ TEST(Conform, PrintsTheCommandWithAllOptions) {
 }
 
 TEST(Conform, RejectsInvalidOptions) {
-    const std::array<std::array<std::string, 3>, 13> wrong = {
+    const std::array<std::array<std::string, 3>, 13> cases = {
         {{"--timeout-factor", "nan", "'nan' must be a number from 0.001 to 1000"},
          {"--timeout-factor", "1e300", "'1e300' must be a number from 0.001 to 1000"},
          {"--seed", "99999999999999999999", "must be a whole number from 0 to 18446744073709551615"},
@@ -118,10 +118,10 @@ TEST(Conform, RejectsInvalidOptions) {
          {"--json", "", "the name is empty"},
          {"--print", "1=", "must be ID=FILE"},
          {"--print", "99999999999=a.png", "must be ID=FILE"},
-         {"--environment", "A=B", "'A=B' must be only a variable's name"},
-         {"--environment", "A B", "'A B' must be only a variable's name"},
-         {"--environment", "", "must be only a variable's name"}}};
-    for (const auto &[option, value, why] : wrong) {
+         {"--environment", "A=B", "'A=B' is not a variable name"},
+         {"--environment", "A B", "'A B' is not a variable name"},
+         {"--environment", "", "'' is not a variable name"}}};
+    for (const auto &[option, value, why] : cases) {
         ConformRun run;
         EXPECT_EQ(run.run({rt_embree, "--only", "abi.load", option, value}), 2) << option << " " << value;
         EXPECT_THAT(run.output(), HasSubstr(option));
@@ -188,26 +188,26 @@ TEST(Conform, RejectsAReportThatWouldReplaceAnInput) {
         std::vector<std::string> arguments = {plugin, "--only", "abi.load", "--reference", rt_embree};
         arguments.insert(arguments.end(), report.begin(), report.end());
         EXPECT_EQ(run.run(arguments), 2) << report[1];
-        EXPECT_THAT(run.output(), HasSubstr("cannot write " + report[1] + ": it is a file that this run reads"));
+        EXPECT_THAT(run.output(), HasSubstr("cannot write " + report[1] + ": this run reads that file"));
     }
     EXPECT_EQ(run.read("print.png"), "no picture");
 }
 
-TEST(Conform, FailsIfStandardOutputCantBeWritten) {
+TEST(Conform, FailsIfStandardOutputCannotBeWritten) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("standard output cannot be written: No space left on device"));
+    EXPECT_THAT(run.output(), HasSubstr("cannot write to standard output: No space left on device"));
 }
 
-TEST(Conform, FailsIfTheListCantBeWritten) {
+TEST(Conform, FailsIfTheListCannotBeWritten) {
     ConformRun run;
     run.start({"--list"}, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("No space left on device"));
 }
 
-TEST(Conform, ExitsCorrectlyIfStandardErrorCantBeWritten) {
+TEST(Conform, ReturnsTheExitStatusIfStandardErrorCannotBeWritten) {
     for (const char *stream : {"/dev/full", "pipe"}) {
         ConformRun run;
         run.start({"nosuch.so"}, [&] {
@@ -215,13 +215,13 @@ TEST(Conform, ExitsCorrectlyIfStandardErrorCantBeWritten) {
             if (stream != std::string("pipe") || ::pipe2(ends, O_CLOEXEC) != 0)
                 ::dup2(::open("/dev/full", O_WRONLY), STDERR_FILENO);
             else
-                ::dup2(ends[1], STDERR_FILENO); // whose other end is shut by exec
+                ::dup2(ends[1], STDERR_FILENO); // its other end is closed by exec
         });
         EXPECT_EQ(run.wait(), 2) << stream;
     }
 }
 
-// A pipe that is full and that nobody reads.
+// The output is a full pipe that nobody reads.
 TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
         ConformRun run;
@@ -231,16 +231,16 @@ TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
         ::fcntl(ends[1], F_SETPIPE_SZ, 4096);
         ASSERT_EQ(::write(ends[1], std::string(4096, ' ').data(), 4096), 4096);
         run.start({run.link_wrong("none").string(), "--only", "abi.create", "--json", "results.json", "--environment",
-                   "ARHOST_TELLS_DESCRIPTORS"},
+                   "ARHOST_LIST_DESCRIPTORS"},
                   [&] {
                       ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
-                      ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                      ::setenv("ARHOST_LIST_DESCRIPTORS", "1", 1);
                       ::dup2(ends[1], stream);
                       std::signal(SIGTERM, SIG_DFL);
                   });
-        while (run.running() && std::filesystem::is_empty(run.path("tmp"))) // a test runs: signals are taken
+        while (run.running() && std::filesystem::is_empty(run.path("tmp"))) // once a test runs, signals are handled
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        std::this_thread::sleep_for(std::chrono::milliseconds(500)); // and by now it has something to say
+        std::this_thread::sleep_for(std::chrono::milliseconds(500)); // until its output blocks
         ::kill(run.pid(), SIGTERM);
         EXPECT_EQ(run.wait(), 128 + SIGTERM);
         EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
@@ -251,7 +251,7 @@ TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
     }
 }
 
-TEST(Conform, RefusesToRunInAnUnsuitableEnvironment) {
+TEST(Conform, FailsInAnUnsuitableEnvironment) {
     ConformRun run;
     run.start({rt_embree, "--only", "abi.load"}, [] {
         const rlimit few{16, 16};
@@ -262,11 +262,11 @@ TEST(Conform, RefusesToRunInAnUnsuitableEnvironment) {
     EXPECT_THAT(run.output(), HasSubstr("raise it: ulimit -n "));
     run.start({rt_embree, "--only", "abi.load"}, [] { ::setenv("TMPDIR", "/no/such/folder", 1); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to one that does"));
+    EXPECT_THAT(run.output(), HasSubstr("set TMPDIR to an existing folder"));
     std::filesystem::create_directory(run.path("caf\xe9"));
     run.start({rt_embree, "--only", "abi.load"}, [&] { ::setenv("TMPDIR", run.path("caf\xe9").c_str(), 1); });
     EXPECT_EQ(run.wait(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("is not UTF-8, as text for a plugin must be"));
+    EXPECT_THAT(run.output(), HasSubstr("is not UTF-8, but text passed to plugins must be"));
 }
 
 TEST(Conform, WorksIfSigchldIsIgnored) {
@@ -275,14 +275,14 @@ TEST(Conform, WorksIfSigchldIsIgnored) {
     EXPECT_EQ(run.wait(), 0) << run.output();
 }
 
-// ---- What a plugin gets, leaves behind, and says ---------------------------------------------------
+// ---- A plugin's descriptors, processes and messages ------------------------------------------------
 
 TEST(Conform, PassesNoDescriptorsToThePlugin) {
     ConformRun run;
     run.write("secret.txt", "secret");
-    run.start({run.link_wrong("none").string(), "--only", "abi.create", "--environment", "ARHOST_TELLS_DESCRIPTORS"},
+    run.start({run.link_wrong("none").string(), "--only", "abi.create", "--environment", "ARHOST_LIST_DESCRIPTORS"},
               [] {
-                  ::setenv("ARHOST_TELLS_DESCRIPTORS", "1", 1);
+                  ::setenv("ARHOST_LIST_DESCRIPTORS", "1", 1);
                   const int secret = ::open("secret.txt", O_RDWR);
                   ::dup2(secret, STDIN_FILENO);
                   ::dup2(secret, 9);
@@ -292,26 +292,26 @@ TEST(Conform, PassesNoDescriptorsToThePlugin) {
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
 }
 
-// The process that rt_hangs_beside_a_process has started.
-pid_t process_beside(const ConformRun &run) {
-    const std::string before = "process ";
+// The process that rt_hangs_beside_a_process started.
+pid_t wait_for_process(const ConformRun &run) {
+    const std::string label = "process ";
     for (int i = 0; i < 5000; ++i) {
         const std::string output = run.output();
-        if (const std::size_t at = output.find(before);
+        if (const std::size_t at = output.find(label);
             at != std::string::npos && output.find('\n', at) < output.size())
-            return std::stoi(output.substr(at + before.size()));
+            return std::stoi(output.substr(at + label.size()));
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    throw std::runtime_error("it has started none: " + run.output());
+    throw std::runtime_error("it started no process: " + run.output());
 }
 
-TEST(Conform, KillsProcessesThatATestHasStarted) {
+TEST(Conform, KillsProcessesStartedByATest) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
                        "processes"}), // no timeout factor: abi.load must end in time
               1);
     EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
-    EXPECT_FALSE(is_alive(process_beside(run)));
+    EXPECT_FALSE(is_alive(wait_for_process(run)));
 }
 
 TEST(Conform, LeavesNothingBehindIfInterrupted) {
@@ -322,9 +322,9 @@ TEST(Conform, LeavesNothingBehindIfInterrupted) {
                    "--json", "results.json"},
                   [&] {
                       ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
-                      std::signal(signal, SIG_DFL); // whatever this test's parent has it at
+                      std::signal(signal, SIG_DFL); // this test's parent may ignore it
                   });
-        const pid_t process = process_beside(run);
+        const pid_t process = wait_for_process(run);
         EXPECT_TRUE(is_alive(process));
         EXPECT_FALSE(std::filesystem::is_empty(run.path("tmp")));
         ::kill(run.pid(), signal);
@@ -346,12 +346,12 @@ TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
 }
 
 TEST(Conform, FailsInvalidDescriptors) {
-    const std::array<std::array<std::string, 3>, 4> wrong = {
+    const std::array<std::array<std::string, 3>, 4> cases = {
         {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes; the maximum is 4096"},
          {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
          {"option_without_key", "abi.load", "its option 1 has no key"},
          {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
-    for (const auto &[defect, test, why] : wrong) {
+    for (const auto &[defect, test, why] : cases) {
         ConformRun run;
         EXPECT_EQ(run.run({run.link_wrong(defect).string(), "--only", "abi.*"}), 1);
         EXPECT_THAT(run.output(), HasSubstr("fail     " + test));
@@ -412,12 +412,12 @@ TEST(Conform, PassesTheTrackers) {
     }
 }
 
-TEST(Conform, NamesTheMissingFunction) {
-    const std::array<std::array<std::string, 3>, 4> lacking = {{{"rt", "render", "a ray tracer"},
-                                                                {"tracker", "track", "a tracker"},
-                                                                {"source", "read", "a source"},
-                                                                {"sink", "write", "a sink"}}};
-    for (const auto &[kind, function, owner] : lacking) {
+TEST(Conform, ReportsAMissingFunction) {
+    const std::array<std::array<std::string, 3>, 4> cases = {{{"rt", "render", "a ray tracer"},
+                                                              {"tracker", "track", "a tracker"},
+                                                              {"source", "read", "a source"},
+                                                              {"sink", "write", "a sink"}}};
+    for (const auto &[kind, function, owner] : cases) {
         ConformRun run;
         EXPECT_EQ(run.run({run.link_wrong("no_" + function, kind).string()}), 1);
         EXPECT_THAT(run.output(),
@@ -425,7 +425,7 @@ TEST(Conform, NamesTheMissingFunction) {
     }
 }
 
-TEST(Conform, ReportsFrameTimesWhenTheyPassToo) {
+TEST(Conform, ReportsFrameTimesOfPassedTests) {
     ConformRun run;
     run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--timeout-factor", "3", "--only", "tracker.speed",
              "--json", "results.json", "--html", "page.html"});
@@ -443,8 +443,8 @@ TEST(Conform, RunsOnlyTestsOfThePluginsKind) {
     EXPECT_EQ(report.at("results")[0].at("test"), "tracker.start");
 }
 
-// Of tag36h11, which is none of the suite's own.
-void write_tag_0(const std::filesystem::path &file) {
+// Tag 0 of tag36h11, which the suite does not use by default.
+void write_tag(const std::filesystem::path &file) {
     std::string cells = "########"
                         "#..#.#.#"
                         "##...#.#"
@@ -464,19 +464,19 @@ void write_tag_0(const std::filesystem::path &file) {
 
 TEST(Conform, DrawsTheUsersMarkers) {
     ConformRun run;
-    write_tag_0(run.path("tag.png"));
+    write_tag(run.path("tag.png"));
     const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so", tag = run.path("tag.png");
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.*s"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("pass     tracker.corners"));
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("it needs three prints"));
+    EXPECT_THAT(run.output(), HasSubstr("the test needs three prints"));
     EXPECT_EQ(run.run({tracker, "--print", "5=" + tag, "--only", "tracker.track"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("it reports 0 markers instead of 1"));
     EXPECT_THAT(run.output(),
                 HasSubstr("to repeat: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
 }
 
-TEST(Conform, FailsIfAMarkersPictureCantBeRead) {
+TEST(Conform, FailsIfAMarkersPictureCannotBeRead) {
     ConformRun run;
     const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
     EXPECT_EQ(run.run({tracker, "--print", "one=tag.png"}), 2);
@@ -532,7 +532,7 @@ TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
     EXPECT_TRUE(std::filesystem::exists(cache));
 }
 
-TEST(Conform, NamesAnUnknownNeed) {
+TEST(Conform, ReportsAnUnknownNeed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost cannot allow; a plugin may need "
@@ -554,7 +554,7 @@ TEST(Conform, RemovesASinksFiles) {
 TEST(Conform, ReportsAFullDiskAsAnErrorOfTheSuite) {
     ConformRun run;
     run.start({ARHOST_PLUGIN_DIRECTORY "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"}, [] {
-        const rlimit full{1 << 20, 1 << 20}; // as far as a process can see
+        const rlimit full{1 << 20, 1 << 20}; // acts like a full disk
         ::setrlimit(RLIMIT_FSIZE, &full);
     });
     EXPECT_EQ(run.wait(), 2);
@@ -565,7 +565,7 @@ TEST(Conform, ReportsAFullDiskAsAnErrorOfTheSuite) {
 TEST(Conform, FailsASinkThatUsesUpDescriptors) {
     ConformRun run;
     run.start({run.link_wrong("leaks_descriptors", "sink").string(), "--only", "sink.leaks", "--jobs", "1"}, [] {
-        const rlimit few{100, 100}; // gone after the warm-up
+        const rlimit few{100, 100}; // exhausted after the warm-up
         ::setrlimit(RLIMIT_NOFILE, &few);
     });
     EXPECT_EQ(run.wait(), 1);

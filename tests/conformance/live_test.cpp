@@ -27,14 +27,14 @@ objects:
   - {name: paper, plane: {size: 300}, material: grey, role: catcher}
   - {name: ball, sphere: {centre: [0, 0, 10], radius: 10}, material: grey}
 )";
-// Seen from half a metre it is behind every pixel.
+// From 0.5 m, the ball covers every pixel.
 constexpr const char *scene_of_one_big_ball = R"(version: 1
 axes: z-up
 materials: {grey: {model: diffuse, diffuse: 0.5}}
 objects: [{sphere: {centre: [0, 0, 0], radius: 300}, material: grey}]
 )";
 
-// arhost's own, but for what a test puts in their place.
+// Sections of the configuration. Tests replace some of them.
 struct Parts {
     std::string source = "{plugin: source_synthetic, fps: 30, options: {frames: 40}, conform: true}";
     std::string camera = "{width: 320, height: 240, fx: 300}";
@@ -52,7 +52,7 @@ struct Parts {
     }
 };
 
-// The suite's wrong plugin with this defect, which reads arhost's own.
+// The suite's wrong plugin with this defect, with read access to the shipped plugin that it wraps.
 std::string wrong(const std::string &kind, const std::string &defect, const std::string &more) {
     return "{plugin: ./" + kind + "_" + defect + ".so, conform: true, reads: [" ARHOST_PLUGIN_DIRECTORY "], " + more +
            "}";
@@ -68,9 +68,9 @@ Parts with_tracker(const std::string &defect) {
     parts.raytracer.clear();
     return parts;
 }
-// The frames' numbers, and a tracker that reads them.
-Parts with_numbers(const std::string &source_options, const std::string &tracker_options,
-                   const std::string &raytracer_options) {
+// The test plugins that encode frame numbers in pixels and read them.
+Parts with_counters(const std::string &source_options, const std::string &tracker_options,
+                    const std::string &raytracer_options) {
     Parts parts;
     parts.source = "{plugin: source_counter, options: {frames: 40, width: 320, height: 240, " + source_options +
                    "}, conform: true}";
@@ -131,7 +131,7 @@ void expect_no_violations(const Parts &parts, const std::set<std::string> &check
     EXPECT_EQ(run.checks(true), std::set<std::string>()) << run.output();
 }
 
-// ---- lockstep ----
+// ---- Mode lockstep ----
 
 TEST(LiveConformance, FindsNoViolationInShippedPlugins) {
     LiveRun run((Parts()));
@@ -145,13 +145,13 @@ TEST(LiveConformance, FindsNoViolationInShippedPlugins) {
 }
 
 TEST(LiveConformance, ReportsSourceViolations) {
-    Parts writes_later = with_numbers("writes_later: true", "", "");
+    Parts writes_later = with_counters("writes_later: true", "", "");
     writes_later.tracker.clear();
     writes_later.raytracer.clear();
     writes_later.output =
         "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // frames wait in the queue
     expect_violations(writes_later, {"source.frame-stays"});
-    expect_violations(with_numbers("ahead_ms: 300", "", ""), {"source.capture-time"});
+    expect_violations(with_counters("ahead_ms: 300", "", ""), {"source.capture-time"});
     for (const auto &[defect, check] :
          {std::pair("changes_clocks", "source.clock"), std::pair("begins_before_0", "source.capture-time"),
           std::pair("times_jump", "source.rate"), std::pair("microseconds", "source.rate")}) {
@@ -168,13 +168,13 @@ TEST(LiveConformance, ReportsTrackerViolations) {
     expect_violations(with_tracker("age_counts_frames"), {"tracker.numbers"});
     expect_violations(with_tracker("metres"), {"tracker.pose"});
     expect_violations(with_tracker("corners_at_half"), {"tracker.pose"});
-    expect_violations(with_numbers("", "reversed: true", ""), {"tracker.order"});
+    expect_violations(with_counters("", "reversed: true", ""), {"tracker.order"});
 }
 
 TEST(LiveConformance, ReportsRayTracerViolations) {
     expect_violations(with_raytracer("opaque_background"), {"raytracer.place", "raytracer.region"});
     expect_violations(with_raytracer("small_region"), {"raytracer.region"});
-    Parts writes_later = with_numbers("", "", "writes_later: true");
+    Parts writes_later = with_counters("", "", "writes_later: true");
     writes_later.output =
         "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // images wait in the queue
     expect_violations(writes_later, {"raytracer.image-stays"});
@@ -189,7 +189,7 @@ TEST(LiveConformance, IsOffByDefault) {
     EXPECT_THAT(run.output(), Not(HasSubstr("conform")));
 }
 
-// ---- lens, mode live, lost markers, restarts ----
+// ---- Lens, mode live, lost markers, restarts ----
 
 TEST(LiveConformance, SkipsPlaceIfTheRayTracerTracesTheLens) {
     Parts parts;
@@ -200,7 +200,7 @@ TEST(LiveConformance, SkipsPlaceIfTheRayTracerTracesTheLens) {
 }
 
 TEST(LiveConformance, ChecksPinholeImagesBeforeTheLensWarp) {
-    Parts parts = with_numbers("", "", "");
+    Parts parts = with_counters("", "", "");
     parts.camera = lens;
     parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // ignores the lens
     std::set<std::string> checks = source_checks;

@@ -10,12 +10,12 @@
 
 namespace arhost::test {
 
-// The value of --only for every test of a wrong plugin's kind. Those of abi.* run for the ray tracers alone.
+// The value of --only for every test of a wrong plugin's kind. Tests of abi.* run only on ray tracers.
 inline std::string whole_suite(const WrongPlugin &wrong) {
     return wrong.kind == "rt" ? "*" : wrong.kind + ".*";
 }
 
-// Of `tests`, those in wrong.found_by fail with its verdict, and no others.
+// Runs `tests`, of which exactly those in wrong.found_by must fail, with wrong.verdict.
 inline void expect_found(const WrongPlugin &wrong, const std::string &tests) {
     ConformRun run;
     const std::filesystem::path plugin = run.link_wrong(wrong.defect, wrong.kind);

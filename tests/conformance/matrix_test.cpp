@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The suite is tested: a correct plugin passes, each wrong one fails the tests named for it.
+// Tests the suite: a correct plugin passes, and each wrong one fails the tests listed for it.
 #include "matrix_run.hpp"
 #include "matrix_sinks.hpp"
 #include "matrix_sources.hpp"
@@ -15,18 +15,18 @@ namespace {
 
 using testing::HasSubstr;
 
-// Per push, each wrong plugin runs the tests that must find it. Those that must pass, and a sample of the others, run
-// the whole suite; exhaustive_test.cpp runs it for all.
+// Per push, each wrong plugin runs the tests that must find its defect. Plugins that must pass, and one failing
+// plugin per kind, run the whole suite; exhaustive_test.cpp runs it for all.
 class MatrixTargeted : public testing::TestWithParam<WrongPlugin> {};
 class MatrixWhole : public testing::TestWithParam<WrongPlugin> {};
 
-TEST_P(MatrixTargeted, FailsTheTestsThatMustFindIt) {
+TEST_P(MatrixTargeted, FailsTheListedTests) {
     std::string tests;
     for (const std::string &test : GetParam().found_by)
         tests += (tests.empty() ? "" : ",") + test;
     expect_found(GetParam(), tests);
 }
-TEST_P(MatrixWhole, FailsTheseTestsAndNoOthers) {
+TEST_P(MatrixWhole, FailsExactlyTheListedTests) {
     expect_found(GetParam(), whole_suite(GetParam()));
 }
 
@@ -34,10 +34,13 @@ std::vector<WrongPlugin> failing(std::vector<WrongPlugin> plugins) {
     std::erase_if(plugins, [](const WrongPlugin &plugin) { return plugin.found_by.empty(); });
     return plugins;
 }
-std::vector<WrongPlugin> sample(std::vector<WrongPlugin> plugins, const std::string &also) {
-    std::erase_if(plugins,
-                  [&](const WrongPlugin &plugin) { return !plugin.found_by.empty() && plugin.defect != also; });
-    return plugins;
+std::vector<WrongPlugin> sample(const std::vector<WrongPlugin> &plugins) {
+    constexpr std::size_t stride = 16;
+    std::vector<WrongPlugin> chosen;
+    for (std::size_t i = 0; i < plugins.size(); ++i)
+        if (plugins[i].found_by.empty() || i % stride == 0)
+            chosen.push_back(plugins[i]);
+    return chosen;
 }
 const auto defect = [](const auto &info) { return info.param.defect; };
 
@@ -45,10 +48,10 @@ INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixTargeted, testing::ValuesIn(failing(wr
 INSTANTIATE_TEST_SUITE_P(Tracker, MatrixTargeted, testing::ValuesIn(failing(wrong_trackers)), defect);
 INSTANTIATE_TEST_SUITE_P(Source, MatrixTargeted, testing::ValuesIn(failing(wrong_sources)), defect);
 INSTANTIATE_TEST_SUITE_P(Sink, MatrixTargeted, testing::ValuesIn(failing(wrong_sinks)), defect);
-INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixWhole, testing::ValuesIn(sample(wrong_plugins, "miss_alpha_1")), defect);
-INSTANTIATE_TEST_SUITE_P(Tracker, MatrixWhole, testing::ValuesIn(sample(wrong_trackers, "half_a_pixel")), defect);
-INSTANTIATE_TEST_SUITE_P(Source, MatrixWhole, testing::ValuesIn(sample(wrong_sources, "stale_times")), defect);
-INSTANTIATE_TEST_SUITE_P(Sink, MatrixWhole, testing::ValuesIn(sample(wrong_sinks, "writes_frames_in_pairs")), defect);
+INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixWhole, testing::ValuesIn(sample(wrong_plugins)), defect);
+INSTANTIATE_TEST_SUITE_P(Tracker, MatrixWhole, testing::ValuesIn(sample(wrong_trackers)), defect);
+INSTANTIATE_TEST_SUITE_P(Source, MatrixWhole, testing::ValuesIn(sample(wrong_sources)), defect);
+INSTANTIATE_TEST_SUITE_P(Sink, MatrixWhole, testing::ValuesIn(sample(wrong_sinks)), defect);
 
 struct Table {
     std::string source; // in wrong/
@@ -67,7 +70,7 @@ TEST(MatrixTable, HasAWrongPluginForEveryTest) {
     EXPECT_EQ(covered, ConformRun::test_names());
 }
 
-TEST(MatrixTable, HasEveryDefectOfTheWrongPlugins) {
+TEST(MatrixTable, ListsEveryDefectOfTheWrongPlugins) {
     for (const Table &table : tables) {
         const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conformance/wrong/" + table.source);
         for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
@@ -87,7 +90,7 @@ TEST(ConformanceDocument, HasTheMatrix) {
             std::string tests;
             for (const std::string &test : wrong.found_by)
                 tests += (tests.empty() ? "`" : ", `") + test + "`";
-            text += "| " + wrong.what + " | " + wrong.verdict + " | " + tests + " |\n";
+            text += "| " + wrong.description + " | " + wrong.verdict + " | " + tests + " |\n";
         }
         EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(text));
     }

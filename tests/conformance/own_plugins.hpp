@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs the suite on one of arhost's own plugins, set up in one way.
+// Runs the suite on a shipped plugin in a given configuration.
 #pragma once
 
 #include "conform_run.hpp"
@@ -14,26 +14,27 @@ struct OwnPlugin {
     std::vector<std::string> settings;
     std::string allow = "";
 };
-inline std::ostream &operator<<(std::ostream &stream, const OwnPlugin &own) {
-    return stream << own.name;
+inline std::ostream &operator<<(std::ostream &stream, const OwnPlugin &configuration) {
+    return stream << configuration.name;
 }
 
-inline void expect_to_pass(const OwnPlugin &own) {
-    // 12 pictures, and a video of them.
+inline void expect_to_pass(const OwnPlugin &configuration) {
+    // Input of source_file: 12 pictures and a video of them.
     ArhostRun run("version: 1\n"
                   "source: {plugin: source_synthetic, options: {width: 160, height: 120, frames: 12}}\n"
                   "outputs: [{plugin: sink_images, path: in/%02d.png}, {plugin: sink_video, path: in/a.mp4}]\n");
-    if (own.plugin == "source_file") {
+    if (configuration.plugin == "source_file") {
         ASSERT_EQ(run.run(), 0) << run.output();
     }
-    std::vector<std::string> arguments = {"conform",          ARHOST_PLUGIN_DIRECTORY "/" + own.plugin + ".so",
-                                          "--jobs",           "1",
-                                          "--timeout-factor", "3",
-                                          "--json",           "results.json"};
-    for (const std::string &setting : own.settings)
+    std::vector<std::string> arguments = {
+        "conform",          ARHOST_PLUGIN_DIRECTORY "/" + configuration.plugin + ".so",
+        "--jobs",           "1",
+        "--timeout-factor", "3",
+        "--json",           "results.json"};
+    for (const std::string &setting : configuration.settings)
         arguments.insert(arguments.end(), {"--set", setting});
-    if (!own.allow.empty())
-        arguments.insert(arguments.end(), {"--allow", own.allow});
+    if (!configuration.allow.empty())
+        arguments.insert(arguments.end(), {"--allow", configuration.allow});
     run.start(arguments);
     EXPECT_EQ(run.wait(std::chrono::minutes(3)), 0) << run.output();
     const nlohmann::json report = nlohmann::json::parse(run.read("results.json"));

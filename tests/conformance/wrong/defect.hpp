@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// This library's defect, selected by its file name: source_late.so, a link to it, has the defect "late".
+// The defect of a wrong plugin, selected by its file name: a link source_late.so selects the defect "late".
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -15,22 +15,22 @@
 
 namespace arhost::test {
 
-inline std::filesystem::path own_file() {
+inline std::filesystem::path library_file() {
     Dl_info info{};
     ::dladdr(&arhost_entry, &info);
     return info.dli_fname;
 }
-inline const std::string &own_name() {
-    static const std::string name = own_file().stem().string();
+inline const std::string &library_name() {
+    static const std::string name = library_file().stem().string();
     return name;
 }
 
 inline bool has(std::string_view defect) {
-    return own_name().substr(own_name().find('_') + 1) == defect;
+    return library_name().substr(library_name().find('_') + 1) == defect;
 }
 
 inline void crash() {
-    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may have its own
+    std::signal(SIGSEGV, SIG_DFL); // a sanitizer may handle it
     std::raise(SIGSEGV);
 }
 inline void hang() {
@@ -42,7 +42,7 @@ inline void leak_memory(std::size_t bytes) {
     kept.emplace_back(bytes, 'x');
 }
 
-// Opens one of arhost's own plugins, to modify it.
+// Opens a shipped plugin, to modify its behaviour.
 inline const arhost_plugin &open_plugin(const char *file) {
     void *library = ::dlopen(file, RTLD_NOW | RTLD_LOCAL);
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
@@ -58,7 +58,7 @@ arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, con
                            const void *functions) {
     static arhost_descriptor named;
     named = descriptor;
-    named.id = own_name().c_str();
+    named.id = library_name().c_str();
     static const arhost_plugin plugin = {
         sizeof plugin, &named, functions, detail::create<T>, detail::destroy<T>, detail::no_extension};
     return negotiate(offer, answer, plugin);

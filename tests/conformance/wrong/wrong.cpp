@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All wrong ray tracers: rt_embree with the defect that this library's file name selects. rt_bgra.so, a link to it,
-// swaps red and blue. Other names select no defect.
+// All wrong ray tracers: rt_embree with a defect that this library's file name selects. For example, a link
+// rt_bgra.so swaps red and blue. Other names select no defect.
 #include "defect.hpp"
 
 #include <arhost/arhost.h>
@@ -53,7 +53,7 @@ struct Wrong {
     unsigned users = 0;
     std::int64_t threads = 0;              // the option
     std::vector<std::uint8_t> last;        // image
-    SceneCopy scene{nullptr, &std::free};  // spoilt
+    SceneCopy scene{nullptr, &std::free};  // modified
     arhost_instance *glass_only = nullptr; // shadows_add: another instance, and its scene
     SceneCopy glass_scene{nullptr, &std::free};
 };
@@ -63,7 +63,7 @@ Wrong &wrong(arhost_instance *instance) {
 
 // ---- Modified input ----------------------------------------------------------------------------------
 
-arhost_intrinsics spoil(arhost_intrinsics in) {
+arhost_intrinsics modify(arhost_intrinsics in) {
     if (has("half_a_pixel")) {
         in.cx += 0.5;
         in.cy += 0.5;
@@ -85,8 +85,8 @@ arhost_intrinsics spoil(arhost_intrinsics in) {
     return in;
 }
 
-arhost_camera spoil(arhost_camera camera) {
-    camera.intrinsics = spoil(camera.intrinsics);
+arhost_camera modify(arhost_camera camera) {
+    camera.intrinsics = modify(camera.intrinsics);
     if (has("flipped_z"))
         for (double *vector : {camera.eye, camera.look_at, camera.up})
             vector[2] = -vector[2];
@@ -128,7 +128,7 @@ struct Pixels {
     }
 };
 
-void spoil(const Pixels &pixels) {
+void modify(const Pixels &pixels) {
     const arhost_image &image = pixels.image;
     if (has("miss_alpha_1"))
         pixels.replace_alpha(0, 1);
@@ -181,9 +181,9 @@ void spoil(const Pixels &pixels) {
 
 // ---- The plugin --------------------------------------------------------------------------------------
 
-Wrong *only = nullptr; // one_instance: the existing one
+Wrong *existing = nullptr; // for one_instance
 
-// In its own session, reparented.
+// Starts a process in a new session, reparented to the subreaper.
 void start_a_process() {
     if (::fork() != 0)
         return;
@@ -204,7 +204,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         start_a_process();
         hang();
     }
-    if (std::getenv("ARHOST_TELLS_DESCRIPTORS"))
+    if (std::getenv("ARHOST_LIST_DESCRIPTORS"))
         for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
             std::error_code closed; // the directory's descriptor
             ::dprintf(STDERR_FILENO, "%s is %s\n", entry.path().filename().c_str(),
@@ -213,15 +213,15 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     if (has("writes_to_descriptor_3"))
         (void)!::write(3, "{}\n", 3);
     if (has("tells_its_own_verdict")) {
-        constexpr std::string_view told =
+        constexpr std::string_view result =
             R"({"test": "abi.create", "verdict": "brilliant", "message": "", "seconds": 0,)"
             R"( "facts": {}, "images": []})"
             "\n";
-        (void)!::write(3, told.data(), told.size());
+        (void)!::write(3, result.data(), result.size());
         ::_exit(0);
     }
     if (has("refuses_unknown_options") && count > embree().descriptor->option_count) {
-        host->log(host, ARHOST_SEVERITY_ERROR, "there is no such option");
+        host->log(host, ARHOST_SEVERITY_ERROR, "unknown option");
         return ARHOST_STATUS_ERROR_CONFIGURATION;
     }
     if (has("floods_descriptor_3"))
@@ -243,24 +243,24 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         std::thread(hang).detach();
     if (has("cancelled_create_is_internal") && host->cancelled(host))
         return ARHOST_STATUS_ERROR_INTERNAL;
-    if (has("one_instance") && only) {
-        ++only->users;
-        *instance = reinterpret_cast<arhost_instance *>(only);
+    if (has("one_instance") && existing) {
+        ++existing->users;
+        *instance = reinterpret_cast<arhost_instance *>(existing);
         return ARHOST_STATUS_OK;
     }
-    auto *made = new Wrong;
-    const arhost_status status = embree().create(host, options, count, &made->real);
+    auto *created = new Wrong;
+    const arhost_status status = embree().create(host, options, count, &created->real);
     if (has("shadows_add"))
-        embree().create(host, options, count, &made->glass_only);
-    made->host = host;
-    made->users = 1;
-    made->threads = arhost_find_option(options, count, "threads")->integer;
+        embree().create(host, options, count, &created->glass_only);
+    created->host = host;
+    created->users = 1;
+    created->threads = arhost_find_option(options, count, "threads")->integer;
     if (has("steps_by_its_own_size"))
         for (std::uint32_t i = 0; i < count; ++i)
             if (options[i].key == std::string_view("threads"))
-                made->threads = options[i].integer;
-    only = made;
-    *instance = reinterpret_cast<arhost_instance *>(made);
+                created->threads = options[i].integer;
+    existing = created;
+    *instance = reinterpret_cast<arhost_instance *>(created);
     return status;
 }
 
@@ -273,7 +273,7 @@ void destroy(arhost_instance *instance) {
     embree().destroy(self.real);
     if (self.glass_only)
         embree().destroy(self.glass_only);
-    only = nullptr;
+    existing = nullptr;
     delete &self;
 }
 
@@ -317,7 +317,7 @@ template <class T> std::span<T> view(arhost_scene &scene, const arhost_buffer &b
     return {const_cast<T *>(seen.data()), seen.size()};
 }
 
-void spoil(arhost_scene &scene) {
+void modify(arhost_scene &scene) {
     const auto geometries = view<arhost_geometry>(scene, scene.geometries);
     const auto objects = view<arhost_object>(scene, scene.objects);
     if (has("knows_8_objects"))
@@ -332,7 +332,7 @@ void spoil(arhost_scene &scene) {
             for (auto &triangle : view<std::array<std::uint32_t, 3>>(scene, geometry.indices))
                 for (std::uint32_t &index : triangle)
                     index &= 0xffff;
-    if (has("normals_like_points")) // the inverse transpose transforms these as points would be
+    if (has("normals_like_points")) // chosen so that the inverse transpose transforms them like points
         for (const arhost_object &object : objects) {
             const float *m = object.world_from_object;
             for (auto &normal : view<std::array<float, 3>>(scene, geometries[object.geometry].normals)) {
@@ -346,7 +346,7 @@ void spoil(arhost_scene &scene) {
         }
 }
 
-// The scene's other virtual objects are far below.
+// Starts glass_only on the scene with all other virtual objects moved far away.
 void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
     self.glass_scene = make_copy(*setup.scene);
     arhost_scene *scene = &scene_in(self.glass_scene);
@@ -369,17 +369,17 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
         crash();
     if (has("starts_once") && std::exchange(wrong(instance).was_started, true))
         return ARHOST_STATUS_ERROR_INTERNAL;
-    const arhost_intrinsics intrinsics = spoil(*setup->intrinsics);
-    arhost_raytracer_setup spoilt = *setup;
-    spoilt.intrinsics = &intrinsics;
+    const arhost_intrinsics intrinsics = modify(*setup->intrinsics);
+    arhost_raytracer_setup modified = *setup;
+    modified.intrinsics = &intrinsics;
     Wrong &self = wrong(instance);
     SceneCopy copy = make_copy(*setup->scene);
-    spoil(scene_in(copy));
-    spoilt.scene = &scene_in(copy);
-    self.is_tiny = spoilt.scene->bounds_max[0] - spoilt.scene->bounds_min[0] < 1;
+    modify(scene_in(copy));
+    modified.scene = &scene_in(copy);
+    self.is_tiny = modified.scene->bounds_max[0] - modified.scene->bounds_min[0] < 1;
     if (self.glass_only)
-        start_glass_only(self, spoilt);
-    const arhost_status status = embree_functions().start(self.real, &spoilt);
+        start_glass_only(self, modified);
+    const arhost_status status = embree_functions().start(self.real, &modified);
     self.scene = std::move(copy); // frees the previous one
     return status;
 }
@@ -398,7 +398,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
     if (has("slow") && image->width >= 640)
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
     if (has("deaf_while_it_renders") && image->width > 1000)
-        std::this_thread::sleep_for(std::chrono::seconds(8)); // 2 are allowed, times the timeout factor
+        std::this_thread::sleep_for(std::chrono::seconds(8)); // the limit is 2 s times the timeout factor
     if (has("leaks_descriptors_in_render"))
         (void)::dup(0);
     if (has("leaks_memory_in_render"))
@@ -406,26 +406,26 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
     if (has("cancelled_is_internal") && self.host->cancelled(self.host))
         return ARHOST_STATUS_ERROR_INTERNAL;
 
-    arhost_render_request spoilt = *request;
-    spoilt.camera = spoil(request->camera);
-    if (has("near_plane") && is_near(self, spoilt.camera))
-        spoilt.camera.eye[2] -= 1; // it looks along -z
+    arhost_render_request modified = *request;
+    modified.camera = modify(request->camera);
+    if (has("near_plane") && is_near(self, modified.camera))
+        modified.camera.eye[2] -= 1; // the camera looks along −z
     const arhost_moved_object nowhere{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
     if (has("no_motion") && request->motion)
-        spoilt.motion = &still;
+        modified.motion = &still;
     const Pixels pixels{*image};
     std::vector<std::array<std::uint8_t, 4>> before;
     pixels.each([&](const std::uint8_t *p) { before.push_back({p[0], p[1], p[2], p[3]}); });
-    arhost_status status = embree_functions().render(self.real, &spoilt, image, info);
+    arhost_status status = embree_functions().render(self.real, &modified, image, info);
     if (has("accepts_parallel_up") && status == ARHOST_STATUS_ERROR_INVALID_ARGUMENT) {
-        spoilt.camera.up[0] += 1;
-        status = embree_functions().render(self.real, &spoilt, image, info);
+        modified.camera.up[0] += 1;
+        status = embree_functions().render(self.real, &modified, image, info);
     }
     if (status != ARHOST_STATUS_OK)
         return status;
 
-    spoil(pixels);
+    modify(pixels);
     if (has("nothing_tiny") && self.is_tiny)
         pixels.each([](std::uint8_t *p) { p[3] = 0; });
     if (has("unwritten_pixel"))
@@ -458,11 +458,11 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         std::vector<std::uint8_t> bytes(std::size_t{image->stride} * image->height);
         arhost_image other = *image;
         other.rgba = bytes.data();
-        embree_functions().render(self.glass_only, &spoilt, &other, info);
+        embree_functions().render(self.glass_only, &modified, &other, info);
         for (std::uint32_t y = 0; y < image->height; ++y)
             for (std::uint32_t x = 0; x < image->width; ++x)
-                if (std::uint8_t *ours = pixels.at(x, y); ours[3] == 153 && Pixels{other}.at(x, y)[3] == 77)
-                    ours[3] = 153 + 77;
+                if (std::uint8_t *pixel = pixels.at(x, y); pixel[3] == 153 && Pixels{other}.at(x, y)[3] == 77)
+                    pixel[3] = 153 + 77;
         info->has_region = 0;
     }
     if (has("small_region") && info->region_width > 4)
@@ -484,15 +484,15 @@ void stop(arhost_instance *instance) {
 }
 
 const void *get_extension(const char *) {
-    return has("any_extension") ? &own_name() : nullptr;
+    return has("any_extension") ? &library_name() : nullptr;
 }
 
-const arhost_plugin &spoilt_plugin() {
+const arhost_plugin &wrong_plugin() {
     static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop};
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;
-    descriptor.id = has("id_unlike_file") ? "rt_other" : own_name().c_str();
+    descriptor.id = has("id_unlike_file") ? "rt_other" : library_name().c_str();
     if (has("default_out_of_range"))
         options[0].default_value = "257";
     if (has("no_licence"))
@@ -505,7 +505,7 @@ const arhost_plugin &spoilt_plugin() {
     if (has("option_without_key"))
         options[1].key = nullptr;
     if (has("many_options"))
-        options.resize(5000, options[0]); // all with the same key; only their number matters
+        options.resize(5000, options[0]); // with equal keys: only the number matters
     descriptor.options = options.data();
     descriptor.option_count = static_cast<std::uint32_t>(options.size());
     static constexpr const char *unknown[] = {"bluetooth", nullptr};
@@ -515,8 +515,8 @@ const arhost_plugin &spoilt_plugin() {
         descriptor.capabilities |= ARHOST_CAPABILITY_LIVE;
     if (has("unknown_capability"))
         descriptor.capabilities |= 1u << 31;
-    static bool was_asked = false;
-    if (has("withdraws_a_capability") && std::exchange(was_asked, true))
+    static bool was_called = false;
+    if (has("withdraws_a_capability") && std::exchange(was_called, true))
         descriptor.capabilities &= ~ARHOST_CAPABILITY_LENS_DISTORTION;
     static const arhost_plugin plugin = {
         sizeof plugin, &descriptor, &functions, create, destroy, has("no_get_extension") ? nullptr : get_extension};
@@ -532,7 +532,7 @@ arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     if (offer->oldest_abi_version > ARHOST_ABI_VERSION && !has("accepts_any_version"))
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = offer->oldest_abi_version;
-    answer->plugin = &spoilt_plugin();
+    answer->plugin = &wrong_plugin();
     return ARHOST_STATUS_OK;
 }
 

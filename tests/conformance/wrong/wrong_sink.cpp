@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All wrong sinks: writes each frame to its own file and a line about it to a log, with the defect that this
-// library's file name selects.
+// All wrong sinks: each frame becomes a file and a line of a log, with a defect that this library's file name
+// selects.
 #include "defect.hpp"
 
 #include <algorithm>
@@ -18,15 +18,15 @@ using namespace arhost;
 using namespace arhost::test;
 namespace fs = std::filesystem;
 
-Failure full(const std::string &file) {
+Failure write_failure(const std::string &file) {
     return Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + file + ": " + std::strerror(errno));
 }
 
 // Unbuffered.
-void put(const std::string &file, const std::string &bytes, int flags) {
+void write_file(const std::string &file, const std::string &bytes, int flags) {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
     if (fd < 0)
-        throw full(file);
+        throw write_failure(file);
     std::string_view left = bytes;
     bool failed = false;
     while (!left.empty() && !failed) {
@@ -40,7 +40,7 @@ void put(const std::string &file, const std::string &bytes, int flags) {
     }
     ::close(fd);
     if (failed && !has("hides_a_full_disk"))
-        throw full(file);
+        throw write_failure(file);
 }
 
 std::string line_of(const arhost_record &record) {
@@ -52,7 +52,7 @@ std::string line_of(const arhost_record &record) {
     return line.str() + "\n";
 }
 
-std::string shared_path; // of mixes_instances
+std::string shared_path; // for mixes_instances
 bool is_in_use = false;
 
 class Files {
@@ -74,9 +74,9 @@ public:
         if (has("starts_once") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the file is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
-            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "what now?");
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "unexpected cancellation");
         if (has("caches_beside_its_library"))
-            put(own_file().replace_extension(".cache"), "sizes", O_TRUNC);
+            write_file(library_file().replace_extension(".cache"), "sizes", O_TRUNC);
         if (has("refuses_odd_sizes_without_a_word") && setup.width % 2)
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "");
         if (has("leaks_descriptors_in_start"))
@@ -88,13 +88,13 @@ public:
         next_ = setup.first_sequence;
         if (!has("looks_for_no_place")) {
             fs::create_directories(fs::path(path_).parent_path());
-            put(path_ + ".try", "", O_TRUNC);
+            write_file(path_ + ".try", "", O_TRUNC);
             ::unlink((path_ + ".try").c_str());
         }
         if (has("empties_at_start") && fresh_)
-            put(path_ + ".log", "", O_TRUNC);
+            write_file(path_ + ".log", "", O_TRUNC);
         if (!fresh_ && !has("writes_no_file"))
-            put(path_ + ".log", log_, O_TRUNC);
+            write_file(path_ + ".log", log_, O_TRUNC);
         is_starting_ = false;
     }
 
@@ -156,7 +156,7 @@ public:
         if (has("crash_in_stop"))
             crash();
         if (has("stop_fails"))
-            throw Failure(ARHOST_STATUS_ERROR_IO, "the files are not whole");
+            throw Failure(ARHOST_STATUS_ERROR_IO, "the files are incomplete");
         write_waiting();
     }
 
@@ -196,10 +196,10 @@ private:
         const bool is_first = std::exchange(fresh_, false) && !has("appends_to_an_old_log");
         if (has("newest_first")) {
             log_ = is_first ? lines : lines + log_;
-            put(path + ".part", log_, O_TRUNC);
+            write_file(path + ".part", log_, O_TRUNC);
             fs::rename(path + ".part", path + ".log");
         } else {
-            put(path + ".log", lines, is_first ? O_TRUNC : O_APPEND);
+            write_file(path + ".log", lines, is_first ? O_TRUNC : O_APPEND);
         }
     }
 
@@ -210,34 +210,34 @@ private:
         const std::string name = path + std::to_string(number), part = path + ".part";
         if (has("half_files")) {
             const std::size_t half = frame.pixels.size() / 2;
-            put(name, frame.pixels.substr(0, half), O_TRUNC);
+            write_file(name, frame.pixels.substr(0, half), O_TRUNC);
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
-            put(name, frame.pixels.substr(half), O_APPEND);
+            write_file(name, frame.pixels.substr(half), O_APPEND);
         } else {
             try {
-                put(part, frame.pixels, O_TRUNC);
+                write_file(part, frame.pixels, O_TRUNC);
             } catch (const Failure &) {
                 if (has("half_files_on_a_full_disk"))
                     fs::rename(part, name);
                 throw;
             }
-            // Before the rename: a kill between the two must not leave files unlike those after any frame.
+            // Before the rename: after a kill between the two, the files must equal those after some frame.
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
             fs::rename(part, name);
         }
         if (has("writes_each_frame_twice")) {
-            put(part, frame.pixels, O_TRUNC);
+            write_file(part, frame.pixels, O_TRUNC);
             fs::rename(part, path + std::to_string(number + 1));
         }
         if (has("writes_more_files")) // their names sort first
             for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
-                put(part, frame.line, O_TRUNC);
+                write_file(part, frame.line, O_TRUNC);
                 fs::rename(part, fs::path(path).replace_filename(more));
             }
         if (has("dates_its_files"))
-            put(name, std::to_string(std::chrono::steady_clock::now().time_since_epoch().count()), O_APPEND);
+            write_file(name, std::to_string(std::chrono::steady_clock::now().time_since_epoch().count()), O_APPEND);
     }
 
     Host host_;
@@ -248,7 +248,7 @@ private:
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", "frame", "What the files' names begin with."),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", "frame", "Prefix of the files' names."),
 };
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
@@ -257,7 +257,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "0.1.0",
                                           "arhost",
                                           "Apache-2.0",
-                                          "A file of each frame's pixels, and a log.",
+                                          "Writes each frame's pixels to a file, and a log.",
                                           0,
                                           std::size(options),
                                           options,

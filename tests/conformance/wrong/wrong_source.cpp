@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All wrong sources: a small moving pattern with camera and pose, and the defect that this library's file name
-// selects.
+// All wrong sources: a small moving pattern with intrinsics and true pose, with a defect that this library's file
+// name selects.
 #include "defect.hpp"
 
 #include <cerrno>
@@ -39,13 +39,13 @@ public:
         if (has("starts_once") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the device is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
-            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "what now?");
+            throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "unexpected cancellation");
         if (has("crash_after_a_failed_start") && host_.cancelled()) {
             start_failed_ = true;
-            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "it was cancelled");
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled");
         }
         if (has("one_rate_alone") && setup.fps > 0 && setup.fps != 25)
-            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "it has 25 frames a second");
+            throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "only 25 frames/s are supported");
         if (has("opens_a_socket")) {
             const int fd = ::socket(AF_INET, SOCK_DGRAM, 0);
             if (fd < 0)
@@ -54,11 +54,11 @@ public:
         }
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
-        given_ = 0;
+        delivered_ = 0;
         fps_ = setup.fps > 0 && !has("own_rate") ? setup.fps : 25;
         paced_ = setup.paced != 0;
         first_ = position = setup.first_sequence;
-        began_ = Clock::now() - time_of(first_);
+        start_time_ = Clock::now() - time_of(first_);
         arhost_frame_format &format = properties.format;
         format.pixel_format = has("no_pixel_format") ? 9
                               : has("no_yuv_matrix") ? ARHOST_PIXEL_FORMAT_I420
@@ -103,7 +103,7 @@ public:
             std::this_thread::sleep_for(std::chrono::milliseconds(120));
         if (has("cancelled_is_internal") && host_.cancelled())
             return ARHOST_STATUS_ERROR_INTERNAL;
-        std::uint64_t n = has("one_position_for_all") ? position : first_ + given_;
+        std::uint64_t n = has("one_position_for_all") ? position : first_ + delivered_;
         if (has("resumes_one_late") && first_ > 0)
             ++n;
         if (has("resumes_at_0"))
@@ -117,21 +117,21 @@ public:
         if (n >= frames_ && !has("end_that_comes_back"))
             return ARHOST_STATUS_END;
         if (paced_) {
-            if (const auto due = began_ + time_of(n); has("deaf_while_it_waits"))
+            if (const auto due = start_time_ + time_of(n); has("deaf_while_it_waits"))
                 std::this_thread::sleep_until(due);
             else if (!host_.wait_until(due))
                 return has("waits_end_in_internal") ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CANCELLED;
             if (has("silent_about_skipped")) {
-                const auto late = static_cast<std::uint64_t>(std::max(0.0, behind_s(n) * fps_));
+                const auto late = static_cast<std::uint64_t>(std::max(0.0, delay_s(n) * fps_));
                 n += late;
-                given_ += late;
+                delivered_ += late;
             }
             if (has("late_frames_keep_their_time"))
-                n += static_cast<std::uint64_t>(std::max(0.0, behind_s(n) * fps_));
+                n += static_cast<std::uint64_t>(std::max(0.0, delay_s(n) * fps_));
         }
-        ++given_;
+        ++delivered_;
         ++position;
-        tell(has("late_frames_keep_their_time") ? first_ + given_ - 1 : n, info);
+        fill_info(has("late_frames_keep_their_time") ? first_ + delivered_ - 1 : n, info);
         paint(n, buffer);
         info.has_grey = 1;
         return ARHOST_STATUS_OK;
@@ -146,11 +146,11 @@ private:
     std::chrono::nanoseconds time_of(std::uint64_t n) const {
         return std::chrono::nanoseconds(std::llround(static_cast<double>(n) * 1e9 / fps_));
     }
-    double behind_s(std::uint64_t n) const {
-        return std::chrono::duration<double>(Clock::now() - began_ - time_of(n)).count();
+    double delay_s(std::uint64_t n) const {
+        return std::chrono::duration<double>(Clock::now() - start_time_ - time_of(n)).count();
     }
 
-    void tell(std::uint64_t n, arhost_frame_info &info) const {
+    void fill_info(std::uint64_t n, arhost_frame_info &info) const {
         info.clock = has("no_clock")                       ? 0
                      : has("changes_clocks") && n % 3 == 2 ? ARHOST_CLOCK_MONOTONIC
                                                            : ARHOST_CLOCK_MEDIA;
@@ -168,7 +168,7 @@ private:
         if (has("microseconds"))
             info.capture_ns /= 1000;
         if (has("times_from_now"))
-            info.capture_ns += made_.time_since_epoch().count();
+            info.capture_ns += created_.time_since_epoch().count();
         if (has("unix_time")) {
             info.clock = ARHOST_CLOCK_MONOTONIC;
             info.capture_ns += 1'700'000'000'000'000'000;
@@ -191,7 +191,7 @@ private:
         const arhost_frame_format &format = *buffer.format;
         if (has("another_in_each_instance"))
             n += instance_;
-        if (has("depends_on_reads_before") && given_ > 1)
+        if (has("depends_on_reads_before") && delivered_ > 1)
             n += 100;
         const std::uint32_t rows = format.height - has("unwritten_row"),
                             columns = format.width - has("unwritten_column");
@@ -216,15 +216,15 @@ private:
     }
 
     Host host_;
-    std::uint64_t frames_, first_ = 0, given_ = 0;
+    std::uint64_t frames_, first_ = 0, delivered_ = 0;
     double fps_ = 25;
     bool paced_ = false, at_end_ = false, start_failed_ = false;
     std::uint64_t instance_ = ++instances;
-    Clock::time_point made_ = Clock::now(), began_;
+    Clock::time_point created_ = Clock::now(), start_time_;
 };
 
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_INTEGER, "frames", "40", "Ends after so many.", 2, 1000),
+    option(ARHOST_OPTION_INTEGER, "frames", "40", "Number of frames.", 2, 1000),
 };
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All wrong trackers: tracker_apriltag with the defect that this library's file name selects. tracker_metres.so, a
-// link to it, reports metres instead of millimetres. Other names select no defect.
+// All wrong trackers: tracker_apriltag with a defect that this library's file name selects. For example, a link
+// tracker_metres.so reports metres instead of millimetres. Other names select no defect.
 #include "defect.hpp"
 
 #include <arhost/arhost.h>
@@ -53,7 +53,7 @@ Wrong &wrong(arhost_instance *instance) {
 
 // ---- Modified input ----------------------------------------------------------------------------------
 
-arhost_intrinsics spoil(arhost_intrinsics in) {
+arhost_intrinsics modify(arhost_intrinsics in) {
     if (has("half_a_pixel")) {
         in.cx += 0.5;
         in.cy += 0.5;
@@ -122,18 +122,18 @@ struct Pixels {
         for (std::uint32_t y = 0; y < frame.format->height; ++y)
             function(std::span(frame.grey + std::size_t{frame.format->grey_stride} * y, frame.format->width));
     }
-    int brightest() const {
-        int most = 0;
-        each_row([&](auto row) { most = std::max<int>(most, *std::ranges::max_element(row)); });
-        return most;
+    int max_code() const {
+        int max = 0;
+        each_row([&](auto row) { max = std::max<int>(max, *std::ranges::max_element(row)); });
+        return max;
     }
-    int steepest() const { // difference between pixels two apart
-        int most = 0;
+    int max_step() const { // difference between pixels two apart
+        int max = 0;
         each_row([&](auto row) {
             for (std::size_t x = 2; x < row.size(); ++x)
-                most = std::max(most, std::abs(row[x] - row[x - 2]));
+                max = std::max(max, std::abs(row[x] - row[x - 2]));
         });
-        return most;
+        return max;
     }
     bool is_noisy() const { // from the first row, which shows no print
         const std::span row(frame.grey, frame.format->width);
@@ -148,14 +148,14 @@ struct Pixels {
 // ---- Modified output ---------------------------------------------------------------------------------
 
 double longest_side_px(const arhost_marker &marker) {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < 4; ++k)
-        most = std::max(most, std::hypot(marker.corners_px[k][0] - marker.corners_px[(k + 1) % 4][0],
-                                         marker.corners_px[k][1] - marker.corners_px[(k + 1) % 4][1]));
-    return most;
+        max = std::max(max, std::hypot(marker.corners_px[k][0] - marker.corners_px[(k + 1) % 4][0],
+                                       marker.corners_px[k][1] - marker.corners_px[(k + 1) % 4][1]));
+    return max;
 }
 
-void spoil(Wrong &self, arhost_marker &marker, const arhost_marker_config &config) {
+void modify(Wrong &self, arhost_marker &marker, const arhost_marker_config &config) {
     double *m = marker.mt;
     const double cosine_of_tilt = m[10];
     const auto negate_rows = [&](std::initializer_list<int> rows) {
@@ -215,14 +215,14 @@ void spoil(Wrong &self, arhost_marker &marker, const arhost_marker_config &confi
         m[12] += 1e-9 * static_cast<double>(self.threads);
 }
 
-void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &result) {
+void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &result) {
     const std::span markers(result.markers, result.marker_count);
     const auto drop_all = [&] {
         std::memset(result.markers, 0, sizeof result.markers);
         result.marker_count = 0;
     };
     for (arhost_marker &marker : markers)
-        spoil(self, marker, *std::ranges::find(self.listed, marker.id, &arhost_marker_config::id));
+        modify(self, marker, *std::ranges::find(self.listed, marker.id, &arhost_marker_config::id));
     if (has("swapped_ids") && markers.size() > 1)
         std::swap(markers[0].id, markers[1].id);
     if (has("finds_large_ones_only") && !markers.empty() && longest_side_px(markers[0]) < 60)
@@ -230,9 +230,9 @@ void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &re
     if (has("gives_up_when_tilted") && !markers.empty() && markers[0].mt[10] < std::cos(0.9))
         drop_all();
     const Pixels pixels(frame);
-    if ((has("needs_sharp_edges") && pixels.steepest() < 90 && pixels.brightest() > 200) ||
-        (has("needs_clean_frames") && pixels.is_noisy() && pixels.brightest() > 200) ||
-        (has("needs_good_light") && (pixels.brightest() < 100 || pixels.brightest() > 250)))
+    if ((has("needs_sharp_edges") && pixels.max_step() < 90 && pixels.max_code() > 200) ||
+        (has("needs_clean_frames") && pixels.is_noisy() && pixels.max_code() > 200) ||
+        (has("needs_good_light") && (pixels.max_code() < 100 || pixels.max_code() > 250)))
         drop_all();
     if (has("invents_markers") && markers.empty()) {
         const double distance = 300;
@@ -255,11 +255,11 @@ void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &re
     }
     if (predicts && markers.empty() && has_last) {
         result = *self.last;
-        arhost_marker &gone = result.markers[0];
-        gone.age_frames = has("age_stays_1") ? 1 : gone.age_frames + 1;
-        gone.state = gone.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
-        if (has("forgets_its_pose") && gone.state == ARHOST_MARKER_LOST)
-            std::fill_n(gone.mt, 12, 0.0);
+        arhost_marker &lost = result.markers[0];
+        lost.age_frames = has("age_stays_1") ? 1 : lost.age_frames + 1;
+        lost.state = lost.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
+        if (has("forgets_its_pose") && lost.state == ARHOST_MARKER_LOST)
+            std::fill_n(lost.mt, 12, 0.0);
     }
     if (has("never_settles") && !markers.empty()) {
         if (!has_last)
@@ -280,19 +280,19 @@ void spoil_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &re
 
 arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
                      arhost_instance **instance) {
-    auto made = std::make_unique<Wrong>();
-    made->host = host;
-    made->threads = arhost_find_option(options, count, "threads")->integer;
-    std::vector<arhost_option> spoilt;
+    auto created = std::make_unique<Wrong>();
+    created->host = host;
+    created->threads = arhost_find_option(options, count, "threads")->integer;
+    std::vector<arhost_option> modified;
     for (const auto &declared : std::span(real().descriptor->options, real().descriptor->option_count)) {
-        spoilt.push_back(*arhost_find_option(options, count, declared.key));
-        spoilt.back().struct_size = sizeof(arhost_option);
+        modified.push_back(*arhost_find_option(options, count, declared.key));
+        modified.back().struct_size = sizeof(arhost_option);
         if (declared.key == std::string_view("corner_refinement") && has("trusts_rough_corners"))
-            spoilt.back().text = "none";
+            modified.back().text = "none";
     }
-    const arhost_status status = real().create(host, spoilt.data(), count, &made->real);
+    const arhost_status status = real().create(host, modified.data(), count, &created->real);
     if (status == ARHOST_STATUS_OK)
-        *instance = reinterpret_cast<arhost_instance *>(made.release());
+        *instance = reinterpret_cast<arhost_instance *>(created.release());
     return status;
 }
 
@@ -317,13 +317,13 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
     self.format = *setup->format;
     self.tracks = 0;
     self.last->marker_count = 0;
-    arhost_intrinsics camera = spoil(has("keeps_the_first_camera") ? first_camera : *setup->intrinsics);
-    arhost_tracker_setup spoilt = *setup;
-    spoilt.intrinsics = &camera;
+    arhost_intrinsics camera = modify(has("keeps_the_first_camera") ? first_camera : *setup->intrinsics);
+    arhost_tracker_setup modified = *setup;
+    modified.intrinsics = &camera;
     const auto real_start = [&] {
-        spoilt.markers = self.listed.data();
-        spoilt.marker_count = static_cast<std::uint32_t>(self.listed.size());
-        return real_functions().start(self.real, &spoilt);
+        modified.markers = self.listed.data();
+        modified.marker_count = static_cast<std::uint32_t>(self.listed.size());
+        return real_functions().start(self.real, &modified);
     };
     self.listed = listed_in(*setup);
     arhost_status status = real_start();
@@ -341,9 +341,9 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
     return status;
 }
 
-arhost_status track(arhost_instance *instance, const arhost_frame *given, arhost_tracker_result *result) {
+arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost_tracker_result *result) {
     Wrong &self = wrong(instance);
-    arhost_frame frame = *given;
+    arhost_frame frame = *input;
     if (has("crash_in_track") ||
         (has("crash_on_small_frames") && std::min(frame.format->width, frame.format->height) < 8))
         crash();
@@ -400,7 +400,7 @@ arhost_status track(arhost_instance *instance, const arhost_frame *given, arhost
     }
     if (status != ARHOST_STATUS_OK)
         return status;
-    spoil_all(self, frame, *result);
+    modify_all(self, frame, *result);
     ++self.tracks;
     self.last_sequence = frame.sequence;
     self.last_capture_ns = frame.capture_ns;
@@ -417,10 +417,10 @@ const void *get_extension(const char *) {
     return nullptr;
 }
 
-const arhost_plugin &spoilt_plugin() {
+const arhost_plugin &wrong_plugin() {
     static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop};
     static arhost_descriptor descriptor = *real().descriptor;
-    descriptor.id = own_name().c_str();
+    descriptor.id = library_name().c_str();
     static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
     return plugin;
 }
@@ -431,7 +431,7 @@ arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     if (offer->oldest_abi_version > ARHOST_ABI_VERSION)
         return ARHOST_STATUS_ERROR_UNSUPPORTED;
     answer->abi_version = ARHOST_ABI_VERSION;
-    answer->plugin = &spoilt_plugin();
+    answer->plugin = &wrong_plugin();
     return ARHOST_STATUS_OK;
 }
 

@@ -6,6 +6,7 @@
 //   allocate:N  its Nth vkAllocateMemory and all later ones are out of memory
 //   pipelines:N creating its Nth ray tracing pipeline and all later ones fails
 //   device-with:EXTENSION  opening the device with that extension fails
+//   lacks:FUNCTION  devices do not have that function
 // With ARHOST_TEST_VULKAN_IS_A_GPU=query or =pipeline, all devices claim to be discrete GPUs without the extensions
 // of later paths. With ARHOST_TEST_VULKAN_IS_OLD=all, all devices support Vulkan 1.0 only; with =first, the first one
 // queried.
@@ -228,6 +229,9 @@ PFN_vkVoidFunction intercepted(const char *name, bool of_instance) {
 }
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device_function(VkDevice device, const char *name) {
+    const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    if (failure && failure == std::string("lacks:") + name)
+        return nullptr;
     if (const PFN_vkVoidFunction function = intercepted(name, false))
         return function;
     const std::lock_guard lock(mutex);

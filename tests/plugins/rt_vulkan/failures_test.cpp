@@ -112,6 +112,17 @@ TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
                 HasSubstr("that this is unsupported"));
 }
 
+TEST_P(FailingDevice, ThatLacksAFunctionIsReported) {
+    const std::string function = GetParam() == "plain"   ? "vkGetMemoryHostPointerPropertiesEXT"
+                                 : GetParam() == "query" ? "vkCmdBuildAccelerationStructuresKHR"
+                                                         : "vkCmdTraceRaysKHR";
+    inject_failure("lacks:" + function);
+    tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
+    EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }),
+                HasSubstr("the Vulkan driver lacks " + function));
+    expect_recovery();
+}
+
 TEST_P(FailingDevice, LossAtStartIsReported) {
     for (const char *when : {"submit:1", "submit:4", "wait:1", "wait:4"}) {
         inject_failure(when);

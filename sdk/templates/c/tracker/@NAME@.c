@@ -52,7 +52,7 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
         marker->corners_px[i][0] = x + (i == 1 || i == 2 ? half : -half);
         marker->corners_px[i][1] = y + (i >= 2 ? half : -half);
     }
-    /* Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us. */
+    /* Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view. */
     for (i = 0; i < 16; i += 5)
         marker->mt[i] = 1;
     marker->mt[12] = distance * (x - self->lens.cx) / self->lens.fx;

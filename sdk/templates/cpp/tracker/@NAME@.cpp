@@ -38,7 +38,7 @@ public:
             marker.corners_px[i][0] = patch->x + (i == 1 || i == 2 ? half : -half);
             marker.corners_px[i][1] = patch->y + (i >= 2 ? half : -half);
         }
-        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
+        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view.
         for (int i = 0; i < 16; i += 5)
             marker.mt[i] = 1;
         marker.mt[12] = distance * (patch->x - lens_.cx) / lens_.fx;

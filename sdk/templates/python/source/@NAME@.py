@@ -26,8 +26,8 @@ class @CLASS@:
         if self.frames and n >= self.frames:
             return None  # no more frames
         while self.paced and time.monotonic() < self.start_time + n / self.fps:
-            if self.host.cancelled():
-                raise arhost.Failure("", arhost.STATUS_ERROR_CANCELLED)  # poll this in every wait
+            if self.host.cancelled():  # poll this in every wait
+                raise arhost.Failure("", arhost.STATUS_ERROR_CANCELLED)
             time.sleep(0.002)
         # FILL IN: your pixels. arhost computes the grey plane for trackers from them.
         buffer.planes[0][...] = (self.image + [4 * n, 0, 0]).astype(np.uint8)

@@ -33,7 +33,7 @@ class @CLASS@:
         marker["state"] = arhost.MARKER_DETECTED
         # Top left, top right, bottom right, bottom left on the upright print.
         marker["corners_px"] = np.array([x, y]) + half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        # Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
+        # Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view.
         mt = np.eye(4)
         mt[:3, 3] = distance * (x - self.lens.cx) / self.lens.fx, -distance * (y - self.lens.cy) / self.lens.fy, -distance
         marker["mt"] = mt.T.reshape(16)

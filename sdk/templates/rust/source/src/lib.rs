@@ -52,9 +52,9 @@ impl Source for @CLASS@ {
         if let Some((first, start_time)) = self.pace {
             let due = start_time + Duration::from_secs_f64(n.saturating_sub(first) as f64 / self.fps);
             while Instant::now() < due {
+                // Poll this in every wait.
                 if self.host.cancelled() {
                     return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, ""));
-                    // poll this in every wait
                 }
                 sleep(Duration::from_millis(2));
             }

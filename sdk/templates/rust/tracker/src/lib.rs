@@ -73,7 +73,7 @@ impl Tracker for @CLASS@ {
             [patch.x + half, patch.y + half],
             [patch.x - half, patch.y + half],
         ];
-        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: it faces us.
+        // Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view.
         for i in [0, 5, 10, 15] {
             marker.mt[i] = 1.0;
         }
