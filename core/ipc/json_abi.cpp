@@ -280,7 +280,7 @@ const char *status_text(arhost_status status) {
     case ARHOST_STATUS_END:
         return "end";
     case ARHOST_STATUS_END_TRUNCATED:
-        return "end, cut short";
+        return "end, input truncated";
     case ARHOST_STATUS_ERROR_INVALID_ARGUMENT:
         return "invalid argument";
     case ARHOST_STATUS_ERROR_CONFIGURATION:

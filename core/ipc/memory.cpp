@@ -44,9 +44,9 @@ SharedMemory SharedMemory::create(const char *name, std::size_t size) {
 SharedMemory SharedMemory::adopt(base::UniqueFd fd) {
     const int seals = ::fcntl(fd.get(), F_GET_SEALS);
     if (seals < 0)
-        base::throw_errno("shared memory that is not a memfd");
+        base::throw_errno("the received shared memory is not a memfd");
     if ((seals & (F_SEAL_GROW | F_SEAL_SHRINK)) != (F_SEAL_GROW | F_SEAL_SHRINK))
-        throw std::runtime_error("shared memory whose size is not sealed");
+        throw std::runtime_error("the size of the received shared memory is not sealed");
     const std::size_t size = size_of(fd);
     return SharedMemory(std::move(fd), size);
 }

@@ -32,7 +32,7 @@ using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // 
 void check_functions(const std::filesystem::path &file, NamedFunctions functions, const std::string &owner) {
     for (const auto &[name, is_present] : functions)
         if (!is_present)
-            refuse(file, "its function '" + std::string(name) + "' is NULL, which " + owner + " must have");
+            refuse(file, "its function '" + std::string(name) + "' is NULL, but " + owner + " must have it");
 }
 
 // Minimum sizes of the structs: their sizes in ABI version 1 (docs/abi.md).
