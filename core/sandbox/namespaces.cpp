@@ -55,8 +55,7 @@ bool bind_mount(const std::filesystem::path &path) {
 
 // Makes the mounts read-only except for the folders and devices of `policy`. Returns false and sets errno on failure.
 bool restrict_mounts(const Policy &policy) {
-    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) !=
-        0) // mounts do not propagate to or from other namespaces
+    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation of mounts
         return false;
     // Creates separate mounts for the folders and devices, so that they can have other flags than the rest. Skips
     // folders in read-only file systems.

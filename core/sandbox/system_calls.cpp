@@ -98,8 +98,7 @@ void deny_reaching_others(Filter &filter, bool has_children) {
         for (const char *call : {"setpgid", "setsid"}) // a signal to the process group must reach only this worker
             filter.deny(call);
     } else {
-        filter.deny("kill",
-                    {equals(0, 0xffffffff)}); // -1 means all processes; Landlock restricts signals to single ones
+        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: all processes. Landlock restricts others
     }
     // 0 means the calling process. Other values could change other processes of the same user.
     for (const char *call :

@@ -96,9 +96,8 @@ void reap(int socket, std::set<pid_t> &spawned) {
         if (reply.exit.pid <= 0)
             return (void)kill_orphans(spawned);
         if (spawned.erase(reply.exit.pid) == 0)
-            continue; // an orphan of a worker
-        ::kill(-reply.exit.pid,
-               SIGKILL); // kills its children; kill_orphans kills those that have left the process group
+            continue;                     // an orphan of a worker
+        ::kill(-reply.exit.pid, SIGKILL); // kill_orphans kills children that have left the group
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -122,8 +121,7 @@ int main() {
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGHUP, SIG_IGN);
-    ::signal(SIGCHLD,
-             SIG_DFL); // if SIGCHLD were still ignored (inherited), the exit statuses of children would be lost
+    ::signal(SIGCHLD, SIG_DFL); // if ignored (inherited), the exit statuses of children would be lost
     sigset_t child;
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);

@@ -61,8 +61,7 @@ void Component::spawn() {
     try {
         process_ = std::make_unique<Process>(context_, name_, std::move(callbacks),
                                              encode(messages::Open{plugin().string(), sandbox_}));
-    } catch (const std::exception
-                 &error) { // for example, too many processes or no memory; handled like the death of a process
+    } catch (const std::exception &error) { // handled like the death of a process
         state_ = State::waiting;
         return restart(error.what());
     }

@@ -156,8 +156,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
             continue;
         }
         const bool has_failed = reply->kind == Reply::failed;
-        if (has_failed || fds.size() != 1 ||
-            !fds[0]) // without the descriptor, this process has too many descriptors open
+        if (has_failed || fds.size() != 1 || !fds[0]) // without fds[0]: too many open files
             throw std::runtime_error(std::string("no process can be started: ") +
                                      std::strerror(has_failed ? reply->error : EMFILE));
         alive_.insert(reply->exit.pid);

@@ -66,9 +66,9 @@ public:
 private:
     std::string start_error(int error) const;
     void start();
-    std::optional<Reply>
-    receive_reply(std::vector<base::UniqueFd> &fds); // nullopt if the launcher has died or does not respond
-    void discard();                                  // kills the launcher and all its workers
+    // Returns nullopt if the launcher has died or does not respond.
+    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds);
+    void discard(); // kills the launcher and all its workers
     void record(const Exit &exit);
 
     std::filesystem::path program_;

@@ -59,7 +59,7 @@ struct Bench {
             limits, arhost::sandbox::Policy{}, std::move(callbacks));
         component->start();
     }
-    // Runs the reactor until `event` has occurred `count` times. Returns false after 20 s.
+    // Runs the reactor until `event` has occurred `times` times. Returns false after 20 s.
     bool until(const std::string &event, std::size_t times = 1) {
         bool timed_out = false;
         const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { timed_out = true; });

@@ -42,7 +42,7 @@ struct Conversation {
     }
 };
 
-// Returns the message that creates an instance of source_counter, whose options are all integers.
+// Returns the default values of the options of source_counter, all of which are integers.
 std::vector<OptionValue> default_options(const messages::Hello &hello) {
     std::vector<OptionValue> values;
     for (const OptionDeclaration &o : hello.descriptor.options)
