@@ -31,8 +31,8 @@ public:
     Option range(double minimum, double maximum);
     Option one_of(const std::vector<std::string> &choices);
     Option existing_path();
-    Option
-    check(const std::function<std::string(const std::string &value)> &problem); // `problem` returns "" if valid
+    // `problem` returns an error message, or "" if the value is valid.
+    Option check(const std::function<std::string(const std::string &value)> &problem);
 
 private:
     CLI::Option *option_;
@@ -43,8 +43,7 @@ public:
     explicit CommandLine(const std::string &description, const std::string &name = "");
 
     void version(const std::string &text);
-    CommandLine group(const std::string &name,
-                      const std::string &description); // options under their own heading in --help
+    CommandLine group(const std::string &name, const std::string &description); // a heading in --help
     CommandLine subcommand(const std::string &name, const std::string &description);
     // A subcommand whose arguments, including --help, are not parsed; arguments() returns them.
     CommandLine raw_subcommand(const std::string &name, const std::string &description);

@@ -90,8 +90,7 @@ TEST(RingProcesses, LoseNoFrameIfTheWorkerIsKilledOrStoppedAtRandom) {
         }
         if (next_expected >= next_fault) {
             next_fault = next_expected + 1 + random() % 60;
-            ::usleep(static_cast<useconds_t>(
-                random() % 200)); // random delay, so that the kill hits different steps of the worker
+            ::usleep(static_cast<useconds_t>(random() % 200)); // so that the kill hits different steps
             if (random() % 2) {
                 ::kill(connection->pid, SIGSTOP);
                 ::usleep(static_cast<useconds_t>(random() % 500));

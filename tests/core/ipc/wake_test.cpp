@@ -46,8 +46,7 @@ TEST(Doorbell, CountsRings) {
 
 TEST(Doorbell, DoesNotBlockTheHostIfTheWorkerClearsONonblock) {
     const DoorbellPair bell = make_doorbell();
-    ::fcntl(bell.worker.get(), F_SETFL,
-            0); // would clear O_NONBLOCK for the host, too, if the ends shared their flags
+    ::fcntl(bell.worker.get(), F_SETFL, 0); // would clear O_NONBLOCK of both ends if they shared it
     EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
 }
 

@@ -209,12 +209,9 @@ TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
     is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
     is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
     const auto stays = [&](Vec3 normal) { EXPECT_EQ(length(normal - up), 0); };
-    stays(perturbed_normal(up, up, u, v,
-                           {0.8, 0.5, 0.1})); // unchanged, because the result would point into the surface
-    stays(perturbed_normal(up, up, up * 3, v,
-                           {0.8, 0.5, 0.9})); // unchanged, because the direction of u is parallel to the normal
-    is({0.8, 0.5, 0.9},
-       perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the sign of the geometric normal does not matter
+    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // the result would point into the surface
+    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // u is parallel to the normal
+    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the sign of `facet` does not matter
 }
 
 TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {
