@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// STDOUT_FILENO or STDERR_FILENO if the file is that stream, else -1.
+// Returns STDOUT_FILENO or STDERR_FILENO if `file` is the file behind that descriptor, otherwise -1.
 int standard_stream(const fs::path &file) {
     for (const int fd : {STDOUT_FILENO, STDERR_FILENO})
         if (identity_of(file).node == identity_of("/proc/self/fd/" + std::to_string(fd)).node)
@@ -25,7 +25,7 @@ int standard_stream(const fs::path &file) {
     return -1;
 }
 
-// Permissions of an existing file, or those that open(2) would give a new one.
+// Returns the permissions of `file`, or those that open(2) would give it if it does not exist.
 mode_t permissions_of(const fs::path &file) {
     struct stat status {};
     if (::stat(file.c_str(), &status) == 0)
@@ -44,7 +44,7 @@ AtomicFile::AtomicFile(const fs::path &file, int signals) : file_(file), signals
     const fs::file_status status = fs::status(file_, error);
     if (fs::is_directory(status))
         throw std::runtime_error("cannot write " + file.string() + ": it is a folder");
-    if (status.type() == fs::file_type::none) // such as a circular link
+    if (status.type() == fs::file_type::none) // for example a circular symbolic link
         fail(error.value());
     if (const int fd = standard_stream(file_); fd >= 0)
         fd_.reset(::fcntl(fd, F_DUPFD_CLOEXEC, 3));
@@ -57,7 +57,7 @@ AtomicFile::AtomicFile(const fs::path &file, int signals) : file_(file), signals
 }
 
 void AtomicFile::open_temporary() {
-    file_ = real_path(file_); // replaces the target of a link, not the link
+    file_ = real_path(file_); // if `file_` is a symbolic link, replaces its target, not the link
     std::string name = file_.string() + ".XXXXXX.tmp";
     fd_.reset(::mkostemps(name.data(), 4, O_CLOEXEC));
     if (fd_) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Atomic file replacement, opened up front.
+// Atomic replacement of a file. Errors such as missing permissions are reported before the caller starts its work.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -10,18 +10,20 @@
 
 namespace arhost::base {
 
-// The constructor opens a temporary file, so that an unwritable path is found before the work; write() renames it to
-// the target. Pipes, devices, and a file that is this process's stdout or stderr are written to directly.
+// The constructor creates a temporary file in the folder of the target, so it throws if the path is not writable.
+// write() fills the temporary file and renames it to the target. If the target is a pipe, a device, or the file
+// behind this process's stdout or stderr, write() writes to it directly.
 class AtomicFile {
 public:
-    // An empty path: does nothing. `signals`: a signalfd. Throws std::runtime_error.
+    // If `file` is empty, all functions do nothing. `signals`: a signalfd whose signals interrupt write(), or -1.
+    // Throws std::runtime_error.
     explicit AtomicFile(const std::filesystem::path &file, int signals = -1);
-    ~AtomicFile(); // removes the temporary file unless written
+    ~AtomicFile(); // removes the temporary file unless write() has renamed it
     AtomicFile(const AtomicFile &) = delete;
     AtomicFile &operator=(const AtomicFile &) = delete;
 
-    // May be called once. Throws std::runtime_error, or Interrupted (base/write_all.hpp) if a signal arrives while
-    // the write blocks.
+    // May be called only once. Throws Interrupted (base/write_all.hpp) if a signal arrives while the write blocks,
+    // and std::runtime_error for other errors.
     void write(const std::string &text);
 
 private:

@@ -50,7 +50,7 @@ Option Option::check(const std::function<std::string(const std::string &value)> 
 CommandLine::CommandLine(const std::string &description, const std::string &name)
     : app_(std::make_shared<CLI::App>(description, name)) {
     app_->get_formatter()->column_width(34);
-    // Arguments appear in the message and must not control the terminal.
+    // The message quotes arguments, which might contain control characters for the terminal.
     app_->failure_message([](const CLI::App *, const CLI::Error &error) {
         return printable(error.what()) + "\nRun with --help for more information.\n";
     });
@@ -83,7 +83,7 @@ Option CommandLine::option(const std::string &names, Value &value, const std::st
     return Option(app_->add_option(names, value, description));
 }
 
-// The types of options that the project's programs have.
+// Explicit instantiations for all types of option values that the project's programs use.
 template Option CommandLine::option(const std::string &, double &, const std::string &);
 template Option CommandLine::option(const std::string &, unsigned &, const std::string &);
 template Option CommandLine::option(const std::string &, std::uint64_t &, const std::string &);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Command-line parsing. Wraps CLI11, whose headers take seconds to compile, so that one file includes them.
+// Command-line parsing. Wraps CLI11: its headers take seconds to compile, so only command_line.cpp includes them.
 #pragma once
 
 #include <functional>
@@ -22,16 +22,17 @@ public:
 
     Option required();
     Option hidden();
-    Option type_name(const std::string &name); // in --help
-    Option show_default();                     // in --help: the variable's present value
+    Option type_name(const std::string &name); // placeholder for the value in --help
+    Option show_default();                     // shows the initial value of the variable in --help
     Option default_text(const std::string &text);
-    Option separator(char c); // between the values of one argument
-    Option one_value_each();  // a list: one value per occurrence of the option
+    Option separator(char c); // one argument may contain several values, separated by `c`
+    Option one_value_each();  // for lists: each occurrence of the option takes one value
     Option range(int minimum, int maximum);
     Option range(double minimum, double maximum);
     Option one_of(const std::vector<std::string> &choices);
     Option existing_path();
-    Option check(const std::function<std::string(const std::string &value)> &problem); // returns "" if valid
+    // `problem` returns an error message, or "" if the value is valid.
+    Option check(const std::function<std::string(const std::string &value)> &problem);
 
 private:
     CLI::Option *option_;
@@ -44,16 +45,17 @@ public:
     void version(const std::string &text);
     CommandLine group(const std::string &name, const std::string &description); // a heading in --help
     CommandLine subcommand(const std::string &name, const std::string &description);
-    // Leaves all its arguments, --help included, to arguments().
+    // A subcommand whose arguments, including --help, are not parsed; arguments() returns them.
     CommandLine raw_subcommand(const std::string &name, const std::string &description);
 
     // `names`: "FILE" (positional) or "-v,--verbose".
     template <class Value> Option option(const std::string &names, Value &value, const std::string &description = "");
     Option flag(const std::string &names, bool &value, const std::string &description);
 
-    // The exit status if the program ends here: 0 after --help or --version, 2 after invalid arguments.
+    // Returns nullopt if the program should continue, otherwise its exit status: 0 after --help or --version, 2 after
+    // invalid arguments.
     std::optional<int> parse(int argc, char **argv);
-    bool selected() const; // a subcommand
+    bool selected() const; // whether the user has given this subcommand
     std::vector<std::string> arguments() const;
     std::string help() const;
 

@@ -12,14 +12,15 @@ namespace arhost::base {
 
 void exec_child(const char *program, char *const argv[], std::span<const int> fds, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) // it died before the line above
+    if (::getppid() != parent) // `parent` exited before the call of prctl
         return;
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    // First above the target numbers, then into place, so that none is overwritten; dup2 clears close-on-exec.
+    // Duplicates all descriptors to numbers from 10 on and from there to 0, 1, 2, …, so dup2 does not overwrite a
+    // descriptor that is still needed. dup2 also clears close-on-exec.
     constexpr int first_free = 10, max_fds = 8;
     int high[max_fds] = {};
     if (fds.size() > max_fds)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The step from fork to exec for untrusted children.
+// Executes a program in a forked child that will run untrusted code.
 #pragma once
 
 #include <span>
@@ -8,8 +8,9 @@
 
 namespace arhost::base {
 
-// To be called in a child after fork; async-signal-safe. The program dies with `parent`, blocks no signals, leaves no
-// core file, and has `fds` as descriptors 0, 1, 2, … and no others. Returns only if something fails.
+// Call in the child after fork; async-signal-safe. The kernel kills the program when `parent` dies. The program
+// starts with no blocked signals and no core dumps; its only descriptors are `fds`, numbered 0, 1, 2, …. Returns only
+// on failure.
 void exec_child(const char *program, char *const argv[], std::span<const int> fds, pid_t parent);
 
 } // namespace arhost::base

@@ -19,9 +19,9 @@ FileIdentity identity_of(const fs::path &file) {
 fs::path real_path(const fs::path &file) {
     std::error_code error;
     fs::path path = fs::absolute(file);
-    constexpr int max_links = 40; // as in the kernel
+    constexpr int max_links = 40; // same limit as in the kernel
     for (int i = 0; i < max_links && !fs::exists(path, error) && fs::is_symlink(path, error); ++i)
-        path = path.parent_path() / fs::read_symlink(path, error); // weakly_canonical keeps a dangling link
+        path = path.parent_path() / fs::read_symlink(path, error); // weakly_canonical does not resolve dangling links
     const fs::path canonical = fs::weakly_canonical(path, error);
     return error ? path.lexically_normal() : canonical;
 }

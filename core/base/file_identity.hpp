@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Identity of a file as workers report it: the host does not access paths that a worker names.
+// Identifies files that workers read. The workers compute the identities, because the host must not access paths that
+// an untrusted worker names.
 #pragma once
 
 #include <filesystem>
@@ -8,15 +9,15 @@
 
 namespace arhost::base {
 
-// Two paths name the same file if either member is equal.
+// Two paths lead to the same file if their `path` or their `node` is equal.
 struct FileIdentity {
-    std::string path; // real path
+    std::string path; // see real_path
     std::string node; // "device:inode", or the path if the file does not exist
 };
 
 FileIdentity identity_of(const std::filesystem::path &file);
 
-// Absolute and free of links, dangling ones included.
+// Returns the absolute path with all symbolic links resolved, including dangling ones.
 std::filesystem::path real_path(const std::filesystem::path &file);
 
 } // namespace arhost::base

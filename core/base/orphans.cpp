@@ -17,11 +17,11 @@ std::set<pid_t> children() {
 int kill_orphans(const std::set<pid_t> &kept) {
     int count = 0;
     for (const pid_t child : children()) {
-        siginfo_t info{}; // a pid from another namespace's /proc is not our child
+        siginfo_t info{}; // fails if /proc belongs to another PID namespace, where `child` is another process
         if (!kept.contains(child) &&
             ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0) {
             ::kill(child, SIGKILL);
-            ::waitpid(child, nullptr, WNOHANG); // or in a later call
+            ::waitpid(child, nullptr, WNOHANG); // if it has not exited yet, a later call reaps it
             ++count;
         }
     }

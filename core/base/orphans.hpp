@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Processes that a plugin started and that outlived its worker.
+// Kills orphans: processes that a plugin has started and that outlive its worker.
 #pragma once
 
 #include <set>
@@ -8,13 +8,16 @@
 
 namespace arhost::base {
 
-std::set<pid_t> children(); // of this thread
+// Returns the child processes of the calling thread.
+std::set<pid_t> children();
 
-// Kills every child of this thread except `kept`; returns their number. A subreaper (PR_SET_CHILD_SUBREAPER) inherits
-// a worker's orphans; grandchildren become its children only when their parent is dead, so with a later call.
+// Kills all children of the calling thread except `kept`. Returns how many it has killed. If the calling process is a
+// subreaper (PR_SET_CHILD_SUBREAPER), the orphans of a dead worker become its children. The children of a killed
+// orphan do so only after the orphan has died, so call this function repeatedly.
 int kill_orphans(const std::set<pid_t> &kept);
 
-// Repeats until there are none, for at most half a second: a process may hang in the kernel.
+// Calls kill_orphans until no orphan is left, but for at most half a second, because a process may hang in the
+// kernel.
 void end_orphans(const std::set<pid_t> &kept);
 
 } // namespace arhost::base

@@ -6,7 +6,7 @@
 namespace arhost::base {
 namespace {
 
-// `c`: one UTF-8 character; bytewise order is code point order.
+// `c`: one UTF-8 character. Compares bytes, because in UTF-8 their order is that of the code points.
 bool is_unsafe(std::string_view c) {
     const auto within = [&](std::string_view first, std::string_view last) { return first <= c && c <= last; };
     return c < " " || within("\x7f", "\u009f") || c == "\u061c" || within("\u200e", "\u200f") ||

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A file descriptor that closes itself, and errno as an exception.
+// Owns a file descriptor; converts errno to exceptions.
 #pragma once
 
 #include <cerrno>

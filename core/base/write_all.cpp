@@ -15,8 +15,8 @@
 namespace arhost::base {
 
 void write_all(int fd, std::string_view bytes, int signals) {
-    // A write to a terminal may block although poll reports it ready. Reopened, it can be non-blocking without
-    // changing the flags of other processes that share the descriptor.
+    // A write to a terminal may block although poll reports that it is ready. Therefore reopens the terminal with
+    // O_NONBLOCK; setting the flag on `fd` would change it for all processes that share the descriptor.
     const UniqueFd terminal(::isatty(fd) ? ::open(("/proc/self/fd/" + std::to_string(fd)).c_str(),
                                                   O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)
                                          : -1);
@@ -30,7 +30,7 @@ void write_all(int fd, std::string_view bytes, int signals) {
             throw Interrupted(signal, "interrupted while writing");
         if (fds[0].revents == 0)
             continue;
-        // A pipe that poll reports ready takes PIPE_BUF bytes without blocking.
+        // If poll reports that a pipe is ready, a write of up to PIPE_BUF bytes does not block.
         const ssize_t count = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
         if (count < 0 && errno != EINTR && errno != EAGAIN)
             throw_errno("write");

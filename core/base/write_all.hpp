@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Writes that may block forever (an unread pipe, a stopped terminal) and can be interrupted.
+// Interruptible writes to descriptors that may block forever, such as an unread pipe or a stopped terminal.
 #pragma once
 
 #include <stdexcept>
@@ -9,19 +9,20 @@
 
 namespace arhost::base {
 
-// A signal arrived.
+// Thrown if a signal arrived.
 struct Interrupted : std::runtime_error {
     Interrupted(int signal, const std::string &what) : std::runtime_error(what), signal(signal) {}
     int signal;
 };
 
-// `signals`: a signalfd that interrupts the write; -1: none. Throws Interrupted or std::system_error.
+// Writes all `bytes` to `fd`. `signals`: a signalfd whose signals interrupt the write, or -1. Throws Interrupted or
+// std::system_error.
 void write_all(int fd, std::string_view bytes, int signals = -1);
 
-// False if stdio output to stdout was lost, for example because the disk is full.
+// Flushes stdout. Returns false if any output was lost, for example because the disk is full.
 bool flush_stdout();
 
-// The next pending signal, or 0; does not wait.
+// Reads the next pending signal from the signalfd `signals`. Returns 0 at once if there is none.
 int take_signal(int signals);
 
 } // namespace arhost::base

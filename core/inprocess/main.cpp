@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-inprocess: `arhost --config FILE` in one process, without deadlines and sandbox, for debuggers, valgrind and
-// sanitizers. A plugin crash ends the whole program.
+// arhost-inprocess: runs a configuration like `arhost --config FILE`, but in one process and without deadlines and
+// sandbox, for debuggers, valgrind and sanitizers. If a plugin crashes, the whole program crashes.
 #include "base/command_line.hpp"
 #include "host/commands.hpp"
 #include "inprocess/thread_starter.hpp"
@@ -17,7 +17,7 @@ int main(int argc, char **argv) {
     worker::retain_freed_memory();
     base::CommandLine app(
         "arhost-inprocess runs a configuration like arhost, but with all plugins in one process and without\n"
-        "deadlines and sandbox: for debuggers.");
+        "deadlines or sandbox. Intended for debuggers, valgrind and sanitizers.");
     app.version("arhost-inprocess " ARHOST_VERSION);
     host::Arguments arguments;
     arguments.in_process = true;

@@ -13,7 +13,7 @@
 namespace arhost::inprocess {
 namespace {
 
-constexpr pid_t first_pid = 1 << 22; // above the maximum pid of Linux, so that kill(2) hits no process
+constexpr pid_t first_pid = 1 << 22; // above the maximum pid of Linux, so that kill(2) cannot affect a process
 
 double cpu_seconds_of_thread() {
     timespec time{};
@@ -34,13 +34,13 @@ supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const sup
     std::tie(spawned.channel, theirs) = ipc::Channel::make_pair();
     ipc::DoorbellPair doorbell = ipc::make_doorbell();
     spawned.doorbell = std::move(doorbell.host);
-    // The worker shares this process's stdout and stderr; its output pipe is closed at once.
+    // The worker uses stdout and stderr of this process, so the write end of its output pipe is closed at once.
     int pipe_ends[2];
     if (::pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK) != 0)
         base::throw_errno("pipe for a worker's output");
     spawned.output.reset(pipe_ends[0]);
     ::close(pipe_ends[1]);
-    // Readable once the worker has ended, like a pidfd. Signals cannot be sent to it.
+    // This eventfd replaces a pidfd: it is readable when the worker has ended, but cannot be used to send signals.
     spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
     base::UniqueFd death(base::checked(::dup(spawned.pidfd.get()), "dup"));
 

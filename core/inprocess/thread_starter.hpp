@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Starts workers as threads of this process. To the host they look like processes, except that they cannot be killed.
+// Starts workers as threads of this process. The host handles them like processes, except that they cannot be killed.
 #pragma once
 
 #include "supervise/launcher.hpp"

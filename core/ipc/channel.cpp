@@ -20,7 +20,7 @@ std::pair<Channel, Channel> Channel::make_pair() {
 }
 
 bool Channel::send(const Json &body, std::initializer_list<int> fds, bool wait) const {
-    // Invalid UTF-8 (in a plugin's log, say) is replaced rather than rejected.
+    // Replaces invalid UTF-8, for example in a plugin's log message, instead of throwing.
     const std::string text = body.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (text.size() > max_message_size || fds.size() > max_passed_fds)
         throw std::length_error("a control message of " + std::to_string(text.size()) + " bytes is too long");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The control channel between the host and a worker: JSON messages with file descriptors over a Unix socket that
-// preserves message boundaries. It carries what happens a few times in a worker's life (messages.hpp); frames go
-// through the rings.
+// preserves message boundaries. It carries the infrequent messages of messages.hpp; the
+// commands and results of frames go through the rings (protocol.hpp).
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -24,12 +24,13 @@ struct Message {
 
 enum class ReceiveState {
     message,
-    none, // within the timeout
+    none, // no message within the timeout
     closed,
-    malformed // too large, not a JSON object, or without "type"
+    malformed // the message is too large, is not a JSON object, or has no "type"
 };
 
-// Each call chooses whether it blocks, with MSG_DONTWAIT instead of O_NONBLOCK.
+// One end of a control channel. Each call specifies whether it blocks: the implementation uses MSG_DONTWAIT instead
+// of O_NONBLOCK.
 class Channel {
 public:
     static constexpr std::size_t max_message_size = 128 * 1024;
@@ -38,10 +39,11 @@ public:
     explicit Channel(base::UniqueFd fd) : fd_(std::move(fd)) {}
     static std::pair<Channel, Channel> make_pair();
 
-    // False if the peer has closed its end or, without `wait`, its queue is full (errno EAGAIN).
+    // Returns false if the peer has closed its end, or if `wait` is false and the queue of the peer is full (errno is
+    // EAGAIN in this case).
     bool send(const Json &body, std::initializer_list<int> fds = {}, bool wait = true) const;
 
-    // Waits up to `timeout_ms`; 0 does not wait, -1 waits without limit.
+    // Receives a message. Waits for up to `timeout_ms`; 0: does not wait; -1: waits without limit.
     ReceiveState receive(Message &message, int timeout_ms) const;
 
     int fd() const { return fd_.get(); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sends and receives one message with file descriptors over a Unix socket.
+// Sends and receives messages with file descriptors over a Unix socket.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -14,14 +14,15 @@ namespace arhost::ipc {
 
 constexpr std::size_t max_passed_fds = 4;
 
-// Like sendmsg(2): returns the bytes sent, or -1 with errno. Never raises SIGPIPE; retries on EINTR.
+// Sends one message. Like sendmsg(2), returns the number of bytes sent, or -1 with errno. Never raises SIGPIPE;
+// retries on EINTR.
 ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, std::initializer_list<int> fds, int flags = 0);
 
 struct Received {
-    ssize_t size;   // as from recvmsg(2): 0 at end of file, -1 with errno
-    bool truncated; // bytes or descriptors did not fit
+    ssize_t size;   // return value of recvmsg(2): 0 at end of file, -1 with errno on error
+    bool truncated; // some bytes or descriptors did not fit
 };
-// Appends the received descriptors to `fds`, close-on-exec.
+// Receives one message. Appends its descriptors, which are close-on-exec, to `fds`.
 Received receive_with_fds(int socket, std::span<std::byte> bytes, std::vector<base::UniqueFd> &fds, int flags = 0);
 
 } // namespace arhost::ipc

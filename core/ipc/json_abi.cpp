@@ -14,7 +14,7 @@ std::string text_or_empty(const char *text) {
     return text ? text : "";
 }
 
-// A string of a descriptor, at most max_text_size bytes long.
+// Returns a string of a descriptor. Throws if it is longer than max_text_size.
 std::string text_of(const Json &json, const char *key) {
     std::string text = json.at(key).get<std::string>();
     if (text.size() > max_text_size)
@@ -23,7 +23,8 @@ std::string text_of(const Json &json, const char *key) {
     return text;
 }
 
-// Truncates to max_device_text_size. Reads no further than needed, as the text may be unterminated.
+// Returns a string of a device, printable and truncated to max_device_text_size. Reads no further than needed,
+// because a faulty plugin may not terminate the string.
 std::string device_text(const char *text) {
     constexpr std::size_t longest_character = 4;
     return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
@@ -152,7 +153,7 @@ Json to_json(const DeviceList &list) {
     return {{"devices", std::move(devices)}, {"left_out", list.left_out}};
 }
 constexpr std::size_t longest_device_text = max_device_text_size + std::string_view("…").size();
-// The longest list fits a message even if JSON escapes each byte of each text.
+// The longest list fits into a message, even if JSON escapes each byte of each text.
 static_assert(max_devices * (3 * 2 * longest_device_text + 128) < Channel::max_message_size);
 
 DeviceList devices_from_json(const Json &json) {
@@ -279,7 +280,7 @@ const char *status_text(arhost_status status) {
     case ARHOST_STATUS_END:
         return "end";
     case ARHOST_STATUS_END_TRUNCATED:
-        return "end, cut short";
+        return "end, input truncated";
     case ARHOST_STATUS_ERROR_INVALID_ARGUMENT:
         return "invalid argument";
     case ARHOST_STATUS_ERROR_CONFIGURATION:

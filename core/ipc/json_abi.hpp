@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// ABI structs in control messages. Reading throws nlohmann::json::exception or std::runtime_error on malformed input,
-// as workers are not trusted.
+// Converts ABI structs to and from the JSON of control messages. Workers are not trusted, so the functions that read
+// JSON validate it: they throw nlohmann::json::exception or std::runtime_error on malformed input.
 #pragma once
 
 #include "ipc/channel.hpp"
@@ -14,7 +14,7 @@
 
 namespace arhost::ipc {
 
-// An arhost_descriptor with its options, owning all strings.
+// Copies of arhost_option_descriptor, arhost_descriptor and arhost_option that own their strings.
 struct OptionDeclaration {
     std::string key;
     arhost_option_type type = 0;
@@ -28,7 +28,7 @@ struct PluginDescription {
     std::string id, name, version, vendor, licence, description;
     std::uint32_t capabilities = 0;
     std::vector<OptionDeclaration> options;
-    std::vector<std::string> needs; // from sandbox::allowances
+    std::vector<std::string> needs; // elements of sandbox::allowances
 };
 struct OptionValue {
     std::string key;
@@ -38,19 +38,21 @@ struct OptionValue {
     std::string text;
 };
 
-// The options of a descriptor. Their size is that of the plugin's headers, which may be newer than these.
+// Returns the options of a descriptor. Steps by struct_size, because the plugin's headers may be newer and its
+// structs larger.
 std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
 
 PluginDescription describe(const arhost_descriptor &descriptor);
 
-// Limits in bytes of a descriptor's texts and of the whole as JSON, which must fit a hello.
+// Maximum size in bytes of each text of a descriptor, and of the whole descriptor as JSON, which must fit into a
+// Hello message.
 constexpr std::size_t max_text_size = 4096, max_descriptor_size = Channel::max_message_size - 1024;
 
 Json to_json(const PluginDescription &description);
 Json to_json(const arhost_descriptor &descriptor);
 PluginDescription description_from_json(const Json &json);
 
-// A plugin's answer through the extension arhost.devices/1, with printable texts.
+// A device that a plugin lists through the extension arhost.devices/1. The texts are printable.
 struct DeviceDescription {
     std::uint32_t index = 0;
     arhost_device_kind kind = 0;
@@ -61,7 +63,7 @@ struct DeviceList {
     std::vector<DeviceDescription> devices;
     std::uint64_t left_out = 0; // devices beyond max_devices
 };
-constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, without the "…" of a cut text
+constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, not counting the "…" of a truncated text
 
 DeviceDescription describe(const arhost_device &device);
 
@@ -71,7 +73,7 @@ DeviceList devices_from_json(const Json &json);
 Json to_json(const arhost_intrinsics &intrinsics);
 arhost_intrinsics intrinsics_from_json(const Json &json);
 
-// Only the fields that a source sets; reading recomputes the layout.
+// The JSON contains only the fields that a source sets; format_from_json recomputes the layout.
 Json to_json(const arhost_frame_format &format);
 arhost_frame_format format_from_json(const Json &json);
 

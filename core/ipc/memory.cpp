@@ -44,9 +44,9 @@ SharedMemory SharedMemory::create(const char *name, std::size_t size) {
 SharedMemory SharedMemory::adopt(base::UniqueFd fd) {
     const int seals = ::fcntl(fd.get(), F_GET_SEALS);
     if (seals < 0)
-        base::throw_errno("shared memory that is not a memfd");
+        base::throw_errno("the received shared memory is not a memfd");
     if ((seals & (F_SEAL_GROW | F_SEAL_SHRINK)) != (F_SEAL_GROW | F_SEAL_SHRINK))
-        throw std::runtime_error("shared memory whose size is not sealed");
+        throw std::runtime_error("the size of the received shared memory is not sealed");
     const std::size_t size = size_of(fd);
     return SharedMemory(std::move(fd), size);
 }
@@ -59,8 +59,8 @@ SharedMemory SharedMemory::adopt_and_freeze(base::UniqueFd fd) {
 
 Mapping SharedMemory::map(Access access) const {
     const int protection = access == Access::read_write ? PROT_READ | PROT_WRITE : PROT_READ;
-    // Linux before 6.7 rejects even a read-only shared mapping of a write-sealed memfd. A private mapping sees the
-    // same pages, since nobody can write them any more.
+    // Before version 6.7, Linux rejects shared mappings of a write-sealed memfd even if they are read-only. A private
+    // mapping shows the same pages, because they can no longer be written.
     const bool frozen = (::fcntl(fd_.get(), F_GET_SEALS) & F_SEAL_WRITE) != 0;
     const int sharing = frozen && access == Access::read_only ? MAP_PRIVATE : MAP_SHARED;
     void *address = ::mmap(nullptr, size_, protection, sharing, fd_.get(), 0);

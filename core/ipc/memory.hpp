@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shared memory: anonymous memfds with one writer each. Seals keep peers from resizing one under a reader and from
-// mapping it writable once its writer has.
+// Shared memory: anonymous memfds with one writer each. Seals prevent peers from resizing a memfd while others read
+// it, and from mapping it writable after its only writer has mapped it.
 //
-// Life cycle of a memfd that a worker writes: the host creates it with a sealed size and sends it; the worker maps it
-// writable and acknowledges; the host seals it against further writers and only then passes it to readers. Memory
-// that the host writes is mapped and sealed at once.
+// Life cycle of a memfd that a worker writes: the host creates it with a sealed size and sends it to the worker. The
+// worker maps it writable and acknowledges. The host then seals it against further writers, and only after that
+// passes it to readers. A memfd that the host itself writes is mapped and sealed as soon as it is created.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -32,7 +32,8 @@ public:
 
     std::span<std::byte> bytes() const { return {address_, size_}; }
     explicit operator bool() const { return address_ != nullptr; }
-    // The mapping as a T, which must fit. T is trivially copyable or consists of atomics; memory starts zeroed.
+    // Returns the mapping as a T, which must not be larger than the mapping. T must be trivially copyable or consist
+    // of atomics, because no constructor is called; new memory is zeroed.
     template <class T> T &as() const { return *reinterpret_cast<T *>(address_); }
 
 private:
@@ -45,11 +46,12 @@ enum class Access { read_only, read_write };
 class SharedMemory {
 public:
     SharedMemory() = default;
-    // Zeroed, with a sealed size. `name` appears in /proc for debugging.
+    // Creates zeroed memory whose size is sealed. `name` appears in /proc for debugging.
     static SharedMemory create(const char *name, std::size_t size);
-    // Memory received from a peer. Throws if it is not a memfd or the peer could still resize it.
+    // Takes over memory received from a peer. Throws if it is not a memfd or if the peer could still resize it.
     static SharedMemory adopt(base::UniqueFd fd);
-    // Memory that a peer has finished writing: applies all seals. Throws if a writable mapping still exists.
+    // Takes over memory that a peer has finished writing, and applies all seals. Throws if a writable mapping still
+    // exists.
     static SharedMemory adopt_and_freeze(base::UniqueFd fd);
 
     Mapping map(Access access) const;
@@ -68,7 +70,7 @@ private:
 
 // Slots of equal size in one memfd, aligned to 64 KiB so that no two share a page or cache line.
 struct SlotLayout {
-    std::uint64_t slot_size = 0; // used bytes of each slot
+    std::uint64_t slot_size = 0; // usable bytes of each slot
     std::uint32_t count = 0;
 
     static constexpr std::uint64_t alignment = 64 * 1024;

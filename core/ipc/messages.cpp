@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-// ABI structs and other types that have their own JSON functions.
+// JSON conversion of ABI structs and other types by their own functions.
 namespace nlohmann {
 
 namespace ipc = arhost::ipc;

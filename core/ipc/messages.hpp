@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The control messages between host and worker, in the order of a worker's life. Either side sends a struct with
-// `encode` and reads it with `parse`; messages.cpp has the JSON of each.
+// The control messages between host and worker, in the order in which a worker usually receives and sends them. The
+// sender converts a message struct to JSON with `encode`; the receiver converts it back with `parse`.
 //
-// Once a worker is ready, the host announces each message with a `control` command in the ring, which fixes the order
-// of messages and frames.
+// Once a worker is ready, the host announces each message with a `control` command in the command ring. This
+// defines the order of messages relative to frames.
 #pragma once
 
 #include "ipc/json_abi.hpp"
@@ -15,7 +15,7 @@
 
 namespace arhost::ipc {
 
-// The peer sent a message with a missing field or one of the wrong type.
+// Thrown if the peer sent a message in which a field is missing or has the wrong type.
 class ProtocolViolation : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -24,21 +24,22 @@ namespace messages {
 
 // ---- host → worker ---------------------------------------------------------------------------------
 
-// The first message to the worker of a plugin; with the host's page and the worker's page.
+// The first message to a worker that runs a plugin. The descriptors of the host page and the worker page
+// (protocol.hpp) accompany it.
 struct Open {
     static constexpr const char *type = "open";
-    std::string plugin; // the shared object
+    std::string plugin; // path of the shared object
     sandbox::Policy sandbox;
 };
 
-// The first message to a scene loader.
+// The first message to a worker that loads a scene.
 struct Load {
     static constexpr const char *type = "load";
-    std::string scene; // its file
+    std::string scene; // path of the scene file
     sandbox::Policy sandbox;
 };
 
-// After Hello, any number of times; the answer is Devices or Failed.
+// May be sent after Hello and before Create, any number of times. The worker answers with Devices or Failed.
 struct ListDevices {
     static constexpr const char *type = "list-devices";
 };
@@ -66,14 +67,16 @@ struct SinkSetup {
 };
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 
-// Create and start the plugin's instance; a ray tracer's comes with the scene's arena.
+// Requests the worker to create and start the plugin's instance. For a ray tracer, the descriptor of the scene's
+// arena accompanies it.
 struct Create {
     static constexpr const char *type = "create";
     std::vector<OptionValue> options;
     Setup setup;
 };
 
-// Map the memory that comes along: the worker's output slots, or input slots.
+// Requests the worker to map the shared memory whose descriptor accompanies this message. It contains either the
+// worker's output slots or input slots.
 struct Attach {
     static constexpr const char *type = "attach";
     bool is_output = false;
@@ -81,7 +84,7 @@ struct Attach {
     SlotLayout layout;
 };
 
-// Unmap input slots.
+// Requests the worker to unmap the input slots with this generation.
 struct Detach {
     static constexpr const char *type = "detach";
     std::uint32_t generation = 0;
@@ -93,24 +96,24 @@ struct Stop {
 
 // ---- worker → host ---------------------------------------------------------------------------------
 
-// The plugin is open.
+// The worker has loaded the plugin and negotiated the ABI version.
 struct Hello {
     static constexpr const char *type = "hello";
     PluginDescription descriptor;
-    std::string sandbox; // the level reached
+    std::string sandbox; // active and missing layers, from sandbox::to_text
 };
 
 struct Devices {
     static constexpr const char *type = "devices";
-    std::optional<DeviceList> list; // none: the plugin lacks the extension
+    std::optional<DeviceList> list; // nullopt: the plugin does not support the extension
 };
 
 // The plugin has started.
 struct Ready {
     static constexpr const char *type = "ready";
-    std::optional<arhost_frame_format> format; // a source's
-    std::uint64_t frame_count = 0;             // a source's; 0: unknown
-    std::optional<arhost_intrinsics> intrinsics;
+    std::optional<arhost_frame_format> format;   // only of a source
+    std::uint64_t frame_count = 0;               // only of a source; 0: unknown
+    std::optional<arhost_intrinsics> intrinsics; // only of a source that knows its camera
 };
 
 struct Attached {
@@ -130,14 +133,14 @@ struct Stopped {
     std::string text; // the last error, unless `status` is OK
 };
 
-// At any time.
+// May be sent at any time.
 struct Log {
     static constexpr const char *type = "log";
     arhost_severity severity = ARHOST_SEVERITY_DEBUG;
     std::string text;
 };
 
-// During a long call; restarts its deadline.
+// Sent during a long call; restarts the deadline of the call.
 struct Progress {
     static constexpr const char *type = "progress";
     double fraction = 0;
@@ -150,18 +153,18 @@ struct Failed {
     std::string text;
 };
 
-// A sink ends the run: its window was closed.
+// A sink requests the end of the run, because the user closed its window.
 struct End {
     static constexpr const char *type = "end";
 };
 
-// The scene loader opens a file.
+// Reports a file that the scene loader is about to open.
 struct Reads {
     static constexpr const char *type = "reads";
-    std::string path, node; // of base::FileIdentity
+    std::string path, node; // as in base::FileIdentity
 };
 
-// The scene loader is done; with the arena.
+// The scene is loaded. The descriptor of its arena accompanies this message.
 struct Loaded {
     static constexpr const char *type = "loaded";
 };
@@ -172,9 +175,10 @@ template <class T> bool is(const Message &message) {
     return message.body.at("type") == T::type;
 }
 
-// For each type above.
+// Both functions are instantiated for each message type above.
 template <class T> Json encode(const T &message);
-// Throws ProtocolViolation, or std::runtime_error if a value is out of range. The type must be T's.
+// Requires is<T>(message). Throws ProtocolViolation if a field is missing or has the wrong type, and
+// std::runtime_error if a value is out of range.
 template <class T> T parse(const Message &message);
 
 } // namespace arhost::ipc

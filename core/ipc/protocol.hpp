@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shared pages of host and worker, and the entries of their rings. messages.hpp has the control messages.
+// The shared memory pages of host and worker, and the entries of the rings in them. See messages.hpp for the control
+// messages.
 #pragma once
 
 #include "ipc/ring.hpp"
@@ -16,10 +17,11 @@ namespace arhost::ipc {
 
 enum class CommandKind : std::uint32_t {
     control = 1, // receive one message from the control channel
-    read = 2,    // source: a frame into output slot `slot`
-    track = 3,   // tracker: input slot `input_slot` of `input_generation`, the result into output slot `slot`
-    render = 4,  // ray tracer: `camera` into output slot `slot`
-    write = 5    // sink: input slot `input_slot` of `input_generation`
+    read = 2,    // source: read a frame into output slot `slot`
+    track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`; write the result to output
+                 // slot `slot`
+    render = 4,  // ray tracer: render the view of `camera` into output slot `slot`
+    write = 5    // sink: write the frame in slot `input_slot` of input memory `input_generation`
 };
 
 struct Command {
@@ -27,7 +29,7 @@ struct Command {
     std::uint32_t slot;
     std::uint32_t input_generation;
     std::uint32_t input_slot;
-    std::uint64_t ticket; // increasing; the result repeats it
+    std::uint64_t ticket; // number of the command, increasing; the result contains the same number
     std::uint64_t sequence;
     std::int64_t capture_ns;
     arhost_clock clock;
@@ -40,15 +42,16 @@ struct Result {
     std::uint64_t ticket;
     arhost_status status;
     std::uint32_t reserved;
-    std::int64_t busy_ns;      // spent inside the plugin
-    arhost_frame_info frame;   // of read
-    arhost_render_info render; // of render
+    std::int64_t busy_ns;      // time spent in the plugin function
+    arhost_frame_info frame;   // only of `read`
+    arhost_render_info render; // only of `render`
 };
 
-// The plugin function that a worker is in, for crash reports.
+// The plugin function that a worker is executing, for crash reports.
 enum class Call : std::uint32_t { none, load, negotiate, create, start, per_frame, idle, stop, destroy, devices };
 
-// "in create", "while its library was loaded". `per_frame` names the kind's own function.
+// Returns, for example, "in create" or "while its library was loaded". `per_frame`: name of the per-frame function of
+// the plugin's kind.
 std::string to_text(Call call, std::string_view per_frame = "its per-frame call");
 
 constexpr std::uint32_t ring_capacity = 16;
@@ -56,7 +59,7 @@ constexpr std::uint32_t ring_capacity = 16;
 // Written by the host, read-only to the worker.
 struct HostPage {
     WakeWord wake;
-    alignas(64) std::atomic<std::uint32_t> cancelled; // non-zero: the running call is to return soon
+    alignas(64) std::atomic<std::uint32_t> cancelled; // non-zero: the running call must return soon
     ProducerSide<Command, ring_capacity> commands;
     ConsumerSide results;
 };
@@ -73,7 +76,7 @@ using CommandConsumer = Consumer<Command, ring_capacity>;
 using ResultProducer = Producer<Result, ring_capacity>;
 using ResultConsumer = Consumer<Result, ring_capacity>;
 
-// An output slot that sinks read: the record, then the image at `image_offset`.
+// Layout of a slot that sinks read: the record, then the image at `image_offset`.
 struct OutputSlot {
     static constexpr std::uint64_t image_offset = (sizeof(arhost_record) + 4095) / 4096 * 4096;
     static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
@@ -81,7 +84,7 @@ struct OutputSlot {
         return image_offset + std::uint64_t(stride(width)) * height;
     }
 };
-// Bytes of one RGBA8 row in a ray tracer's slot.
+// Bytes from one row of the RGBA8 image in a ray tracer's slot to the next.
 inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }

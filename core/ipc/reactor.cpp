@@ -44,17 +44,18 @@ void Reactor::remove(std::uint64_t id) {
 
 void Reactor::run_once() {
     using std::chrono::milliseconds;
-    // Short waits make a suspension of this process visible: the wait takes longer than requested.
+    // Waits only for short times, so that postpone_by_suspension can detect a suspension of this process: a wait then
+    // takes noticeably longer than requested.
     constexpr milliseconds slice{100};
     std::optional<milliseconds> timeout;
     if (!deadlines_.empty()) {
-        // Rounded up: waking just before a deadline would spin.
+        // Rounded up, because waking up just before a deadline would cause busy waiting.
         const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - Clock::now());
         timeout = std::clamp(left, milliseconds(0), slice);
     }
     dispatch_events(timeout);
     if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
-        dispatch_events(milliseconds(0)); // events during a suspension of this process arrived in time
+        dispatch_events(milliseconds(0)); // events that arrived while this process was suspended precede the deadline
     while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
         auto due = deadlines_.extract(deadlines_.begin());
         due.mapped().callback();
@@ -79,7 +80,8 @@ void Reactor::dispatch_events(std::optional<std::chrono::milliseconds> timeout) 
     }
 }
 
-// Extends all deadlines by the time in which this process did not run: workers may not have run either.
+// If this process was suspended during the last wait, extends all deadlines by the duration of the suspension,
+// because the workers may have been suspended, too.
 void Reactor::postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout) {
     constexpr std::chrono::milliseconds noticeable{50}; // above the scheduling delays of a busy machine
     const Clock::time_point now = Clock::now(), before = std::exchange(last_wait_end_, now);

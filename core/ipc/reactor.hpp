@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The host's event loop: one epoll for doorbells, control channels, process exits (pidfds), signals and deadlines.
-// Single-threaded.
+// The host's event loop: one epoll instance for doorbells, control channels, process exits (pidfds), signals and
+// deadlines. Single-threaded.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -43,13 +43,13 @@ public:
 
     Reactor();
 
-    // Calls back while `fd` is readable or hung up. `fd` must stay open until the registration ends.
+    // Calls `callback` whenever `fd` is readable or hung up. `fd` must stay open until the registration ends.
     [[nodiscard]] Registration watch(int fd, Callback callback);
-    // Calls back once.
+    // Calls `callback` once, at the time `when`.
     [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
 
-    // Waits for events and handles them. Events precede expired deadlines, and deadlines do not include time in
-    // which this process did not run (Ctrl-Z, a frozen container).
+    // Waits for events or a deadline and calls the callbacks. Handles events before expired deadlines. Deadlines do
+    // not include time in which this process was suspended (Ctrl-Z, a frozen container).
     void run_once();
 
 private:

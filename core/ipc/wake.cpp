@@ -26,7 +26,8 @@ void pause_cpu() {
 } // namespace
 
 void wake(WakeWord &word) {
-    // SYNC POINT with wake_count (its acquire load): entries pushed before are visible to a reader of the new count.
+    // SYNC POINT with wake_count (its acquire load): entries that were pushed before are visible to a reader of the
+    // new count.
     // The kernel re-reads the word under the futex lock, so a sleeper either sees the new count or is woken.
     word.count.fetch_add(1, std::memory_order_release);
     futex(word.count, FUTEX_WAKE, INT_MAX, nullptr);
@@ -63,7 +64,7 @@ DoorbellPair make_doorbell() {
 }
 
 void ring_doorbell(int worker_end) {
-    // If the buffer is full, the host has been notified already.
+    // An error is ignored: if the buffer is full, the host has been notified already.
     (void)::send(worker_end, "!", 1, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Wake-ups between host and worker. Both are hints; the rings' positions decide.
+// Wake-ups between host and worker, one mechanism for each direction. Both are only hints: after a wake-up, the
+// receiver checks the positions of the ring.
 //
-// Host → worker: a futex on a counter in the host's page. Incrementing it never blocks, and the worker cannot modify
-// it, as it waits on a read-only mapping.
-// Worker → host: a byte on a socket pair, sent with MSG_DONTWAIT. The host's epoll covers it, and no flag that the
-// worker sets on its end can make the host block (with an eventfd, both ends would share O_NONBLOCK).
+// Host → worker: a futex on a counter in the host's page. The host increments it without blocking; the worker cannot
+// modify it, because its mapping is read-only.
+// Worker → host: a byte on a socket pair, sent with MSG_DONTWAIT. The host waits for it with epoll. No flag that
+// the worker sets on its end can make the host block. (The ends of an eventfd would share the flag O_NONBLOCK.)
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -16,31 +17,32 @@
 
 namespace arhost::ipc {
 
-// In the waker's page.
+// The counter; part of the page of the side that calls `wake`.
 struct WakeWord {
     alignas(64) std::atomic<std::uint32_t> count;
 };
 
-// Increments the count and wakes all waiters. Only the page's writer may call it.
+// Increments the count and wakes all waiters. Only the process that has mapped the page writable may call it.
 void wake(WakeWord &word);
 
-// The current count. Read it, check for work, and only then wait for it to change, so that no wake-up is lost.
+// Returns the current count. To lose no wake-up, read the count first, then check for work, and only then wait for
+// the count to change.
 std::uint32_t wake_count(const WakeWord &word);
 
-// Waits until the count differs from `seen`; false after `timeout`. Polls for `spin` first, which avoids the 20 µs
-// of a sleep if a core is free.
+// Waits until the count differs from `seen`; returns false after `timeout`. Polls the count for the duration `spin`
+// before it sleeps: if a core is free, this avoids the 20 µs that a sleep costs.
 bool wait_for_wake(const WakeWord &word, std::uint32_t seen, std::chrono::nanoseconds timeout,
                    std::chrono::nanoseconds spin = std::chrono::nanoseconds(0));
 
 struct DoorbellPair {
-    base::UniqueFd host;   // readable once rung
-    base::UniqueFd worker; // for ring_doorbell
+    base::UniqueFd host;   // readable after ring_doorbell
+    base::UniqueFd worker; // passed to ring_doorbell
 };
 DoorbellPair make_doorbell();
 void ring_doorbell(int worker_end);
 
-// Drains the doorbell and returns the number of rings, at most 4096 per call to bound the host's time; -1 if the
-// other end is closed.
+// Reads all rings of the doorbell and returns their number, or -1 if the other end is closed. Reads at most 4096 per
+// call, which bounds the time that the host spends.
 int drain_doorbell(int host_end);
 
 } // namespace arhost::ipc

@@ -8,13 +8,13 @@
 
 namespace arhost::sandbox {
 
-// Root keeps CAP_DAC_OVERRIDE, to write files of other users as in a container with mounted volumes; Landlock and the
-// mounts restrict which files. Other users keep no capability.
+// Root keeps CAP_DAC_OVERRIDE, because in a container it may have to write files of other users in mounted volumes;
+// Landlock and the mounts limit which files it can write. Other users keep no capability.
 Layer drop_capabilities() {
     const unsigned kept = CAP_DAC_OVERRIDE, mask = ::geteuid() == 0 ? 1u << kept : 0;
     for (unsigned capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability)
         if (capability != kept || !mask)
-            ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail; capset below drops the rest
+            ::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0); // may fail; the call of capset below is decisive
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     __user_cap_data_struct data[2] = {};
     if (::syscall(SYS_capget, &header, data) != 0)

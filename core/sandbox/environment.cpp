@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Environment variables: some hold secrets (tokens, keys), others are needed by libraries and drivers.
+// Removes environment variables: some contain secrets (tokens, keys); others are kept because libraries and drivers
+// need them.
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// Read by common libraries and not secret. A wildcard is used only if no secret matches it.
+// Variables that common libraries read and that are not secret. The wildcards match no known variable with a secret.
 constexpr const char *kept[] = {
     // the user and the system
     "HOME", "LANG", "LANGUAGE", "LC_*", "LD_*", "LOGNAME", "PATH", "SHELL", "TERM", "TMPDIR", "TZ", "TZDIR", "USER",
@@ -28,7 +29,7 @@ constexpr const char *kept[] = {
     // language runtimes and tools
     "PYTHON*", "VIRTUAL_ENV", "CONDA_PREFIX", "RUST_BACKTRACE", "RUST_LOG", "ASAN_*", "LSAN_*", "MSAN_*", "TSAN_*",
     "UBSAN_*", "LLVM_PROFILE_FILE", "GCOV_*",
-    // arhost's own
+    // variables of arhost
     "ARHOST_*"};
 
 bool is_kept(const Policy &policy, std::string_view entry) {

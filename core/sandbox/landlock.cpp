@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Landlock: restricts file access, and in newer kernels TCP, signals and abstract sockets. Uses raw system calls and
-// its own constants, as Debian 12's headers have only versions 1 and 2.
+// defines the constants here, because Debian 12's headers contain only versions 1 and 2 of Landlock.
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct RulesetAttributes {
-    std::uint64_t handled_files, handled_network, scoped; // since versions 1, 4, 6
+    std::uint64_t handled_files, handled_network, scoped; // available since version 1, 4 and 6, respectively
 };
 struct __attribute__((packed)) PathBeneath {
     std::uint64_t allowed;
@@ -28,16 +28,16 @@ namespace access {
 constexpr std::uint64_t execute = 1 << 0, write_file = 1 << 1, read_file = 1 << 2, read_folder = 1 << 3,
                         remove_folder = 1 << 4, remove_file = 1 << 5, make_folder = 1 << 7, make_file = 1 << 8,
                         refer = 1 << 13, truncate = 1 << 14, ioctl_device = 1 << 15;
-// The only accesses valid in rules for files.
+// The accesses that are valid in rules for files (not folders).
 constexpr std::uint64_t of_files = execute | write_file | read_file | truncate | ioctl_device;
 constexpr std::uint64_t read = read_file | read_folder;
-// Excludes making links, pipes and sockets, which could trap other programs that open files there.
+// Does not include the creation of links, pipes and sockets, which could harm other programs that open files there.
 constexpr std::uint64_t write =
     read | write_file | truncate | remove_folder | remove_file | make_folder | make_file | refer;
 constexpr std::uint64_t device = read | write_file | truncate | ioctl_device;
 } // namespace access
 
-// All file accesses that a Landlock version can restrict.
+// Returns all file accesses that a version of Landlock can restrict.
 std::uint64_t handled_by(long version) {
     const int bits = version >= 5 ? 16 : version >= 3 ? 15 : version >= 2 ? 14 : 13;
     return (std::uint64_t(1) << bits) - 1;
@@ -56,7 +56,7 @@ public:
     Ruleset &operator=(const Ruleset &) = delete;
 
     explicit operator bool() const { return fd_ >= 0; }
-    // Ignores missing paths.
+    // Allows `access` to `path` and everything below it. Ignores paths that do not exist.
     void allow(const fs::path &path, std::uint64_t access) {
         const int fd = ::open(path.c_str(), O_PATH | O_CLOEXEC);
         struct stat status {};
@@ -80,7 +80,7 @@ Layer enter_landlock(const Policy &policy) {
     Layer layer{"landlock", "", ""};
     const long version = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, create_version);
     if (version < 1) {
-        layer.missing = error_text("not in this kernel, or disabled");
+        layer.missing = error_text(errno == EOPNOTSUPP ? "disabled at boot" : "not in this kernel");
         return layer;
     }
     RulesetAttributes attributes{handled_by(version), 0, 0};
@@ -96,7 +96,7 @@ Layer enter_landlock(const Policy &policy) {
     }
     Ruleset rules(attributes, size);
     if (!rules) {
-        layer.missing = error_text("creating the ruleset");
+        layer.missing = error_text("cannot create the ruleset");
         return layer;
     }
     const std::uint64_t execute = may_start_processes(policy) ? access::execute : 0;
@@ -110,7 +110,7 @@ Layer enter_landlock(const Policy &policy) {
     if (policy.allows("video"))
         rules.allow("/dev", access::read_folder); // to enumerate cameras
     if (!rules.enforce()) {
-        layer.missing = error_text("not enforced");
+        layer.missing = error_text("cannot enforce the ruleset");
         return layer;
     }
     layer.active = "version " + std::to_string(version) + ", files";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The layers, in the order in which sandbox::enter applies them. Order matters: a layer may remove rights that an
-// earlier one needs.
+// The layers of the sandbox, in the order in which sandbox::enter applies them. The order matters, because a layer
+// may remove rights that are needed to apply another layer; that layer must come first.
 #pragma once
 
 #include "sandbox/sandbox.hpp"
@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-// Sanitizers reserve terabytes of addresses, and start processes.
+// Code built with sanitizers needs exceptions: sanitizers reserve terabytes of address space and start processes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ARHOST_UNDER_SANITIZER 1
 #elif defined(__has_feature)
@@ -39,7 +39,7 @@ inline bool may_start_processes(const Policy &policy) {
     return under_sanitizer || policy.allows("processes");
 }
 
-// Memory that RLIMIT_DATA does not count: memfds, shared anonymous mappings.
+// Whether the process may use memory that RLIMIT_DATA does not count: memfds and shared anonymous mappings.
 inline bool may_share_memory(const Policy &policy) {
     return policy.makes_shared_memory || policy.allows("gpu") || policy.allows("display") ||
            policy.allows("processes");
@@ -49,16 +49,16 @@ inline bool has_memory_limit(const Policy &policy) {
 }
 
 void drop_environment(const Policy &policy); // cannot fail
-Layer raise_oom_score();                     // the OOM killer takes workers first; needs /proc writable
+Layer raise_oom_score();                     // the OOM killer kills workers first; must run while /proc is writable
 Layer enter_namespaces(const Policy &policy);
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();
-Layer enter_landlock(const Policy &policy); // needs no_new_privs, as does the next
+Layer enter_landlock(const Policy &policy); // this layer and the next one require no_new_privs
 Layer filter_system_calls(const Policy &policy);
 
-// The paths that a policy grants, with wildcards expanded; missing ones are omitted.
+// The paths to which a policy grants access, with wildcards expanded. Patterns that match nothing are omitted.
 struct Paths {
-    std::vector<std::filesystem::path> readable, devices; // devices: read, write, ioctl
+    std::vector<std::filesystem::path> readable, devices; // devices may be read, written and controlled with ioctl
 };
 Paths paths_of(const Policy &policy);
 

@@ -9,7 +9,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// Lowers soft and hard limit to at most `maximum`.
+// Lowers the soft and the hard limit to `maximum` if they are higher.
 void lower(Layer &layer, const char *name, __rlimit_resource resource, rlim_t maximum) {
     rlimit limit{};
     ::getrlimit(resource, &limit);
@@ -39,13 +39,14 @@ Layer raise_oom_score() {
 
 Layer set_limits(const Policy &policy) {
     Layer layer{"limits", "", ""};
-    // Private writable memory including thread stacks. RLIMIT_AS would also count reserved address space.
+    // RLIMIT_DATA counts private writable memory, including thread stacks. RLIMIT_AS would also count reserved
+    // address space.
     if (has_memory_limit(policy))
         lower(layer, "memory", RLIMIT_DATA, policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory());
     if (policy.writable.empty() && !may_share_memory(policy))
-        lower(layer, "files", RLIMIT_FSIZE, 0); // protects /tmp even without other layers
-    // Half of the usual 1024: descriptors in unread messages count against one limit for all processes of a user, and
-    // a plugin must not exhaust it for the host and the scene loader.
+        lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
+    // Half of the usual 1024, because all descriptors in unread messages of a user's processes count towards one
+    // limit, and a plugin must not exhaust it: the host and the scene loader need it, too.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);

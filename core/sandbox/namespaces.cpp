@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Namespaces: no network, a read-only file system except for a few folders, and few devices. This also blocks what
-// Landlock does not handle: changes to owners, modes, times and attributes of files.
+// Namespaces: no network, a file system that is read-only except for a few folders, and only a few devices. This also
+// prevents changes to owners, modes, times and attributes of files, which Landlock cannot restrict.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -17,7 +17,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// False if the namespace is unavailable or the user cannot be mapped.
+// Returns false if the user namespace is unavailable or the user cannot be mapped.
 bool enter_user_namespace() {
     const uid_t user = ::geteuid();
     const gid_t group = ::getegid();
@@ -26,12 +26,13 @@ bool enter_user_namespace() {
     const auto write = [](const char *file, const std::string &text) {
         return static_cast<bool>(std::ofstream(file) << text << std::flush);
     };
-    return write("/proc/self/setgroups", "deny") && // required before mapping a group
+    return write("/proc/self/setgroups", "deny") && // required before a group can be mapped
            write("/proc/self/uid_map", std::to_string(user) + " " + std::to_string(user) + " 1") &&
            write("/proc/self/gid_map", std::to_string(group) + " " + std::to_string(group) + " 1");
 }
 
-// Tried in a child: some systems allow the namespace but not the mapping, and a process cannot leave it again.
+// Tries it in a child process: some systems allow the namespace but not the mapping, and a process cannot leave the
+// namespace again.
 bool can_enter_user_namespace() {
     const pid_t child = ::fork();
     if (child == 0)
@@ -52,11 +53,12 @@ bool bind_mount(const std::filesystem::path &path) {
     return ::mount(path.c_str(), path.c_str(), nullptr, MS_BIND | MS_REC, nullptr) == 0;
 }
 
-// False with errno if it fails.
+// Makes the mounts read-only except for the folders and devices of `policy`. Returns false and sets errno on failure.
 bool restrict_mounts(const Policy &policy) {
-    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation to or from outside
+    if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation of mounts
         return false;
-    // Separate mounts for folders and devices that keep their flags; read-only file systems are skipped.
+    // Creates separate mounts for the folders and devices, so that they can have other flags than the rest. Skips
+    // folders in read-only file systems.
     std::vector<std::filesystem::path> writable;
     for (const std::filesystem::path &folder : policy.writable) {
         struct statvfs found {};
@@ -84,7 +86,7 @@ Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
     const auto active = [&](const char *what) { add_to(layer.active, what); };
     const auto missing = [&](const char *what) { add_to(layer.missing, error_text(what)); };
-    // Root can unshare without a user namespace, in which it would lose access to other users' files.
+    // Root does not need a user namespace, and in one it would lose access to the files of other users.
     const bool is_root = ::geteuid() == 0;
     if (!is_root) {
         if (!can_enter_user_namespace() || !enter_user_namespace()) {

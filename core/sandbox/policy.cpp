@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 using PathList = std::initializer_list<const char *>;
 
-// What libraries commonly need. Excludes /home, /tmp, /run and other processes' /proc.
+// Paths that libraries commonly need. Does not include /home, /tmp, /run and the /proc folders of other processes.
 constexpr PathList system_readable = {"/usr",
                                       "/lib",
                                       "/lib32",
@@ -37,7 +37,7 @@ constexpr PathList system_readable = {"/usr",
                                       "/etc/drirc",
                                       "/etc/python3",
                                       "/etc/mime.types",
-                                      "/dev/zero", // read-only: mapping it writable makes uncounted shared memory
+                                      "/dev/zero", // read-only: a writable mapping would be uncounted memory
                                       "/proc/self",
                                       "/proc/cpuinfo",
                                       "/proc/meminfo",
@@ -83,7 +83,7 @@ void append(std::vector<fs::path> &paths, PathList patterns) {
     }
 }
 
-// The folders in a colon-separated variable.
+// Appends the folders in a colon-separated environment variable.
 void append_folders(std::vector<fs::path> &paths, const char *variable) {
     const char *value = std::getenv(variable);
     std::istringstream list(value ? value : "");

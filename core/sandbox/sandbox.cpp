@@ -15,7 +15,7 @@ Layer set_no_new_privileges() {
     return {"no_new_privs", "yes", ""};
 }
 
-// Gives each plugin its own folder for the GPU driver's shader cache.
+// Gives each plugin a separate folder for the shader cache of the GPU driver.
 void add_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
     const char *caches = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
     if (policy.mode == Mode::none || !policy.allows("gpu") || (!caches && !home))
@@ -52,7 +52,7 @@ Level enter(const Policy &policy) {
     if (policy.mode == Mode::none)
         return level;
     for (const std::filesystem::path &folder : policy.writable) {
-        std::error_code ignored; // reported by whoever writes there
+        std::error_code ignored; // a later write to the folder reports the error
         std::filesystem::create_directories(folder, ignored);
     }
     drop_environment(policy);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Restrictions that a process applies to itself before it runs untrusted code or reads untrusted data
-// (docs/security.md). The layers overlap: if a machine lacks one, others cover part of it. None needs privileges.
+// (docs/security.md). The layers overlap: if a layer is missing on a machine, others cover part of it. None of them
+// needs privileges.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -16,35 +17,35 @@
 
 namespace arhost::sandbox {
 
-// Permissions beyond computing: the values of arhost_descriptor.needs and of the key `allow`.
+// Permissions beyond the default: the valid values in arhost_descriptor.needs and of the key `allow`.
 constexpr std::array<std::string_view, 6> allowances = {"video", "usb", "gpu", "display", "network", "processes"};
 
 enum class Mode {
-    permissive = 1, // every layer that the machine supports
-    strict,         // all layers, or an exception
+    permissive = 1, // applies every layer that the machine supports
+    strict,         // applies all layers; throws if one is incomplete
     none            // no sandbox, for debuggers
 };
 
 struct Policy {
     Mode mode = Mode::permissive;
-    std::set<std::string, std::less<>> allow{}; // of `allowances`
-    // Absolute paths; folders include their contents. System libraries and settings are always readable.
+    std::set<std::string, std::less<>> allow{}; // elements of `allowances`
+    // Absolute paths; a folder includes its contents. System libraries and settings are always readable.
     std::vector<std::filesystem::path> readable{};
     std::vector<std::filesystem::path> writable{};    // folders; created if missing
-    std::set<std::string, std::less<>> environment{}; // variables to keep besides the standard ones
-    std::uint64_t memory_bytes = 0;                   // private memory; 0: three quarters of the machine's
-    bool makes_shared_memory = false;                 // needed by the scene loader; bypasses memory_bytes
+    std::set<std::string, std::less<>> environment{}; // variables to keep in addition to the standard ones
+    std::uint64_t memory_bytes = 0;   // limit of private memory; 0: three quarters of the memory of the machine
+    bool makes_shared_memory = false; // set for the scene loader; such memory does not count towards memory_bytes
 
     bool allows(std::string_view what) const { return allow.contains(what); }
 };
 
-// Whether `path` is `folder` or below it. Compares names only: both must be canonical.
+// Whether `path` is `folder` or a path below it. Compares only names, so both must be canonical.
 bool contains(const std::filesystem::path &folder, const std::filesystem::path &path);
 
-// Grants read access to a path named by an option (absolute); false if it is missing or too broad: a folder that
-// contains the home folder, or anything in /dev, /proc or /sys.
+// Grants read access to an absolute path that an option names. Returns false if the path does not exist or is too
+// broad: a folder that contains the home folder, or a path in /dev, /proc or /sys.
 bool allow_read(Policy &policy, const std::filesystem::path &file);
-// The same; for a printf pattern (frame-%04d.png), its folder.
+// Like allow_read. If the path is a printf pattern (frame-%04d.png), grants access to its folder.
 void allow_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);
 
 constexpr std::array<std::string_view, 3> modes = {"permissive", "strict", "none"};
@@ -53,26 +54,27 @@ Mode mode_of(std::string_view text);
 nlohmann::json to_json(const Policy &policy);
 Policy policy_from_json(const nlohmann::json &json); // throws nlohmann::json::exception
 
-// Whether it can be in Policy::environment: not empty, no "=", no blanks.
+// Whether `name` is valid in Policy::environment: not empty, and without "=", blanks and control characters.
 bool is_variable_name(std::string_view name);
 
-// State of one layer on this machine.
+// Result of applying one layer on this machine.
 struct Layer {
     std::string name;
-    std::string active;  // what is enforced; "": nothing
-    std::string missing; // what is not, and why; "": nothing
+    std::string active;  // the restrictions that are enforced; "": none
+    std::string missing; // the restrictions that are not enforced, and why; "": none
 };
 using Level = std::vector<Layer>;
 
 bool complete(const Level &level);
-// "no_new_privs: yes; namespaces: user, net; … MISSING landlock: not in this kernel".
+// Returns, for example, "no_new_privs: yes; namespaces: user, net; … MISSING landlock: not in this kernel".
 std::string to_text(const Level &level);
 
 // Permanently sandboxes the calling process, which must be single-threaded. Returns the state of each layer; throws
 // std::runtime_error if a layer is incomplete and the mode is strict. Mode::none does nothing.
 Level enter(const Policy &policy);
 
-// The same for a process that will open `plugin`; its folder, and that of a link's target, become readable.
+// Like enter, for a process that will open `plugin`. Also makes the folder of `plugin` readable, and, if `plugin` is
+// a link, the folder of its target.
 Level enter_for(const std::filesystem::path &plugin, Policy policy);
 
 } // namespace arhost::sandbox

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// seccomp filter: denies system calls that no plugin needs with EPERM (libseccomp). A deny list, as an allow list
-// would break with new drivers and C libraries.
+// seccomp filter (libseccomp): system calls that no plugin needs fail with EPERM. This is a deny list, because an
+// allow list would break with new drivers and C libraries.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -18,7 +18,7 @@
 namespace arhost::sandbox {
 namespace {
 
-// Calls newer than Debian 12's libseccomp, by number; the numbers are the same on every architecture.
+// System calls that Debian 12's libseccomp does not know by name. Their numbers are the same on all architectures.
 constexpr std::pair<const char *, int> newer_calls[] = {
     {"fchmodat2", 452}, {"setxattrat", 463}, {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
 
@@ -74,7 +74,7 @@ private:
     bool failed_ = false;
 };
 
-// The kernel uses the lower 32 bits of these arguments; the filter must ignore the upper ones.
+// Compares only the lower 32 bits: the kernel ignores the upper bits of these arguments.
 scmp_arg_cmp equals(unsigned argument, std::uint64_t value) {
     return {argument, SCMP_CMP_MASKED_EQ, 0xffffffffu, value & 0xffffffffu};
 }
@@ -88,18 +88,19 @@ scmp_arg_cmp from(unsigned argument, std::uint64_t value) {
     return {argument, SCMP_CMP_GE, value, 0};
 }
 
-// Allows calls that target this process only; thread and group IDs could belong to others.
+// Denies calls that could affect other processes: the target must be this process. Other ids are denied, because they
+// could belong to threads or groups of other processes.
 void deny_reaching_others(Filter &filter, bool has_children) {
     const auto self = static_cast<std::uint64_t>(::getpid());
     if (!has_children) {
         for (const char *call : {"kill", "tgkill", "rt_sigqueueinfo", "rt_tgsigqueueinfo"})
             filter.deny(call, {differs(0, self)});
-        for (const char *call : {"setpgid", "setsid"}) // group signals must reach this worker only
+        for (const char *call : {"setpgid", "setsid"}) // a signal to the process group must reach only this worker
             filter.deny(call);
     } else {
-        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: all processes. Landlock restricts single ones
+        filter.deny("kill", {equals(0, 0xffffffff)}); // -1: all processes. Landlock restricts others
     }
-    // 0 is the caller. Other processes of the same user could otherwise be changed.
+    // 0 means the calling process. Other values could change other processes of the same user.
     for (const char *call :
          {"prlimit64", "sched_setaffinity", "sched_setscheduler", "sched_setparam", "sched_setattr"})
         filter.deny(call, {differs(0, 0)});
@@ -115,14 +116,15 @@ void deny_reaching_others(Filter &filter, bool has_children) {
         filter.deny("ioctl", {equals(1, request)});
     for (const unsigned long request : {0x40086602ul /* FS_IOC_SETFLAGS */, 0x401c5820ul /* FS_IOC_FSSETXATTR */})
         filter.deny("ioctl", {equals(1, request)});
-    // LeakSanitizer's tracer process needs PDEATHSIG: if it survived the worker, it would wait forever for a lock,
-    // and the traced worker could not be reaped.
+    // The tracer process of LeakSanitizer needs PR_SET_PDEATHSIG: if the tracer survived the worker, it would wait
+    // forever for a lock, and the traced worker could not be reaped.
     if (!under_sanitizer)
         filter.deny("prctl", {equals(0, PR_SET_PDEATHSIG)});
 }
 
 void deny_new_processes(Filter &filter, bool may_fork) {
-    // clone3 has its flags in memory, invisible to the filter; on ENOSYS libraries fall back to clone.
+    // The filter cannot see the flags of clone3, because they are in memory. After ENOSYS, libraries use clone
+    // instead.
     filter.deny("clone3", {}, ENOSYS);
     for (const std::uint64_t flag :
          {CLONE_NEWNS, CLONE_NEWCGROUP, CLONE_NEWUTS, CLONE_NEWIPC, CLONE_NEWUSER, CLONE_NEWPID, CLONE_NEWNET})
@@ -142,22 +144,22 @@ void deny_sockets(Filter &filter, const Policy &policy) {
         families.insert({AF_INET, AF_INET6, AF_NETLINK}); // getaddrinfo uses netlink
     if (policy.allows("usb"))
         families.insert(AF_NETLINK); // hot-plug events
-    constexpr unsigned end = 64;     // above all families
+    constexpr unsigned end = 64;     // higher than all address families
     for (unsigned family = 0; family < end; ++family)
         if (!families.contains(family))
             filter.deny("socket", {equals(0, family)});
     filter.deny("socket", {from(0, end)});
     if (!families.contains(AF_UNIX))
-        for (const int type : {SOCK_DGRAM, SOCK_RAW}) // these types can send to any socket
+        for (const int type : {SOCK_DGRAM, SOCK_RAW}) // sockets of these types can send to any socket
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
 }
 
-// Memory that RLIMIT_DATA does not count.
+// Denies calls that allocate memory that RLIMIT_DATA does not count.
 void deny_uncounted_memory(Filter &filter) {
     for (const char *call : {"memfd_create", "memfd_secret", "shmget"})
         filter.deny(call);
     filter.deny("mmap", {has_bits(3, MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED | MAP_ANONYMOUS)});
-    filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // would count as stack
+    filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // such a mapping would count as stack
 }
 
 } // namespace
@@ -168,14 +170,14 @@ Layer filter_system_calls(const Policy &policy) {
     for (const char *call : denied)
         if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
             filter.deny(call);
-    filter.deny("utimensat", {differs(1, 0)}); // futimens passes a null path and stays allowed
+    filter.deny("utimensat", {differs(1, 0)}); // futimens passes a null path and remains allowed
     deny_reaching_others(filter, may_start_processes(policy));
     deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);
     if (!filter.valid() || !filter.load())
-        layer.missing = error_text("loading the filter");
+        layer.missing = error_text("cannot load the filter");
     else
         layer.active = "yes";
     return layer;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-launcher: started by the host (supervise/launcher.hpp) with their socket as descriptor 3. Starts workers,
-// reports how they exited, and kills the processes that they leave behind.
+// arhost-launcher: started by the host (supervise/launcher.hpp) with a socket to the host as descriptor 3. Starts
+// workers, reports how they exited, and kills the processes that they leave behind.
 #include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "supervise/launcher_protocol.hpp"
@@ -23,19 +23,21 @@ using namespace arhost::supervise;
 using arhost::base::kill_orphans;
 using arhost::base::UniqueFd;
 
-// In the child, after fork: control channel and doorbell as descriptors 3 and 4, as arhost-worker expects them.
+// Runs in the child after fork. Executes arhost-worker, with the control channel as descriptor 3 and the doorbell as
+// descriptor 4.
 [[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
-    // Its own group: a kill reaches what it forks, and the terminal's Ctrl-C reaches the host only.
+    // A separate process group, so that a kill of the group reaches the processes that the worker forks, and Ctrl-C
+    // in the terminal reaches only the host.
     ::setpgid(0, 0);
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_DFL);
     ::signal(SIGHUP, SIG_IGN);
-    ::signal(SIGPIPE, SIG_IGN); // and SIGXFSZ, which the host ignores too: a full disk is an error value
+    ::signal(SIGPIPE, SIG_IGN); // writes to a closed pipe return EPIPE instead
     const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
     char *const argv[] = {const_cast<char *>(program), nullptr};
     const int output = fds[2].get();
     arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, launcher);
-    const char message[] = "arhost-worker cannot be executed; is it installed beside arhost?\n";
+    const char message[] = "arhost-worker cannot be executed; is it installed in the same folder as arhost?\n";
     (void)!::write(STDERR_FILENO, message, sizeof message - 1);
     ::_exit(127);
 }
@@ -52,10 +54,10 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
         send_struct(socket, reply);
         return;
     }
-    // No race: the child remains a zombie until this process reaps it.
+    // The pid cannot be reused before this call, because the child remains a zombie until this process reaps it.
     const UniqueFd pidfd(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
     reply.exit.pid = pid;
-    if (!pidfd) { // forbidden in this container, or out of descriptors
+    if (!pidfd) { // for example, the container forbids pidfd_open, or no descriptor is free
         reply.kind = Reply::failed;
         reply.error = errno;
         ::kill(pid, SIGKILL);
@@ -67,12 +69,13 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
     send_struct(socket, reply, {pidfd.get()});
 }
 
-// The host has exited: kills the workers and their children. Uses _exit, as a sanitizer's leak check at exit would
-// stop this process, which conflicts with the SIGCONT of a waiting host.
+// Called after the host has exited. Kills the workers and their children, and exits. Uses _exit, because the leak
+// check of a sanitizer would stop this process at a normal exit, which conflicts with the SIGCONT that a waiting host
+// sends.
 [[noreturn]] void end_all(const std::set<pid_t> &spawned) {
     for (const pid_t worker : spawned)
         ::kill(-worker, SIGKILL);
-    for (int i = 0; i < 500; ++i) { // does not wait for a process that hangs in the kernel
+    for (int i = 0; i < 500; ++i) { // gives up after half a second, because a process may hang in the kernel
         kill_orphans({});
         pid_t reaped;
         while ((reaped = ::waitpid(-1, nullptr, WNOHANG)) > 0) {
@@ -93,8 +96,8 @@ void reap(int socket, std::set<pid_t> &spawned) {
         if (reply.exit.pid <= 0)
             return (void)kill_orphans(spawned);
         if (spawned.erase(reply.exit.pid) == 0)
-            continue;                     // a worker's orphan
-        ::kill(-reply.exit.pid, SIGKILL); // its children; kill_orphans finds those that left its group
+            continue;                     // an orphan of a worker
+        ::kill(-reply.exit.pid, SIGKILL); // kill_orphans kills children that have left the group
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -111,14 +114,14 @@ int main() {
     }
     ::fcntl(launcher_fd, F_SETFD, FD_CLOEXEC);
     ::syscall(SYS_close_range, launcher_fd + 1u, ~0u, 0u);
-    // The closed socket shows that the host has exited. SIGCONT instead of SIGKILL: a stopped launcher must continue
-    // to clean up.
+    // When the host exits, its end of the socket is closed, which makes this process clean up. The parent-death
+    // signal is SIGCONT instead of SIGKILL, because a stopped launcher must continue in order to clean up.
     ::prctl(PR_SET_PDEATHSIG, SIGCONT);
-    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // adopts the orphans of workers
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // makes the orphans of workers children of this process
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGHUP, SIG_IGN);
-    ::signal(SIGCHLD, SIG_DFL); // if inherited as ignored, the exits of children would be lost
+    ::signal(SIGCHLD, SIG_DFL); // if ignored (inherited), the exit statuses of children would be lost
     sigset_t child;
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);

@@ -18,8 +18,9 @@ bool is_valid_status(arhost_kind kind, arhost_status status) {
     return status == ARHOST_STATUS_OK || (status < 0 && status >= ARHOST_STATUS_ERROR_INTERNAL);
 }
 
-// Errors that a restart may fix: a new process reopens its device and starts with free memory. The host restarts a
-// source after any error, and disables a sink.
+// Whether a restart may fix the error `status` of a tracker or ray tracer: a new process reopens its device and
+// starts with free memory. Errors of the other kinds are handled by the host: it restarts a source and disables a
+// sink.
 bool needs_new_process(arhost_kind kind, arhost_status status) {
     return (kind == ARHOST_KIND_TRACKER || kind == ARHOST_KIND_RAYTRACER) &&
            (status == ARHOST_STATUS_ERROR_DEVICE_LOST || status == ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
@@ -60,7 +61,7 @@ void Component::spawn() {
     try {
         process_ = std::make_unique<Process>(context_, name_, std::move(callbacks),
                                              encode(messages::Open{plugin().string(), sandbox_}));
-    } catch (const std::exception &error) { // out of processes or memory: treated like a death
+    } catch (const std::exception &error) { // handled like the death of a process
         state_ = State::waiting;
         return restart(error.what());
     }
@@ -179,7 +180,7 @@ void Component::on_ready(const Message &message) {
 void Component::on_attached(const messages::Attached &attached) {
     if (!attached.is_output || !pending_output_)
         return;
-    // The worker has its writable mapping; no other process gets one.
+    // The worker has mapped the memory writable. From now on, no other process can do so.
     Region &region = *pending_output_;
     region.memory.seal_future_writes();
     region.mapping = region.memory.map(Access::read_only);
@@ -209,12 +210,12 @@ void Component::on_result(const Result &result) {
     if (!is_valid_status(description_.kind, result.status))
         return process_->end("contract violation: its status is " + std::to_string(result.status));
     if (needs_new_process(description_.kind, result.status))
-        return process_->end(status_text(result.status)); // the command counts as unanswered, like after a crash
+        return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
     const Command command = in_flight_.front();
     in_flight_.pop_front();
     set_frame_deadline();
     callbacks_.result(command, result);
-    // Errors, and results that made the host end the process, do not count as completed frames.
+    // Errors do not count as completed frames, nor do results because of which the host terminates the process.
     if (result.status > 0 && process_ && !process_->ending())
         policy_.frame_done();
     if (stop_requested_)
@@ -245,12 +246,13 @@ void Component::on_died(const Death &death) {
     if (frame != Crash::no_frame)
         reason += ", at frame " + std::to_string(frame);
 
-    if (stop_response_) { // it had finished its work; a later crash does not matter
+    if (stop_response_) { // the plugin has finished its work, so a later crash does not matter
         if (crash)
             context_.log(ARHOST_SEVERITY_WARNING, name_, reason + ", after it had finished");
         return stopped(stop_response_->status, stop_response_->text);
     }
-    // Only a sink is restarted to stop, as it may have files to finish: once after a hang, more often after a crash.
+    // Of the components that die during stop, only a sink is restarted, because it may have to complete files: once
+    // after the host has killed it for a hang, more often after crashes.
     const bool is_sink = description_.kind == ARHOST_KIND_SINK;
     deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
     if (stop_sent_ && (!is_sink || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
@@ -259,7 +261,7 @@ void Component::on_died(const Death &death) {
     }
     if (!configuration_error_.empty())
         return give_up(configuration_error_, true);
-    // It died by itself before hello: its library is unusable.
+    // The process died before Hello, but the host did not kill it, so its library is unusable.
     if (description_.id.empty() && !death.by_host && death.signal != SIGKILL)
         return give_up(plugin().string() + ": " + death.how, true);
     restart(reason);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A supervised plugin: starts a worker, enforces its deadlines, restarts it if it dies or hangs, and disables it if
-// it keeps failing. The host submits commands and receives results and losses.
+// it keeps failing. The host submits commands; it receives results, and is notified of lost commands.
 #pragma once
 
 #include "ipc/messages.hpp"
@@ -13,11 +13,11 @@
 
 namespace arhost::supervise {
 
-// Slots in shared memory that one process writes and others read.
+// Shared memory with slots that one process writes and others read.
 struct Region {
     ipc::SharedMemory memory;
     ipc::SlotLayout layout;
-    ipc::Mapping mapping; // this process's view
+    ipc::Mapping mapping; // mapping in this process
     std::uint32_t generation = 0;
 };
 using RegionPointer = std::shared_ptr<const Region>;
@@ -33,49 +33,52 @@ public:
 
     struct Create {
         ipc::messages::Create message;
-        std::optional<int> arena_fd; // a ray tracer's
+        std::optional<int> arena_fd; // descriptor of the scene's arena; only for a ray tracer
     };
 
-    // All except `hello` and `ready` are called after the state has changed.
+    // All callbacks except `hello` and `ready` are called after the state has changed.
     struct Callbacks {
-        // The plugin has been opened. Returns how to create it; throws std::runtime_error if the configuration does
-        // not fit the plugin.
+        // Called when the plugin has been opened. Returns the parameters of its instance; throws std::runtime_error
+        // if the configuration does not match the plugin. `candidate`: index in the list of plugins.
         std::function<Create(const ipc::PluginDescription &, std::size_t candidate)> hello;
-        // It has started. Returns the layout of its output slots (count 0: none); throws if `ready` is unsuitable.
+        // Called when the plugin has started. Returns the layout of its output slots (count 0: no slots); throws if
+        // the values in `ready` are unsuitable.
         std::function<ipc::SlotLayout(const ipc::messages::Ready &ready)> ready;
         std::function<void()> running; // commands may be submitted
         std::function<void(const ipc::Command &, const ipc::Result &)> result;
-        // The process has died. The unanswered commands, oldest first; the worker was executing the first one.
+        // Called when the process has died. `unanswered`: the commands without a result, oldest first; the worker was
+        // executing the first one.
         std::function<void(const std::vector<ipc::Command> &unanswered)> lost;
-        // It will not be restarted.
+        // Called when the component will not be restarted.
         std::function<void(const std::string &reason, bool is_configuration_error)> disabled;
         std::function<void(arhost_status, const std::string &text)> stopped; // after stop()
         std::function<void()> end_requested;                                 // a sink's window was closed
     };
 
     struct Crash {
-        std::string plugin; // its id, or the file name if it died before hello
+        std::string plugin; // id of the plugin, or its file name if it died before Hello
         std::string how, log_tail;
-        std::uint64_t frame; // in process, or no_frame
+        std::uint64_t frame; // the frame that was being processed, or no_frame
         static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
     };
 
-    // `plugins`: the shared object, then its fallbacks. `policy` applies to all.
+    // `plugins`: the shared object of the plugin, followed by its fallbacks. `policy` applies to all of them.
     Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
               const base::Limits &limits, sandbox::Policy policy, Callbacks callbacks);
     Component(const Component &) = delete;
     Component &operator=(const Component &) = delete;
 
     void start();
-    // Waits for its commands in flight, calls the plugin's stop and waits for the exit. A dead component is restarted
-    // first, as it may have files to finish.
+    // Stops the component asynchronously: waits for the commands in flight, calls the plugin's `stop` and waits until
+    // the process has exited. If the process is dead, it is restarted first, because it may have to complete files.
     void stop();
-    void kill(); // at once, without restart
+    void kill(); // kills the process at once; it is not restarted
     void cancel_call();
-    // Ends the process, which is then restarted.
+    // Terminates the process, which is then restarted.
     void end_process(const std::string &reason);
 
-    // Whether it accepts commands. A process that is being ended does not, though results may still arrive.
+    // Whether commands may be submitted. While the process is being terminated, they may not, though results may
+    // still arrive.
     bool running() const { return state_ == State::running && !process_->ending(); }
     State state() const { return state_; }
     const std::string &name() const { return name_; }
@@ -83,11 +86,12 @@ public:
     const ipc::PluginDescription &description() const { return description_; }
     pid_t pid() const { return process_ ? process_->pid() : 0; }
 
-    // The output slots of the current process; null until it runs.
+    // The output slots of the current process; null until the state is `running`.
     const RegionPointer &output() const { return output_; }
 
     std::size_t in_flight() const { return in_flight_.size(); }
-    // Sets the ticket, attaches `input` first if it is new, and detaches inputs that nobody holds.
+    // Sets the ticket of the command and sends it. If the worker does not know `input` yet, attaches it first.
+    // Detaches inputs to which nothing refers any more.
     void submit(ipc::Command command, const RegionPointer &input = nullptr);
 
     std::uint32_t restarts() const { return restarts_; }
@@ -122,7 +126,7 @@ private:
     State state_ = State::idle;
     bool stop_requested_ = false, stop_sent_ = false;
     std::optional<ipc::messages::Stopped> stop_response_;
-    std::string configuration_error_, failure_; // from the worker's Failed
+    std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
     ipc::PluginDescription description_;
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> pending_output_;
@@ -139,7 +143,7 @@ private:
     std::minstd_rand jitter_{std::random_device{}()};
 };
 
-// A region that the host writes: mapped writable here, read-only elsewhere.
+// Creates a region that the host writes: it is mapped writable in this process, and read-only in the others.
 RegionPointer make_host_region(const char *name, const ipc::SlotLayout &layout);
 
 } // namespace arhost::supervise

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How a child process ended.
+// Exit status of a child process.
 #pragma once
 
 #include <sys/resource.h>
@@ -10,11 +10,11 @@ namespace arhost::supervise {
 
 struct Exit {
     pid_t pid;
-    int wait_status; // as from wait(2)
+    int wait_status; // as returned by wait(2)
     double cpu_seconds;
 };
 
-// User plus system time.
+// Returns user plus system time.
 inline double cpu_seconds(const rusage &usage) {
     const auto seconds = [](const timeval &t) {
         return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);

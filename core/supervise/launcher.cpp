@@ -32,7 +32,7 @@ Launcher::Launcher(std::filesystem::path program, std::chrono::milliseconds time
     : program_(std::move(program)), timeout_(timeout), unrelated_children_(base::children()) {
     if (::access(program_.c_str(), X_OK) != 0)
         throw std::runtime_error(start_error(errno));
-    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // adopts the orphans of a killed launcher
+    ::prctl(PR_SET_CHILD_SUBREAPER, 1); // makes the orphans of a killed launcher children of this process
 }
 
 std::string Launcher::start_error(int error) const {
@@ -40,7 +40,8 @@ std::string Launcher::start_error(int error) const {
            "; is it installed in the same folder as arhost?";
 }
 
-// posix_spawn instead of fork: this process may have threads, whose locks would stay locked in a forked child.
+// Uses posix_spawn instead of fork, because this process may have threads, whose locks would stay locked in the
+// child.
 void Launcher::start() {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
@@ -52,7 +53,7 @@ void Launcher::start() {
     ::posix_spawn_file_actions_adddup2(&actions, launcher_end.get(), launcher_fd);
     posix_spawnattr_t attributes;
     ::posix_spawnattr_init(&attributes);
-    // A process group of its own: it survives a signal to the host's group and can then kill the workers.
+    // A separate process group, so that the launcher survives a signal to the host's group and can kill the workers.
     ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     ::posix_spawnattr_setpgroup(&attributes, 0);
     std::string path = program_;
@@ -65,11 +66,11 @@ void Launcher::start() {
     socket_ = std::move(host_end);
 }
 
-// Sends SIGCONT while waiting, as a stopped launcher must not block the host.
+// Waits for a reply. Sends SIGCONT meanwhile, because a stopped launcher must not block the host.
 std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
     const auto deadline = Clock::now() + timeout_;
     pollfd ready{socket_.get(), POLLIN, 0};
-    // Polls once more after the deadline, as this process itself may have been stopped.
+    // Polls once more after the deadline, because this process itself may have been stopped.
     for (bool is_late = false;; is_late = Clock::now() > deadline) {
         const int count = ::poll(&ready, 1, is_late ? 0 : 50);
         if (count > 0)
@@ -87,19 +88,21 @@ std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
 }
 
 void Launcher::discard() {
-    ::kill(pid_, SIGKILL); // it may only have closed its socket
-    // Gives up on a launcher that hangs in the kernel or whose exit a debugger has not collected.
+    ::kill(pid_, SIGKILL); // the launcher may have closed its socket without exiting
+    // Waits for its exit, but gives up after half a second: the launcher may hang in the kernel, or a debugger may
+    // not have collected its exit status.
     for (int i = 0; i < 500 && ::waitpid(pid_, nullptr, WNOHANG) == 0; ++i)
         ::usleep(1000);
     std::vector<UniqueFd> fds;
-    // Collects its last reports. Does not wait: processes that are killed below may hold its end of the socket.
+    // Receives its last reports. Does not wait for the end of file, because processes that are killed only below may
+    // still have its end of the socket open.
     for (Reply reply; socket_ && receive_struct(socket_.get(), reply, fds, MSG_DONTWAIT);)
         if (reply.kind == Reply::exited)
             record(reply.exit);
     socket_.reset();
     is_lost_ = true;
     alive_.clear();
-    base::end_orphans(unrelated_children_); // processes that its workers have forked
+    base::end_orphans(unrelated_children_); // kills the processes that its workers have forked
 }
 
 Launcher::~Launcher() {
@@ -143,7 +146,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
 
         std::vector<UniqueFd> fds;
         const bool sent = send_struct(socket_.get(), request, {theirs.fd(), doorbell.worker.get(), output_end.get()});
-        if (!sent && errno != EPIPE && errno != ECONNRESET) // a resource limit, not a dead launcher
+        if (!sent && errno != EPIPE && errno != ECONNRESET) // the cause is a resource limit, not a dead launcher
             base::throw_errno("no process can be started");
         std::optional<Reply> reply;
         while (sent && (reply = receive_reply(fds)) && reply->kind == Reply::exited)
@@ -153,7 +156,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, const LogFunction 
             continue;
         }
         const bool has_failed = reply->kind == Reply::failed;
-        if (has_failed || fds.size() != 1 || !fds[0]) // or this process is out of descriptors
+        if (has_failed || fds.size() != 1 || !fds[0]) // without fds[0]: too many open files
             throw std::runtime_error(std::string("no process can be started: ") +
                                      std::strerror(has_failed ? reply->error : EMFILE));
         alive_.insert(reply->exit.pid);
@@ -180,7 +183,7 @@ Exit Launcher::wait_exit(pid_t pid) {
                 exits_.erase(it);
                 return found;
             }
-        if (!alive_.contains(pid)) // killed together with its launcher
+        if (!alive_.contains(pid)) // the process was killed together with its launcher
             return {pid, SIGKILL, 0};
         std::vector<UniqueFd> fds;
         if (const auto reply = receive_reply(fds))

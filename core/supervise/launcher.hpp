@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The launcher: arhost-launcher, a small single-threaded process, is the parent of all workers. It starts them on
-// request and reports how they exited. Workers die with it (PR_SET_PDEATHSIG follows the thread that forked), and it
-// exits with the host, so a killed host leaves no process behind. The host replaces a launcher that was killed or
-// does not respond, any number of times.
+// request and reports how they exited. The kernel kills the workers when the launcher dies (PR_SET_PDEATHSIG refers
+// to the thread that forked), and the launcher exits when the host exits, so a killed host leaves no process behind.
+// If the launcher is killed or does not respond, the host replaces it, any number of times.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -30,14 +30,14 @@ using LogFunction =
 struct Spawned {
     pid_t pid = 0;
     base::UniqueFd pidfd;    // readable once it has exited
-    ipc::Channel channel;    // its descriptor 3
-    base::UniqueFd doorbell; // its descriptor 4
-    base::UniqueFd output;   // its stdout and stderr
+    ipc::Channel channel;    // descriptor 3 of the worker
+    base::UniqueFd doorbell; // descriptor 4 of the worker
+    base::UniqueFd output;   // stdout and stderr of the worker
 };
 
 struct Reply;
 
-// Starts workers: the launcher, or a replacement (core/inprocess, tests).
+// Starts workers. Implemented by Launcher, and by replacements in core/inprocess and tests.
 class Starter {
 public:
     virtual ~Starter() = default;
@@ -49,12 +49,12 @@ public:
     virtual Exit wait_exit(pid_t pid) = 0;
 };
 
-// Create one per process, on the thread that lives longest: that thread becomes the parent of the launcher and of the
-// orphans of a killed launcher, which it kills.
+// Create only one Launcher per process, on the thread that lives longest: this thread becomes the parent of the
+// launcher, and of the orphans of a killed launcher, which the Launcher kills.
 class Launcher final : public Starter {
 public:
     // `program` is arhost-launcher; the first spawn starts it. Throws std::runtime_error if it cannot be executed.
-    // `timeout` limits each response and the final exit.
+    // `timeout`: maximum time for each response of the launcher, and for its exit.
     explicit Launcher(std::filesystem::path program, std::chrono::milliseconds timeout = std::chrono::seconds(4));
     ~Launcher() override;
     Launcher(const Launcher &) = delete;
@@ -66,17 +66,18 @@ public:
 private:
     std::string start_error(int error) const;
     void start();
-    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds); // nullopt: no launcher or no response
-    void discard();                                                       // the launcher and all its workers
+    // Returns nullopt if the launcher has died or does not respond.
+    std::optional<Reply> receive_reply(std::vector<base::UniqueFd> &fds);
+    void discard(); // kills the launcher and all its workers
     void record(const Exit &exit);
 
     std::filesystem::path program_;
     std::chrono::milliseconds timeout_;
-    std::set<pid_t> unrelated_children_; // inherited by exec, not workers
-    base::UniqueFd socket_;              // closed: no launcher is running
+    std::set<pid_t> unrelated_children_; // children that existed before; they are not workers
+    base::UniqueFd socket_;              // empty if no launcher is running
     pid_t pid_ = 0;
-    bool is_lost_ = false;  // and not yet replaced
-    std::set<pid_t> alive_; // the launcher's children
+    bool is_lost_ = false;  // the launcher was discarded and is not yet replaced
+    std::set<pid_t> alive_; // workers of the current launcher
     std::deque<Exit> exits_;
 };
 

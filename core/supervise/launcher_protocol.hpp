@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The messages between the host and arhost-launcher: plain structs, as both are of the same build.
+// The messages between the host and arhost-launcher: plain structs, because both come from the same build.
 #pragma once
 
 #include "ipc/fd_passing.hpp"
@@ -11,13 +11,13 @@
 namespace arhost::supervise {
 
 struct Request {
-    char program[PATH_MAX]; // comes with the descriptors control, doorbell and output
+    char program[PATH_MAX]; // accompanied by the descriptors of control channel, doorbell and output
 };
 
 struct Reply {
     enum Kind : int { spawned, failed, exited } kind;
-    int error; // errno of `failed`
-    Exit exit; // `spawned`: only the pid; comes with the pidfd
+    int error; // errno; only for `failed`
+    Exit exit; // for `spawned`, only the pid is set, and the pidfd accompanies the reply
 };
 
 // The launcher's end of the socket.

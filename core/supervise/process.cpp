@@ -14,7 +14,7 @@ namespace {
 
 using namespace ipc;
 
-// False if the worker is a thread (arhost-inprocess).
+// Sends a signal to a worker. Returns false if the worker is a thread (arhost-inprocess).
 bool signal_process(const base::UniqueFd &pidfd, int signal) {
     return ::syscall(SYS_pidfd_send_signal, pidfd.get(), signal, nullptr, 0) == 0 || errno != EBADF;
 }
@@ -29,7 +29,7 @@ Process::Process(Context &context, std::string name, Callbacks callbacks, const 
       host_page_(host_memory_.map(Access::read_write)), worker_page_(worker_memory_.map(Access::read_only)),
       commands_(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands),
       results_(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results) {
-    host_memory_.seal_future_writes(); // the worker can map it read-only
+    host_memory_.seal_future_writes(); // the worker can map this page only read-only
     Reactor &reactor = context_.reactor;
     channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { receive_messages(16); });
     doorbell_watch_ = reactor.watch(spawned_.doorbell.get(), [this] { on_doorbell(); });
@@ -46,11 +46,12 @@ Process::~Process() {
 void Process::send_json(const Json &body, std::initializer_list<int> fds) {
     if (spawned_.channel.send(body, fds, false))
         return;
-    // A full queue means that the worker has stopped receiving. The pidfd reports a dead worker.
+    // If the queue is full, the worker has stopped receiving. Other errors mean that the worker is dead, which the
+    // pidfd reports.
     if (errno == EAGAIN)
-        end("does not receive messages");
+        end("does not read its control messages");
     else if (errno == ETOOMANYREFS)
-        end("cannot receive its memory: this user's processes have too many file descriptors in flight "
+        end("its shared memory cannot be sent: this user's processes have too many file descriptors in flight "
             "(ETOOMANYREFS)");
 }
 
@@ -68,7 +69,7 @@ void Process::submit(const Command &command) {
 }
 
 void Process::request_cancel() {
-    host_page_.as<HostPage>().cancelled.store(1, std::memory_order_relaxed); // publishes no other data
+    host_page_.as<HostPage>().cancelled.store(1, std::memory_order_relaxed); // relaxed: no other data depends on it
     wake(host_page_.as<HostPage>().wake);
 }
 
@@ -76,7 +77,7 @@ void Process::end(const std::string &reason) {
     if (!end_reason_.empty())
         return;
     end_reason_ = reason;
-    if (!signal_process(spawned_.pidfd, SIGABRT)) { // a thread ends once its channel is closed
+    if (!signal_process(spawned_.pidfd, SIGABRT)) { // the worker is a thread, which ends when its channel is closed
         ::shutdown(spawned_.channel.fd(), SHUT_RDWR);
         wake(host_page_.as<HostPage>().wake);
     }
@@ -96,7 +97,7 @@ double Process::cpu_seconds() const {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// Bounded, so that a flood of messages cannot starve the frames.
+// Receives at most `max_messages`, so that a flood of messages cannot delay the frames.
 void Process::receive_messages(int max_messages) {
     for (int i = 0; i < max_messages; ++i) {
         Message message;
@@ -105,7 +106,7 @@ void Process::receive_messages(int max_messages) {
             return;
         case ReceiveState::closed:
             channel_watch_.cancel();
-            // Usually its exit follows. A worker that only closed its end is useless.
+            // The worker usually exits next. If it has only closed its end, it is useless.
             if (!ending())
                 kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
                                                      [this] { end("closed its control channel"); });
@@ -125,12 +126,13 @@ void Process::receive_messages(int max_messages) {
         } catch (const ProtocolViolation &violation) {
             return end(std::string("protocol violation: ") + violation.what());
         } catch (const std::exception &error) {
-            return end(std::string("cannot be served: ") + error.what());
+            return end(std::string("its message cannot be handled: ") + error.what());
         }
     }
 }
 
-// Limits the rate of a worker's log lines, separately for warnings, so that they remain visible.
+// Logs a line of the worker, unless the worker logs too many per second. Counts warnings separately, so that other
+// lines do not displace them.
 void Process::log(arhost_severity severity, const std::string &text) {
     constexpr int max_per_second = 100;
     append_to_tail(text);
@@ -150,7 +152,7 @@ void Process::report_suppressed_lines() {
          {std::pair{&other_lines_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
         if (lines->suppressed > 0)
             context_.log(severity, name_,
-                         std::to_string(lines->suppressed) + " more lines within a second suppressed");
+                         "suppressed " + std::to_string(lines->suppressed) + " more log lines within one second");
         *lines = {};
     }
 }
@@ -209,7 +211,7 @@ void Process::append_to_tail(const std::string &line) {
 }
 
 void Process::on_death() {
-    // Receives what it sent before it exited. The socket and pipe buffers bound the amount.
+    // Receives what the worker sent before it exited. The buffers of socket and pipe limit the amount.
     if (channel_watch_.active())
         receive_messages(100'000);
     receive_results();
@@ -224,7 +226,7 @@ void Process::on_death() {
     death.by_host = ending();
     death.signal = WIFSIGNALED(exit.wait_status) ? WTERMSIG(exit.wait_status) : 0;
     death.clean = WIFEXITED(exit.wait_status) && WEXITSTATUS(exit.wait_status) == 0;
-    // SYNC with Link::mark: relaxed suffices, as the writer has exited.
+    // SYNC with Link::mark: a relaxed load suffices, because the writer has exited.
     const auto call = static_cast<Call>(worker_page_.as<WorkerPage>().call.load(std::memory_order_relaxed));
     if (WIFSIGNALED(exit.wait_status))
         death.how = "killed by signal " + std::to_string(WTERMSIG(exit.wait_status)) + " (" +
@@ -240,7 +242,7 @@ void Process::on_death() {
     output_watch_.cancel();
     death_watch_.cancel();
     kill_deadline_.cancel();
-    const auto died = std::move(callbacks_.died); // which may destroy this object
+    const auto died = std::move(callbacks_.died); // moved out, because the callback may destroy this object
     died(death);
 }
 

@@ -25,47 +25,47 @@ struct Context {
 
 struct Death {
     std::string how;      // "killed by signal 11 (Segmentation fault) in per-frame"
-    bool clean = false;   // exit status 0
-    bool by_host = false; // the host ended it, for the reason in `how`
-    int signal = 0;       // that killed it; 0: it exited by itself
+    bool clean = false;   // exited with status 0
+    bool by_host = false; // the host terminated the process, for the reason in `how`
+    int signal = 0;       // the signal that killed the process; 0: it exited by itself
     double cpu_seconds = 0;
-    std::string log_tail; // the last 20 lines logged or printed
+    std::string log_tail; // the last 20 lines that the worker logged or printed
 };
 
 class Process {
 public:
-    // Called from the reactor. `died` is called last and once; only there the Process may be destroyed. An exception
-    // from `message` ends the process.
+    // Called from the reactor. `died` is called once, as the last callback, and is the only one that may destroy the
+    // Process. If `message` throws, the process is terminated.
     struct Callbacks {
-        std::function<void(ipc::Message &)> message; // all except Log
+        std::function<void(ipc::Message &)> message; // all messages except Log
         std::function<void(const ipc::Result &)> result;
         std::function<void(const Death &)> died;
     };
 
     // Starts a worker and sends it the pages with `first`, the encoded messages::Open or messages::Load.
     Process(Context &context, std::string name, Callbacks callbacks, const ipc::Json &first);
-    ~Process(); // kills it
+    ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;
 
-    // Before the worker is ready, which then waits for messages only.
+    // For a worker that has not sent Ready yet and therefore waits only for messages.
     template <class T> void send(const T &message, std::initializer_list<int> fds = {}) {
         send_json(ipc::encode(message), fds);
     }
-    // To a ready worker, which receives the message in order with its commands.
+    // For a worker that has sent Ready: it receives the message in order relative to the commands.
     template <class T> void send_ordered(const T &message, std::initializer_list<int> fds = {}) {
         send_json_ordered(ipc::encode(message), fds);
     }
     void submit(const ipc::Command &command);
 
-    void request_cancel(); // the running call sees host->cancelled
-    // Sends SIGABRT, and SIGKILL soon after. `reason` appears in Death::how.
+    void request_cancel(); // makes host->cancelled return non-zero
+    // Terminates the process: sends SIGABRT, and 100 ms later SIGKILL. `reason` appears in Death::how.
     void end(const std::string &reason);
     bool ending() const { return !end_reason_.empty(); }
     void kill_now();
 
     pid_t pid() const { return spawned_.pid; }
-    double cpu_seconds() const; // so far
+    double cpu_seconds() const; // used so far
 
 private:
     void send_json(const ipc::Json &body, std::initializer_list<int> fds);
@@ -90,7 +90,7 @@ private:
     std::string end_reason_, partial_line_;
     std::deque<std::string> tail_;
     ipc::Reactor::Clock::time_point log_second_ends_{};
-    struct LineCount { // within the current second
+    struct LineCount { // lines within the current second
         int logged = 0, suppressed = 0;
     };
     LineCount other_lines_, warnings_;

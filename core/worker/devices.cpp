@@ -9,14 +9,18 @@ namespace {
 
 struct Listing {
     ipc::DeviceList list;
-    bool is_invalid = false;
+    const char *fault = nullptr; // contract violation
 };
 
 void add_device(void *context, const arhost_device *device) noexcept {
     Listing &listing = *static_cast<Listing *>(context);
     constexpr std::size_t min_size = offsetof(arhost_device, abilities) + sizeof(arhost_device::abilities);
-    if (!device || device->struct_size < min_size || !device->name)
-        listing.is_invalid = true;
+    if (!device)
+        listing.fault = "it reported a device that is NULL";
+    else if (device->struct_size < min_size)
+        listing.fault = "it reported a device whose struct_size is too small";
+    else if (!device->name)
+        listing.fault = "it reported a device without a name";
     else if (listing.list.devices.size() < ipc::max_devices)
         listing.list.devices.push_back(ipc::describe(*device));
     else
@@ -31,12 +35,14 @@ arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
     if (!extension)
         return ARHOST_STATUS_OK;
     constexpr std::size_t min_size = offsetof(arhost_devices, list) + sizeof(arhost_devices::list);
-    if (extension->struct_size < min_size || !extension->list)
-        throw std::runtime_error("its extension " ARHOST_DEVICES_EXTENSION " is too short or has no 'list'");
+    if (extension->struct_size < min_size)
+        throw std::runtime_error("the struct_size of its extension " ARHOST_DEVICES_EXTENSION " is too small");
+    if (!extension->list)
+        throw std::runtime_error("the function 'list' of its extension " ARHOST_DEVICES_EXTENSION " is NULL");
     Listing listing;
     const arhost_status status = extension->list(&host, add_device, &listing);
-    if (listing.is_invalid)
-        throw std::runtime_error("it reported a device that has no name or whose struct is too short");
+    if (listing.fault)
+        throw std::runtime_error(listing.fault);
     list = std::move(listing.list);
     return status;
 }

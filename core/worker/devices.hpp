@@ -9,8 +9,9 @@
 
 namespace arhost::worker {
 
-// Leaves `list` empty if the plugin lacks the extension. Throws std::runtime_error with a message for the user if the
-// plugin violates the extension's contract.
+// Sets `list`, or leaves it unchanged if the plugin does not support the extension. Returns the status of the
+// plugin's `list` function, or ARHOST_STATUS_OK without the extension. Throws std::runtime_error with a message for
+// the user if the plugin violates the extension's contract.
 arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
                            std::optional<ipc::DeviceList> &list);
 

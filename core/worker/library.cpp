@@ -27,15 +27,15 @@ std::string joined(std::span<const std::string_view> list) {
     throw std::runtime_error(file.string() + ": " + why);
 }
 
-using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // name, is present
+using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // name; whether it is not NULL
 
 void check_functions(const std::filesystem::path &file, NamedFunctions functions, const std::string &owner) {
     for (const auto &[name, is_present] : functions)
         if (!is_present)
-            refuse(file, "its function '" + std::string(name) + "' is NULL, which " + owner + " must have");
+            refuse(file, "its function '" + std::string(name) + "' is NULL, but " + owner + " must have it");
 }
 
-// Sizes of the structs in ABI version 1, the minimum (docs/abi.md).
+// Minimum sizes of the structs: their sizes in ABI version 1 (docs/abi.md).
 #define ARHOST_SIZE_UP_TO(type, last) (offsetof(type, last) + sizeof(type::last))
 constexpr std::size_t entry_point_size = ARHOST_SIZE_UP_TO(arhost_entry_point, negotiate),
                       plugin_size = ARHOST_SIZE_UP_TO(arhost_plugin, get_extension),
@@ -48,14 +48,13 @@ void check_kind(const std::filesystem::path &file, const void *functions, PerFra
                 const std::string &owner) {
     const auto &f = *static_cast<const Functions *>(functions);
     if (f.struct_size < functions_size<Functions>)
-        refuse(file, "its struct of functions is shorter than that of " + owner +
-                         "; build it against this arhost's headers");
+        refuse(file, "its function table is too small for " + owner + "; build it against this arhost's headers");
     check_functions(file, {{"start", f.start}, {name, f.*per_frame}, {"stop", f.stop}}, owner);
 }
 
 void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) {
     if (!plugin.functions)
-        refuse(file, "its kind's functions are NULL");
+        refuse(file, "its function table (arhost_plugin.functions) is NULL");
     switch (plugin.descriptor->kind) {
     case ARHOST_KIND_SOURCE:
         return check_kind<arhost_source>(file, plugin.functions, &arhost_source::read, "read", "a source");
@@ -80,8 +79,9 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
         const auto mentions = [&](const char *words) { return reason.find(words) != std::string::npos; };
         const char *hint = "";
         if (mentions("cannot open shared object file"))
-            hint = " (if the sandbox hides its folder: 'reads: [FOLDER]' in the configuration, '--reads FOLDER' of "
-                   "plugins and conform)";
+            hint =
+                " (if the sandbox hides the folder of that file, set 'reads: [FOLDER]' in the configuration or pass "
+                "'--reads FOLDER' to plugins and conform)";
         else if (mentions("failed to map segment") || mentions("cannot allocate memory"))
             hint = " (out of memory: 'memory_mb' may be too small)";
         refuse(file, "cannot be loaded: " + reason + hint);
@@ -89,9 +89,10 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
         refuse(file, "is not an arhost plugin: it exports no symbol 'arhost_entry'");
-    if (entry->struct_size < entry_point_size || !entry->negotiate)
-        refuse(file,
-               "its arhost_entry is too short or has no negotiate function; build it against this arhost's headers");
+    if (entry->struct_size < entry_point_size)
+        refuse(file, "its arhost_entry is too small; build it against this arhost's headers");
+    if (!entry->negotiate)
+        refuse(file, "its arhost_entry has no negotiate function");
     return *entry;
 }
 
@@ -99,19 +100,26 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
     arhost_answer answer{sizeof answer, 0xffffffffu, nullptr};
     const arhost_status status = entry.negotiate(&offer, &answer);
-    const std::string versions = "this arhost speaks ABI version " + std::to_string(ARHOST_ABI_VERSION);
+    const std::string versions = "this arhost supports only ABI version " + std::to_string(ARHOST_ABI_VERSION);
     if (status != ARHOST_STATUS_OK)
-        refuse(file, "refused the ABI version; " + versions + ": build the plugin against its headers");
+        refuse(file,
+               "does not support the offered ABI version; " + versions + ": build the plugin against its headers");
     if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
         refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
                          ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
-    if (!plugin || plugin->struct_size < plugin_size)
-        refuse(file, "its negotiate returned no arhost_plugin or a truncated one");
-    if (!plugin->descriptor || plugin->descriptor->struct_size < descriptor_size || !plugin->descriptor->id)
-        refuse(file, "its descriptor is missing or truncated");
+    if (!plugin)
+        refuse(file, "its negotiate returned no arhost_plugin");
+    if (plugin->struct_size < plugin_size)
+        refuse(file, "its arhost_plugin is too small; build it against this arhost's headers");
+    if (!plugin->descriptor)
+        refuse(file, "its arhost_plugin has no descriptor");
+    if (plugin->descriptor->struct_size < descriptor_size)
+        refuse(file, "its arhost_descriptor is too small; build it against this arhost's headers");
+    if (!plugin->descriptor->id)
+        refuse(file, "its arhost_descriptor has no id");
     const std::string id = plugin->descriptor->id;
-    if (file.stem() != id && file.stem() != "lib" + id) // some build tools put "lib" before the name
+    if (file.stem() != id && file.stem() != "lib" + id) // some build tools prepend "lib" to the file name
         refuse(file, "its id is '" + id + "'; rename the file to match");
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
@@ -123,11 +131,11 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         file, {{"create", plugin->create}, {"destroy", plugin->destroy}, {"get_extension", plugin->get_extension}},
         "every plugin");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
-        refuse(file, "its descriptor counts options but lists none");
+        refuse(file, "its arhost_descriptor.option_count is not 0, but its options are NULL");
     if (plugin->descriptor->option_count > 0 &&
         (plugin->descriptor->options->struct_size < option_size ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
-        refuse(file, "its options' struct_size is not that of an arhost_option_descriptor");
+        refuse(file, "the struct_size of its options does not match arhost_option_descriptor");
     const auto options = ipc::options_of(*plugin->descriptor);
     if (const auto found = std::ranges::find(options, nullptr, &arhost_option_descriptor::key);
         found != options.end())

@@ -9,7 +9,8 @@
 
 namespace arhost::worker {
 
-// Both throw std::runtime_error with a message for the user. The library stays open until the process exits.
+// Both functions throw std::runtime_error with a message for the user. The library stays open until the process
+// exits.
 const arhost_entry_point &open_library(const std::filesystem::path &file);
 const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry);
 

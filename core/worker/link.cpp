@@ -28,7 +28,8 @@ Message Link::receive() const {
 }
 
 void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
-    // The kernel limits the descriptors in flight per user, and other processes may use them up.
+    // The kernel limits the number of descriptors in unread messages per user, and other processes of the user may
+    // have reached the limit. Therefore retries.
     constexpr int max_attempts = 500;
     for (int attempts = 0; !channel_.send(body, fds); ++attempts) {
         if (errno != ETOOMANYREFS)
@@ -44,13 +45,13 @@ void Link::log(arhost_severity severity, const std::string &text) const {
 }
 
 void Link::progress(double fraction, const char *what) const {
-    // JSON has no NaN.
+    // JSON cannot represent NaN and infinity.
     channel_.send(encode(messages::Progress{std::isfinite(fraction) ? fraction : 0, what ? what : ""}), {}, false);
 }
 
 void Link::map_pages(Message &open) {
     if (open.fds.size() < 2)
-        throw HostLost("'open' came without the pages");
+        throw HostLost("'open' was sent without the descriptors of the pages");
     host_page_ = SharedMemory::adopt(std::move(open.fds[0])).map(Access::read_only);
     worker_page_ = SharedMemory::adopt(std::move(open.fds[1])).map(Access::read_write);
     if (host_page_.bytes().size() < sizeof(HostPage) || worker_page_.bytes().size() < sizeof(WorkerPage))
@@ -83,7 +84,7 @@ std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
 }
 
 void Link::send_result(const Result &result) {
-    // The host never has more commands in flight than the ring holds, so the ring is never full.
+    // The result ring is never full, because the host never has more commands in flight than the ring has entries.
     if (results_->push(result) != RingResult::done)
         throw HostLost("the result ring is full or inconsistent");
     ring_doorbell(doorbell_.get());

@@ -13,7 +13,7 @@
 
 namespace arhost::worker {
 
-// The host has ended or violates the protocol: the worker ends.
+// Thrown if the host has exited or violates the protocol. The worker then exits.
 class HostLost : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -31,19 +31,19 @@ public:
     void log(arhost_severity severity, const std::string &text) const; // never blocks
     void progress(double fraction, const char *what) const;            // never blocks
 
-    // Maps the pages that came with Open, which hold the rings.
+    // Maps the pages whose descriptors accompanied `open`; they contain the rings.
     void map_pages(ipc::Message &open);
     bool cancelled() const {
         return host_page_ && host_page_.as<ipc::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
     }
 
-    // The next command; nullopt after `timeout` without one. Throws HostLost.
+    // Returns the next command, or nullopt if none arrives within `timeout`. Throws HostLost.
     std::optional<ipc::Command> next_command(std::chrono::milliseconds timeout);
     void send_result(const ipc::Result &result);
 
-    bool serving = false; // Ready was sent: later failures are not configuration errors
+    bool serving = false; // Ready has been sent, so later failures are not configuration errors
 
-    // Marks the plugin's function that runs during this object's lifetime, for crash reports.
+    // Marks a plugin function as running during the lifetime of this object, for crash reports.
     class InCall {
     public:
         InCall(const Link &link, ipc::Call call) : link_(link) { link_.mark(call); }
@@ -57,7 +57,7 @@ public:
 
 private:
     void send_json(const ipc::Json &body, std::initializer_list<int> fds) const;
-    // Relaxed: the host reads it after this process has exited (Process::on_death).
+    // A relaxed store suffices, because the host reads the value after this process has exited (Process::on_death).
     void mark(ipc::Call call) const {
         if (worker_page_)
             worker_page_.as<ipc::WorkerPage>().call.store(static_cast<std::uint32_t>(call),

@@ -24,7 +24,7 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
     {
         const ipc::Mapping mapping = memory.map(ipc::Access::read_write);
         std::move(builder).write(mapping.bytes());
-    } // unmapped: the host can freeze the memory only without a writable mapping
+    } // unmaps the memory, because the host can freeze it only if no writable mapping exists
     link.send(ipc::messages::Loaded{}, {memory.fd()});
     return EXIT_SUCCESS;
 }

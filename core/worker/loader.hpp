@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A worker that loads a scene into an arena instead of serving a plugin.
+// Loads a scene into an arena. A worker either does this or runs a plugin.
 #pragma once
 
 #include "worker/link.hpp"
 
 namespace arhost::worker {
 
-// Returns the process's exit status.
+// Loads the scene, sends its arena to the host, and returns the exit status of the process.
 int load_scene(Link &link, const ipc::messages::Load &load);
 
 } // namespace arhost::worker

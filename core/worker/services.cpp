@@ -48,8 +48,10 @@ public:
         if (status != ARHOST_STATUS_OK)
             return status;
         format_ = properties.format;
-        if (!arhost_frame_layout(&format_) || format_.byte_size != properties.format.byte_size)
-            throw std::runtime_error("the source's frame format is invalid or not laid out by arhost_frame_layout");
+        if (!arhost_frame_layout(&format_))
+            throw std::runtime_error("the source's frame format is invalid");
+        if (format_.byte_size != properties.format.byte_size)
+            throw std::runtime_error("the source did not compute its frame layout with arhost_frame_layout");
         ready.format = format_;
         ready.frame_count = properties.frame_count;
         if (properties.has_intrinsics)
@@ -72,7 +74,7 @@ public:
         const arhost_status status = source_.read(instance_, &buffer, &result.frame);
         if (status == ARHOST_STATUS_OK)
             next_ += std::uint64_t{1} + result.frame.skipped;
-        // Here rather than in the host, which should not spend the time.
+        // The worker fills the grey plane, so that the host need not spend this time.
         if (status == ARHOST_STATUS_OK && !result.frame.has_grey && buffer.grey != buffer.plane[0])
             fill_grey(format_, buffer.plane, buffer.grey);
         return status;
@@ -84,7 +86,7 @@ private:
     const arhost_source &source_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
-    std::uint64_t next_ = 0; // sequence number including skipped frames
+    std::uint64_t next_ = 0; // arhost_frame_buffer.sequence of the next call, which counts skipped frames
 };
 
 class TrackerService final : public Service {
@@ -141,7 +143,7 @@ public:
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &) override {
         const auto &message = setup_of_kind<messages::RaytracerSetup>(any);
-        require(fds.size() == 1, "'create' came without the scene's arena");
+        require(fds.size() == 1, "'create' was sent without the descriptor of the scene's arena");
         arena_ = SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only);
         require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
         arhost_raytracer_setup setup{};
@@ -185,7 +187,7 @@ private:
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
     Mapping arena_;
-    std::optional<scene::MotionEvaluator> motion_; // of animated scenes
+    std::optional<scene::MotionEvaluator> motion_; // only for animated scenes
     std::uint32_t width_ = 0, height_ = 0;
 };
 

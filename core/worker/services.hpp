@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Calls the functions of each kind of plugin.
+// Calls the functions of a plugin, for each kind of plugin.
 #pragma once
 
 #include "ipc/messages.hpp"
@@ -12,14 +12,14 @@
 
 namespace arhost::worker {
 
-// The memory that commands refer to.
+// The shared memory to whose slots the commands refer.
 struct Memory {
     struct Region {
         ipc::SlotLayout layout;
         ipc::Mapping mapping;
         std::span<std::byte> slot(std::uint32_t index) const; // throws HostLost if out of range
     };
-    std::map<std::uint32_t, Region> inputs; // by generation
+    std::map<std::uint32_t, Region> inputs; // key: generation
     Region output;
 
     const Region &input(std::uint32_t generation) const; // throws HostLost
@@ -28,7 +28,8 @@ struct Memory {
 class Service {
 public:
     virtual ~Service() = default;
-    // Calls the plugin's start with `setup` and fills `ready`. `fds` came along with Create.
+    // Calls the plugin's start with `setup` and fills `ready`. `fds`: the descriptors that
+    // accompanied Create.
     virtual arhost_status start(const ipc::messages::Setup &setup, const std::vector<base::UniqueFd> &fds,
                                 ipc::messages::Ready &ready) = 0;
     // Calls the plugin's per-frame function.

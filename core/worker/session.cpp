@@ -17,7 +17,8 @@ namespace {
 
 using namespace ipc;
 
-// The arhost_host that the plugin sees. Keeps the last error that the plugin logged, for Failed.
+// The arhost_host that is passed to the plugin. Stores the last error that the plugin logged, which the messages
+// Failed and Stopped report.
 class PluginHost {
 public:
     explicit PluginHost(Link &link)
@@ -28,7 +29,7 @@ public:
         std::lock_guard lock(mutex_);
         return last_error_;
     }
-    // For a call of the plugin that returned an error.
+    // Returns the message to send after a plugin function has returned the error `status`.
     messages::Failed failed(arhost_status status) const {
         const std::string reason = last_error();
         return {status, reason.empty() ? "the plugin gave no reason" : reason};
@@ -99,7 +100,7 @@ private:
                 plugin_.create(host_.get(), options.data(), static_cast<std::uint32_t>(options.size()), &instance_);
         }
         if (status == ARHOST_STATUS_OK && !instance_)
-            throw std::runtime_error("the plugin's create succeeded without an instance");
+            throw std::runtime_error("the plugin's create returned ARHOST_STATUS_OK, but no instance");
         messages::Ready ready;
         if (status == ARHOST_STATUS_OK) {
             service_ = make_service(plugin_, instance_);
@@ -153,7 +154,7 @@ private:
 
     void attach(const messages::Attach &attach, std::vector<base::UniqueFd> fds) {
         if (fds.size() != 1)
-            throw HostLost("'attach' came without memory");
+            throw HostLost("'attach' was sent without exactly one memory descriptor");
         const SharedMemory memory = SharedMemory::adopt(std::move(fds[0]));
         Memory::Region region{attach.layout, memory.map(attach.is_output ? Access::read_write : Access::read_only)};
         if (region.layout.byte_size() > memory.size())
@@ -191,7 +192,7 @@ void send_devices(const Link &link, const PluginHost &host, const arhost_plugin 
 }
 
 int serve_plugin(Link &link, const messages::Open &open) {
-    // Sandboxed before the library is loaded, as its constructors run then.
+    // Enters the sandbox before the library is loaded, because loading runs the constructors of the library.
     const sandbox::Level level = log_level(link, sandbox::enter_for(open.plugin, open.sandbox));
     const arhost_entry_point *entry = nullptr;
     {

@@ -7,12 +7,13 @@
 
 namespace arhost::worker {
 
-// Makes malloc keep freed memory. Plugins free and allocate the same memory with each frame; returning it to the
-// system in between costs trackers a quarter of their time in page faults. (glibc raises its thresholds by itself
-// only after a process has freed a large block.) Call once, before starting threads.
+// Makes malloc keep freed memory instead of returning it to the system. Plugins often free and allocate the same
+// amount of memory in each frame; without this function, trackers spend a quarter of their time in page faults. (By
+// itself, glibc raises its thresholds only after a process has freed a large block.) Call once, before starting
+// threads.
 void retain_freed_memory();
 
-// Returns the process's exit status.
+// Serves the host until the work is done or an error occurs. Returns the exit status of the process.
 int run(Link &link);
 
 } // namespace arhost::worker

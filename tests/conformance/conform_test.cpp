@@ -421,7 +421,7 @@ TEST(Conform, ReportsAMissingFunction) {
         ConformRun run;
         EXPECT_EQ(run.run({run.link_wrong("no_" + function, kind).string()}), 1);
         EXPECT_THAT(run.output(),
-                    HasSubstr("its function '" + function + "' is NULL, which " + owner + " must have"));
+                    HasSubstr("its function '" + function + "' is NULL, but " + owner + " must have it"));
     }
 }
 

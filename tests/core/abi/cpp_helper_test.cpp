@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The adapters of arhost-cpp/plugin.hpp.
+// Tests the adapters of arhost-cpp/plugin.hpp.
 #include <arhost-cpp/plugin.hpp>
 
 #include <gtest/gtest.h>
@@ -122,7 +122,7 @@ struct WithAHost {
     }
 };
 struct WithOtherDevices {
-    static int devices() { return 2; } // not a list of devices
+    static int devices() { return 2; } // does not return a list of devices, so it is not the extension's function
 };
 
 } // namespace
@@ -156,7 +156,7 @@ TEST(CppHelper, RejectsAnOfferWithoutItsVersion) {
 
 namespace {
 
-// A struct as extended by a newer host.
+// An ABI struct to which a newer host has appended fields.
 template <class T> struct Longer {
     T known;
     std::uint64_t unknown[2] = {0xa5a5a5a5a5a5a5a5, 0xa5a5a5a5a5a5a5a5};

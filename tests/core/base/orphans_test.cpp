@@ -28,7 +28,7 @@ TEST(Orphans, AreKilledExceptKeptOnes) {
     const pid_t kept = sleeper(), other = sleeper();
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
-    if (const pid_t parent = ::fork(); parent == 0) { // its child is reparented to this process
+    if (const pid_t parent = ::fork(); parent == 0) { // its child becomes a child of this process
         const pid_t left = sleeper();
         (void)!::write(ends[1], &left, sizeof left);
         ::_exit(0);

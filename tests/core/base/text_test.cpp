@@ -13,8 +13,8 @@ TEST(Printable, KeepsTextInAnyLanguage) {
 TEST(Printable, IsOneLineThatCannotControlATerminal) {
     EXPECT_EQ(printable("a\nb\r\tc"), "a b  c");
     EXPECT_EQ(printable("\x1b[2Jgone\a\x7f"), " [2Jgone  ");
-    EXPECT_EQ(printable("\u009b2J"), " 2J");                           // CSI as one character
-    EXPECT_EQ(printable("a\u202efdp.exe\u2069\u2028"), "a fdp.exe  "); // would be shown right to left
+    EXPECT_EQ(printable("\u009b2J"), " 2J");                           // the control character CSI
+    EXPECT_EQ(printable("a\u202efdp.exe\u2069\u2028"), "a fdp.exe  "); // would be displayed from right to left
     EXPECT_EQ(printable("1\u200e2\u200f3\u061c4"), "1 2 3 4");
     EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a b");
 }
@@ -27,7 +27,7 @@ TEST(Printable, IsTruncatedBetweenCharacters) {
     EXPECT_EQ(printable("12345", 5), "12345");
     EXPECT_EQ(printable("123456", 5), "12345…");
     EXPECT_EQ(printable("123½6", 4), "123…");
-    EXPECT_EQ(printable("\xe9\xe9", 4), "\ufffd…") << "the replacement character counts";
+    EXPECT_EQ(printable("\xe9\xe9", 4), "\ufffd…") << "the replacement character counts towards max_size";
 }
 
 TEST(Printable, ReplacesInvalidUtf8) {

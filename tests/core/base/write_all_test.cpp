@@ -56,7 +56,7 @@ TEST_F(WriteAll, IsInterruptedByASignalWhileAPipeIsFull) {
             EXPECT_EQ(interrupted.signal, SIGUSR1);
         }
     });
-    int waiting = 0; // bytes in the pipe
+    int waiting = 0; // number of bytes in the pipe
     while (waiting < 4096 * 16)
         ASSERT_EQ(::ioctl(to_read.get(), FIONREAD, &waiting), 0);
     std::this_thread::sleep_for(std::chrono::milliseconds(50)); // usually enough for the write to block

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-inprocess behaves like arhost, except for processes and deadlines.
+// Tests that arhost-inprocess behaves like arhost, except for separate processes and deadlines.
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// Returns the exit status; the output is in output.txt.
+// Runs arhost-inprocess in the folder of `run`. Returns its exit status; its output is in output.txt.
 int run_in_process(const ArhostRun &run) {
     const std::string command = "cd " + run.path("").string() +
                                 " && ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
@@ -50,7 +50,8 @@ TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
     EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'refuse' requests"));
 }
 
-// Threads cannot be killed, but a worker that waits for its next frame ends by itself.
+// A worker thread cannot be killed, but it ends by itself if the host closes the channel while it waits for a
+// command.
 TEST(InProcess, RestartsAPluginWhoseDeviceIsLost) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "error_at: 20, error: -6"));
     run.write("scene.yaml", small_scene);

@@ -9,7 +9,7 @@ using testing::HasSubstr;
 
 namespace {
 
-// As if sent through the channel.
+// Returns `message` after conversion to JSON and back, as if it had been sent through a channel.
 template <class T> T sent(const T &message) {
     const Message received{Json::parse(encode(message).dump()), {}};
     EXPECT_TRUE(is<T>(received));

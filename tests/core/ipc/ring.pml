@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A model of the link between the host and one worker (core/ipc/ring.hpp, core/supervise): the command ring, the result
- * ring, the slots, and the death of the worker at any point. The model is sequentially consistent; the memory orderings
+ * ring, the slots, and the death of the worker at any step. The model is sequentially consistent; the memory orderings
  * of ring.hpp are tested with the thread sanitizer.
  *
- * Checked for every interleaving: frames return in order, none lost, duplicated or torn; a slot is never written while
- * the host reads it; positions stay within capacity; the host always finishes.
+ * Properties that are checked for every interleaving: frames return in order, and no frame is lost, duplicated or torn;
+ * the worker never writes a slot while the host reads it; positions are at most one capacity apart; the host always
+ * finishes.
  *
  * Each macro FAULT… plants a fault; `check-model --faults` verifies that the model detects it.
  */
-#define CAPACITY 2  /* of both rings */
+#define CAPACITY 2  /* number of entries of each ring */
 #define SLOTS    2
 #define FRAMES   4
-#define DEATHS   2  /* maximum */
+#define DEATHS   2  /* maximum number of deaths of the worker */
 #define NOBODY   255
 
 /* Written by the host. */
@@ -23,7 +24,7 @@ byte result_published, command_consumed;
 byte result_frame[CAPACITY];
 /* The two halves of each slot hold a frame number, which reveals torn frames. */
 byte low[SLOTS], high[SLOTS];
-/* The slot that the host is reading. */
+/* The slot that the host is reading, or NOBODY. */
 byte reading = NOBODY;
 
 bool alive = true, done;
@@ -47,7 +48,7 @@ end_waiting:
     results++;
     result_published = results;
 #endif
-    assert(reading != slot);          /* the host has released it */
+    assert(reading != slot);          /* the host has released the slot */
     low[slot] = frame;
     may_die;
     assert(reading != slot);
@@ -106,12 +107,12 @@ active proctype host() {
         command_published = position
     :: result_published != result_position -> take_result()
     :: !alive ->
-        /* Results that it published before its death are valid. */
+        /* Results that the worker published before its death are valid. */
         do
         :: result_published != result_position -> take_result()
         :: else -> break
         od;
-        /* New memory and a new worker; unanswered frames are submitted again. */
+        /* Creates new memory and a new worker. Unanswered frames are submitted again. */
         atomic {
             command_published = 0; command_consumed = 0; result_published = 0; result_consumed = 0;
             low[0] = NOBODY; low[1] = NOBODY; high[0] = NOBODY; high[1] = NOBODY;
@@ -126,5 +127,5 @@ active proctype host() {
     done = true
 }
 
-/* The host always finishes, given weak fairness. */
+/* The host always finishes. Assumes weak fairness. */
 ltl finishes { <> done }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two processes on one link; the worker is stopped and killed at random points. The host continues with a new worker,
-// and no frame is lost, torn or out of order.
+// Two processes, host and worker, communicate over rings. The test stops and kills the worker at random times. The
+// host must continue with a new worker, and no frame may be lost, torn or out of order.
 #include "ipc/memory.hpp"
 #include "ipc/protocol.hpp"
 
@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t words = 4096;
 constexpr SlotLayout layout{words * sizeof(std::uint64_t), 4};
 
-// The worker: fills the slot of each command with its sequence number.
+// Runs in the worker process. Fills the slot of each command with the sequence number of the command.
 [[noreturn]] void serve(const SharedMemory &host_memory, const SharedMemory &worker_memory,
                         const SharedMemory &pixels, int doorbell) {
     const Mapping host = host_memory.map(Access::read_only), mine = worker_memory.map(Access::read_write),
@@ -90,7 +90,7 @@ TEST(RingProcesses, LoseNoFrameIfTheWorkerIsKilledOrStoppedAtRandom) {
         }
         if (next_expected >= next_fault) {
             next_fault = next_expected + 1 + random() % 60;
-            ::usleep(static_cast<useconds_t>(random() % 200)); // anywhere in its work
+            ::usleep(static_cast<useconds_t>(random() % 200)); // so that the kill hits different steps
             if (random() % 2) {
                 ::kill(connection->pid, SIGSTOP);
                 ::usleep(static_cast<useconds_t>(random() % 500));
@@ -116,7 +116,7 @@ TEST(RingProcesses, LoseNoFrameIfTheWorkerIsKilledOrStoppedAtRandom) {
         }
         ASSERT_EQ(popped, RingResult::wait);
         if (::waitpid(connection->pid, nullptr, WNOHANG) == connection->pid) {
-            // It may have completed frames between the last pop and its death.
+            // Receives results that the worker published between the last pop and its death.
             while (connection->results.pop(result) == RingResult::done) {
                 ASSERT_EQ(result.ticket, next_expected++);
                 connection->in_flight.pop_front();

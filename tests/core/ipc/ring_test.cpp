@@ -64,6 +64,6 @@ TEST(Ring, DetectsAProducerThatPublishesMoreThanTheCapacity) {
     int value = 0;
     ring.producer_side->published = 5;
     EXPECT_EQ(ring.consumer.pop(value), RingResult::violation);
-    ring.producer_side->published = ~std::uint64_t(0); // before the consumer's position
+    ring.producer_side->published = ~std::uint64_t(0); // is behind the consumer's position
     EXPECT_EQ(ring.consumer.pop(value), RingResult::violation);
 }

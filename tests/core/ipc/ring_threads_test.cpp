@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two threads on one ring with slots, for the thread sanitizer: an entry publishes the payload in its slot, and the
-// slot is overwritten only after the consumer has returned it.
+// Two threads exchange slots through rings, for the thread sanitizer: popping an entry makes the data in its slot
+// visible, and the producer overwrites a slot only after the consumer has returned it.
 #include "ipc/ring.hpp"
 #include "ipc/wake.hpp"
 

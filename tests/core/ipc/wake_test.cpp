@@ -20,7 +20,7 @@ TEST(Wake, ReachesAnotherProcessThroughAReadOnlyMapping) {
         const Mapping reader = memory.map(Access::read_only);
         ::_exit(wait_for_wake(reader.as<WakeWord>(), 0, 20s) ? 0 : 1);
     }
-    ::usleep(20'000); // usually asleep by now; the test passes either way
+    ::usleep(20'000); // the child is usually asleep after this time; the test passes even if it is not
     wake(writer.as<WakeWord>());
     int status = -1;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
@@ -46,7 +46,7 @@ TEST(Doorbell, CountsRings) {
 
 TEST(Doorbell, DoesNotBlockTheHostIfTheWorkerClearsONonblock) {
     const DoorbellPair bell = make_doorbell();
-    ::fcntl(bell.worker.get(), F_SETFL, 0); // clears O_NONBLOCK, if it were shared
+    ::fcntl(bell.worker.get(), F_SETFL, 0); // would clear O_NONBLOCK of both ends if they shared it
     EXPECT_EQ(drain_doorbell(bell.host.get()), 0);
 }
 

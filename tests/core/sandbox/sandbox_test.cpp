@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Each layer alone and all together, each in a child process: what is blocked, and what must still work.
+// Tests each layer separately and all layers together, in child processes: what they must block, and what must still
+// work.
 #include "plugin_under_test.hpp"
 #include "sandbox/layers.hpp"
 
@@ -34,7 +35,7 @@ int in_child(const std::function<int()> &checks) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-// Reports by number, since a child process cannot use GoogleTest's expectations.
+// Identifies a failed check by its number, because a child process cannot use GoogleTest's expectations.
 class Checks {
 public:
     void that(bool holds) {
@@ -82,7 +83,7 @@ struct Sandbox : testing::Test {
 
 #define EXPECT_CHECKS(result)                                                                                        \
     if (const int failed = (result); failed == layer_is_missing)                                                     \
-        GTEST_SKIP() << "this machine lacks the layer";                                                              \
+        GTEST_SKIP() << "the layer is not available on this machine";                                                \
     else                                                                                                             \
         EXPECT_EQ(failed, 0) << "the number of the check that failed"
 

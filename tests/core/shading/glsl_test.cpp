@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The leaf files are also valid GLSL: a shader that calls all their functions compiles to SPIR-V. The shader is
-// generated from the declarations, so that none is missed.
+// Tests that the leaf files are valid GLSL: a shader that calls all leaf functions must compile to SPIR-V. The test
+// generates the shader from the declarations, so that it covers all functions.
 #include "plugin_under_test.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ std::string without_comments(const std::string &text) {
     return std::regex_replace(text, std::regex("//[^\n]*"), "");
 }
 
-// Code of the leaf files, by file name.
+// Returns the code of the leaf files; the keys are the file names.
 std::map<std::string, std::string> leaf_files() {
     std::map<std::string, std::string> files;
     for (const auto &entry : std::filesystem::directory_iterator(shading / "leaf"))
@@ -64,7 +64,8 @@ std::size_t count_of(const std::string &text, const std::string &word) {
         std::distance(std::sregex_iterator(text.begin(), text.end(), whole), std::sregex_iterator()));
 }
 
-// Arguments are read from a buffer and results written to it, so that no call is optimised away.
+// Returns a shader that calls `functions`. It reads the arguments from a buffer and writes the results to it, so that
+// the compiler cannot remove a call.
 std::string shader_that_calls(const std::vector<Function> &functions) {
     std::string blocks, calls;
     std::map<std::string, std::string> values{
@@ -72,7 +73,7 @@ std::string shader_that_calls(const std::vector<Function> &functions) {
     for (const Function &function : functions) {
         std::string arguments;
         for (const std::string &type : function.parameters) {
-            if (!values.contains(type)) { // a struct of the leaf files
+            if (!values.contains(type)) { // the type is a struct of the leaf files
                 values[type] = "uniform_" + type;
                 blocks += "layout(binding = " + std::to_string(values.size()) + ") uniform " + type + "Block { " +
                           type + " " + values[type] + "; };\n";
@@ -96,7 +97,7 @@ protected:
         if (std::string(ARHOST_GLSLANG).empty())
             GTEST_SKIP() << "glslangValidator is not installed (Debian: glslang-tools)";
     }
-    // Compiler errors for a compute shader; empty if it compiles.
+    // Compiles a compute shader. Returns the error messages, or an empty string if it compiles.
     std::string compile_errors(const std::string &shader) const {
         const std::string folder = folder_.path(), source = folder + "/shader.comp", log = folder + "/log";
         std::ofstream(source) << shader;

@@ -123,7 +123,7 @@ TEST(Lens, HasNoRayBeyondTheMonotonicLimit) {
     const Lens lens(intrinsics_of({"", ARHOST_DISTORTION_BROWN, {-0.5, 0, 0, 0}}));
     EXPECT_TRUE(lens.ray({301.5 + 560 * 0.54, 262.25}));
     EXPECT_FALSE(lens.ray({301.5 + 560 * 0.55, 262.25}));
-    EXPECT_FALSE(lens.project({1, 0, 1})) << "it would fold back inwards";
+    EXPECT_FALSE(lens.project({1, 0, 1})) << "the point would fold back inwards";
 }
 
 TEST(Lens, DoesNotProjectPointsBehindTheCamera) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Fresnel terms, glass and microfacets, compared with published values and numerical integrals.
+// Compares Fresnel terms, glass and microfacets with published values and numerical integrals.
 #include <arhost/shading/scalar.hpp>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ Vec3 direction(double theta, double phi) {
     return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-// ∫ f over the directions with z > 0, by the midpoint rule, finest near the pole.
+// Integrates f over the directions with z > 0 with the midpoint rule; the steps are finest near the pole.
 template <class F> double integral_over_hemisphere(F f, int rows = 600, int columns = 300) {
     double sum = 0;
     for (int row = 0; row < rows; ++row) {
@@ -33,7 +33,7 @@ template <class F> double integral_over_hemisphere(F f, int rows = 600, int colu
     return sum;
 }
 
-// The mean of f(u, v) over the unit square.
+// Returns the mean of f(u, v) over the unit square.
 template <class F> double mean_over_square(F f, int n = 500) {
     double sum = 0;
     for (int i = 0; i < n; ++i)
@@ -89,7 +89,7 @@ TEST(Glass, ReflectsTotallyBeyondTheCriticalAngle) {
                                         0.04, 0.7);
     };
     EXPECT_LE(reflectance(critical - 1e-6), 0.7);
-    EXPECT_EQ(reflectance(critical + 1e-6), 1) << "whatever the maximum";
+    EXPECT_EQ(reflectance(critical + 1e-6), 1) << "total reflection ignores the maximum";
 }
 
 TEST(Glass, ReflectanceIsTheSameFromInsideAndOutside) {
@@ -155,9 +155,10 @@ TEST(Ggx, VisibleMicrofacetAreaIsTheProjectedSurfaceArea) {
         }
 }
 
-// Histogram over 8 × 8 cells of the hemisphere, equally spaced in θ and φ.
+// Compares a histogram of sampled normals with the density. The hemisphere has 8 × 8 cells, equally spaced in θ and
+// φ.
 TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
-    constexpr int cells = 8, steps = 60; // per side: cells, integration steps per cell
+    constexpr int cells = 8, steps = 60; // per axis: number of cells; integration steps in each cell
     for (const double alpha : {0.2, 0.5, 1.0})
         for (const double theta : {0.0, 0.6, 1.3}) {
             const Vec3 eye = direction(theta, 2.0);
@@ -187,7 +188,7 @@ TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
         }
 }
 
-// White furnace test: with perfectly reflecting microfacets, masking loses some light, but none is gained.
+// White furnace test: with perfectly reflecting microfacets, light may be lost by masking, but must not be gained.
 TEST(Ggx, LampsAndSampledRaysConserveEnergy) {
     for (const double alpha : {0.1, 0.3, 0.7, 1.0})
         for (const double theta : {0.0, 0.7, 1.2, 1.4}) {
@@ -200,7 +201,8 @@ TEST(Ggx, LampsAndSampledRaysConserveEnergy) {
                 const Vec3 light = mirror_direction(-eye, ggx_half_vector(up, eye, alpha, u, v));
                 return light.z > 0 ? ggx_masking(light.z, alpha) : 0;
             });
-            // Sampled rays use uncorrelated masking and shadowing, which is slightly darker.
+            // Sampled rays use uncorrelated masking and shadowing, so their result is slightly darker than that of
+            // lamps.
             const double expected = integral_over_hemisphere([&](Vec3 light) {
                 return ggx_distribution(half_vector(light), alpha) * ggx_masking(light.z, alpha) *
                        ggx_masking(eye.z, alpha) / (4 * eye.z);

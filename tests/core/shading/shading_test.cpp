@@ -27,7 +27,7 @@ TEST(Bsdf, LambertIsTheCosineAndZeroFromBehind) {
 
 TEST(Bsdf, PhongIsOneInTheMirrorDirectionAndFallsOffWithTheExponent) {
     EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-30), 256), 1, 1e-12);
-    EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(15), 2), 0.5, 1e-12); // 45° off
+    EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(15), 2), 0.5, 1e-12); // 45° from the mirror direction
     EXPECT_NEAR(phong(up, at_degrees(30), at_degrees(-20), 64), std::pow(std::cos(pi / 18), 64), 1e-12);
 }
 
@@ -57,7 +57,7 @@ TEST(Alpha, ClassesGiveTheirCodes) {
 TEST(Alpha, SeveralLightsAreWeightedByIrradiance) {
     EXPECT_DOUBLE_EQ(fraction_of_light(3, 3 + 1), 0.75);
     EXPECT_EQ(fraction_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
-    EXPECT_EQ(fraction_of_light(0, 0), 0) << "no light, no shadow";
+    EXPECT_EQ(fraction_of_light(0, 0), 0) << "without light there is no shadow";
     EXPECT_DOUBLE_EQ(shadow_alpha(0.5, 0.25, 0.6, 0.3), 0.375);
 }
 
@@ -76,7 +76,7 @@ TEST(Light, SpotIsFullInsideTheInnerConeAndDarkOutsideTheOuterCone) {
     EXPECT_NEAR(spot_attenuation(0.75, 0.9, 0.7), 5.0 / 32, 1e-12); // 3 t² − 2 t³ at a quarter
     EXPECT_EQ(spot_attenuation(0.7, 0.9, 0.7), 0);
     EXPECT_EQ(spot_attenuation(-1, 0.9, 0.7), 0);
-    EXPECT_EQ(spot_attenuation(0.81, 0.8, 0.8), 1) << "equal cones: a sharp edge";
+    EXPECT_EQ(spot_attenuation(0.81, 0.8, 0.8), 1) << "equal cones give a sharp edge";
     EXPECT_EQ(spot_attenuation(0.79, 0.8, 0.8), 0);
 }
 
@@ -103,7 +103,7 @@ TEST(Environment, DirectionsMapBackToTheirCoordinates) {
             const Vec3 d = equirectangular_direction(u, v);
             EXPECT_NEAR(dot(d, d), 1, 1e-12);
             EXPECT_NEAR(equirectangular_u(d), u, 1e-12);
-            EXPECT_NEAR(equirectangular_v(d), v, 1e-7); // by an arc cosine
+            EXPECT_NEAR(equirectangular_v(d), v, 1e-7); // less accurate, because an arc cosine is involved
         }
 }
 
@@ -209,9 +209,9 @@ TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
     is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
     is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
     const auto stays = [&](Vec3 normal) { EXPECT_EQ(length(normal - up), 0); };
-    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // it would point inwards
-    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // no direction along u
-    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the facet's side does not matter
+    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // the result would point into the surface
+    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // u is parallel to the normal
+    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the sign of `facet` does not matter
 }
 
 TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {
@@ -236,7 +236,7 @@ TEST(Srgb, DecodeInvertsEncode) {
 TEST(Srgb8Table, MatchesTheFormulaAtAndBetweenCodeThresholds) {
     const Srgb8Table table = make_srgb8_table();
     int last = 0;
-    // Every 97th float from below the first code's edge to 1, 1.2 million of them.
+    // Checks every 97th float from below the threshold of code 1 up to 1; these are 1.2 million floats.
     for (std::int32_t bits = std::bit_cast<std::int32_t>(0x1p-14f); bits <= std::bit_cast<std::int32_t>(1.0f);
          bits += 97) {
         const float x = std::bit_cast<float>(bits);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A component without a pipeline: start, commands, death, stop.
+// Tests start, commands, death and stop of a component without a pipeline.
 #include "supervise/component.hpp"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ struct Bench {
             limits, arhost::sandbox::Policy{}, std::move(callbacks));
         component->start();
     }
-    // Runs until the event has occurred so many times; false after 20 s.
+    // Runs the reactor until `event` has occurred `times` times. Returns false after 20 s.
     bool until(const std::string &event, std::size_t times = 1) {
         bool timed_out = false;
         const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { timed_out = true; });
@@ -104,7 +104,7 @@ TEST(Component, ReportsLostCommandsAndGetsNewMemoryAfterADeath) {
     const RegionPointer first = bench.component->output();
     for (std::uint64_t i = 0; i < 4; ++i)
         bench.read(i);
-    ASSERT_TRUE(bench.until("lost 2")) << "0 and 1 were answered";
+    ASSERT_TRUE(bench.until("lost 2")) << "the commands 0 and 1 were answered, the last two were not";
     ASSERT_TRUE(bench.until("running", 2));
     EXPECT_NE(bench.component->output(), first);
     EXPECT_GT(bench.component->output()->generation, first->generation);

@@ -94,7 +94,7 @@ TEST(Launcher, IsReplacedEachTimeItIsKilled) {
 }
 
 TEST(Launcher, DoesNotKillUnrelatedChildrenWhenItIsReplaced) {
-    const pid_t other = ::fork(); // as if inherited from a shell that started this program with exec
+    const pid_t other = ::fork(); // like a child of a shell that then started this program with exec
     if (other == 0)
         for (;;)
             ::pause();
@@ -103,7 +103,7 @@ TEST(Launcher, DoesNotKillUnrelatedChildrenWhenItIsReplaced) {
     ::kill(parent_of(first.pid), SIGKILL);
     wait_dead(first);
     launcher.spawn("/usr/bin/yes", no_log);
-    EXPECT_EQ(::waitpid(other, nullptr, WNOHANG), 0) << "it was killed";
+    EXPECT_EQ(::waitpid(other, nullptr, WNOHANG), 0) << "the unrelated child was killed";
     ::kill(other, SIGKILL);
     ::waitpid(other, nullptr, 0);
 }
@@ -124,7 +124,7 @@ TEST(Launcher, ReportsThatItCanNotBeStarted) {
               "no process can be started: /bin/true was started 5 times and exited or did not respond each time");
 }
 
-// It does not respond, and the debugger collects its exit first.
+// A launcher under a debugger does not respond, and the debugger collects its exit status before this process can.
 TEST(Launcher, IsReplacedIfADebuggerHoldsIt) {
     Launcher launcher(program, std::chrono::milliseconds(500));
     const Spawned first = launcher.spawn("/usr/bin/yes", no_log);
@@ -186,7 +186,7 @@ TEST(Launcher, DoesNotBlockTheDestructorIfItDoesNotExit) {
     EXPECT_FALSE(is_alive(pid));
 }
 
-// SIGCONT as PR_SET_PDEATHSIG makes it continue, and it kills the workers.
+// PR_SET_PDEATHSIG sends SIGCONT to the stopped launcher, which then continues and kills the workers.
 TEST(Launcher, ExitsWithItsHostEvenIfStopped) {
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A real worker with a real plugin; the test plays the host.
+// Tests a worker process with a plugin; the test takes the role of the host.
 #include "supervise/process.hpp"
 
 #include "plugin_under_test.hpp"
@@ -28,7 +28,7 @@ struct Conversation {
                    [this](const supervise::Death &how) { death = how.how; }},
                   encode(messages::Open{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so", sandbox::Policy{}})) {}
 
-    // Its next message, which must be a T; nullopt if it died.
+    // Returns the next message of the worker, which must be a T, or nullopt if the worker has died.
     template <class T> std::optional<T> next() {
         while (received.empty() && death.empty())
             reactor.run_once();
@@ -42,7 +42,7 @@ struct Conversation {
     }
 };
 
-// Of source_counter, whose options are integers.
+// Returns the default values of the options of source_counter, all of which are integers.
 std::vector<OptionValue> default_options(const messages::Hello &hello) {
     std::vector<OptionValue> values;
     for (const OptionDeclaration &o : hello.descriptor.options)

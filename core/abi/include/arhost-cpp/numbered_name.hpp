@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-cpp/numbered_name.hpp: file names with a frame number, "frame_%05d.png". Sources that read numbered files
-// and sinks that write them share this parser, so that a source reads every name that a sink writes.
+// and sinks that write them share this parser, so a source can read every name that a sink writes.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace arhost {
 
 class NumberedName {
 public:
-    // `name`, without folders, has one conversion: %d, or %0Nd for at least N digits with leading zeros (N: 1 to 20).
-    // "%%" is a percent sign. Throws std::invalid_argument with a sentence that quotes `name` and says how to write
-    // it. The name is never passed to printf.
+    // `name` is a pattern without folders. It contains exactly one conversion: %d, or %0Nd, which pads the number
+    // with leading zeros to N digits (N: 1 to 20). "%%" is a percent sign. Throws std::invalid_argument with a
+    // message that quotes `name` and describes valid patterns. The pattern is never passed to printf.
     explicit NumberedName(std::string_view name) {
         bool has_number = false;
         for (std::size_t i = 0; i < name.size();) {
@@ -53,7 +53,7 @@ public:
         return prefix_ + std::string(min_digits_ - std::min(min_digits_, digits.size()), '0') + digits + suffix_;
     }
 
-    // The number in `name`, or nullopt if this pattern does not produce that name.
+    // Returns the number in `candidate`, or nullopt if this pattern cannot produce that name.
     std::optional<std::uint64_t> number(std::string_view candidate) const {
         if (candidate.size() <= prefix_.size() + suffix_.size() || !candidate.starts_with(prefix_))
             return std::nullopt;
@@ -73,7 +73,7 @@ public:
 private:
     bool parse_width(std::string_view width) {
         const auto [stop, error] = std::from_chars(width.data(), width.data() + width.size(), min_digits_);
-        constexpr std::size_t max_digits = 20; // of a 64-bit number
+        constexpr std::size_t max_digits = 20; // digits of the largest 64-bit number
         return width.front() == '0' && error == std::errc() && min_digits_ >= 1 && min_digits_ <= max_digits;
     }
 

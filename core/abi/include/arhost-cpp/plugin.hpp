@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-cpp/plugin.hpp: the C ABI's boilerplate for plugins in C++20, header-only. A plugin is a class that one
-// macro exports:
+// arhost-cpp/plugin.hpp: header-only C++20 wrapper of the C ABI. A plugin is a class, which one macro exports:
 //
 //   class Grey {
 //   public:
@@ -12,7 +11,7 @@
 //   ARHOST_TRACKER(Grey, descriptor)
 //
 // Members report errors by throwing arhost::Failure (or any std::exception) with a message for the user. The adapters
-// below log the message and return a status, so no exception crosses the ABI.
+// in this header log the message and return a status, so no exception crosses the ABI.
 #pragma once
 
 #include <arhost/arhost.h>
@@ -29,7 +28,7 @@
 
 namespace arhost {
 
-// An error for the user: an ARHOST_STATUS_ERROR_…, and a message that says what to change.
+// An error to report to the user. `status` is an ARHOST_STATUS_ERROR_…; `message` says what to change.
 class Failure : public std::runtime_error {
 public:
     Failure(arhost_status status, const std::string &message) : std::runtime_error(message), status_(status) {}
@@ -49,7 +48,7 @@ public:
     void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
     bool cancelled() const { return host_->cancelled(host_) != 0; }
-    // Sleeps until `when`. Returns false, early, if the host cancels.
+    // Sleeps until `when`, then returns true. If the host cancels the call, returns false early.
     bool wait_until(std::chrono::steady_clock::time_point when) const {
         constexpr auto poll_interval = std::chrono::milliseconds(20);
         for (;;) {
@@ -66,7 +65,7 @@ private:
     const arhost_host *host_;
 };
 
-// The option values passed to `create`. Requesting a key that the descriptor does not declare throws.
+// The option values passed to `create`. The accessors throw Failure if the descriptor does not declare `key`.
 class Options {
 public:
     Options(const arhost_option *first, std::uint32_t count) : first_(first), count_(count) {}
@@ -85,21 +84,21 @@ private:
     std::uint32_t count_;
 };
 
-// Element `i` of setup.markers, whose elements a newer host may have extended.
+// Returns element `i` of setup.markers. Steps by struct_size, because a newer host may use larger elements.
 inline const arhost_marker_config &listed_marker(const arhost_tracker_setup &setup, std::size_t i) {
     return *reinterpret_cast<const arhost_marker_config *>(reinterpret_cast<const char *>(setup.markers) +
                                                            i * setup.markers->struct_size);
 }
 
-// An arhost_option_descriptor, with the optional fields last.
+// Returns an arhost_option_descriptor. Unlike in the struct, the optional fields are last and have defaults.
 constexpr arhost_option_descriptor option(arhost_option_type type, const char *key, const char *default_value,
                                           const char *help, double minimum = 0, double maximum = 0,
                                           const char *const *choices = nullptr) {
     return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
 }
 
-// A device of the extension in arhost/devices.h, which documents the fields; "" stands for NULL. A class gets the
-// extension by a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host &)`.
+// Same fields as arhost_device (arhost/devices.h), with "" for NULL. A plugin class supports the devices extension if
+// it has a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host &)`.
 struct Device {
     std::uint32_t index = 0;
     arhost_device_kind kind = ARHOST_DEVICE_OTHER;
@@ -109,7 +108,7 @@ struct Device {
 
 namespace detail {
 
-// The arhost_instance of a plugin that is written as the class T.
+// The object behind an arhost_instance pointer, for a plugin class T.
 template <class T> struct Instance {
     Host host;
     T plugin;
@@ -120,7 +119,7 @@ template <class T> Instance<T> &instance_of(arhost_instance *instance) {
     return *reinterpret_cast<Instance<T> *>(instance);
 }
 
-// Runs `call`; logs an exception and converts it to a status.
+// Runs `call` and returns its status. If `call` throws, logs the exception and returns a matching error status.
 template <class Call> arhost_status guarded(const Host &host, Call &&call) noexcept {
     try {
         return call();
@@ -192,7 +191,7 @@ arhost_status list_devices(const arhost_host *host, arhost_take_device take, voi
 template <ListsDevices T>
 inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), list_devices<T>};
 
-// Optional members of the class.
+// `stop` and `get_extension` are optional members of the plugin class.
 template <class T> void stop(T &plugin) {
     if constexpr (requires { plugin.stop(); })
         plugin.stop();
@@ -210,7 +209,8 @@ template <class T> const void *get_extension(const char *id) {
         return no_extension(id);
 }
 
-// The function tables of the kinds. `read`, `write` and `idle` return an arhost_status: it may be ARHOST_STATUS_END.
+// The function table of each kind. Unlike the other members of the plugin class, `read`, `write` and `idle` return an
+// arhost_status, because they may return ARHOST_STATUS_END.
 template <class T>
 inline constexpr arhost_source source_functions = {
     sizeof(arhost_source),
@@ -277,7 +277,7 @@ inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer,
 
 } // namespace arhost
 
-// Defines arhost_entry for a class and its arhost_descriptor. Use once per library, at global scope.
+// Defines arhost_entry for a plugin class and its arhost_descriptor. Use once per shared object, at global scope.
 #define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                            \
     static constexpr arhost_plugin arhost_plugin_object = {                                                          \
         sizeof(arhost_plugin),         &(descriptor_object),           &arhost::detail::functions_object<Class>,     \

@@ -30,7 +30,7 @@ enum { ARHOST_MAX_DISTORTION = 12 };
 
 typedef struct arhost_intrinsics {
     uint32_t struct_size;
-    uint32_t width, height; /* px, of the image to which the values below apply */
+    uint32_t width, height; /* size in px of the image to which the following values apply */
     arhost_distortion distortion;
     double fx, fy; /* focal lengths, px, > 0 */
     double cx, cy; /* principal point, px */
@@ -41,8 +41,8 @@ typedef struct arhost_intrinsics {
 
 /* A camera in world coordinates: right-handed, millimetres. The camera axes are
  *   w = eye − look_at (backward),  u = up × w (right),  v = w × u (up), each normalised.
- * A camera derived from a marker has |look_at − eye| = 1 and a unit `up` perpendicular to it; one from a trajectory
- * file may have any `up` that is not parallel to w. */
+ * A camera derived from a marker has |look_at − eye| = 1 and a unit vector `up` perpendicular to w; a camera from a
+ * trajectory file may have any `up` that is not parallel to w. */
 typedef struct arhost_camera {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */

@@ -2,7 +2,7 @@
 /*
  * arhost/frame.h: layout of video frames in shared memory.
  *
- * Pixel coordinates are those of OpenCV's calibrations: centres at integers, (0, 0) is the centre of the top left
+ * Pixel coordinates follow OpenCV's calibration: pixel centres are at integers, (0, 0) is the centre of the top left
  * pixel, y points down. The first row is the top one.
  */
 #ifndef ARHOST_FRAME_H
@@ -20,8 +20,8 @@ enum {
     ARHOST_PIXEL_FORMAT_RGB8 = 2,  /* 1 plane: R G B */
     ARHOST_PIXEL_FORMAT_BGR8 = 3,  /* 1 plane: B G R */
     ARHOST_PIXEL_FORMAT_YUYV = 4,  /* 1 plane: Y0 U Y1 V; even width */
-    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y; interleaved U V at half size. Even width and height */
-    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V; U and V at half size. Even width and height */
+    ARHOST_PIXEL_FORMAT_NV12 = 5,  /* 2 planes: Y; U V interleaved, subsampled 2×2. Even width and height */
+    ARHOST_PIXEL_FORMAT_I420 = 6   /* 3 planes: Y, U, V; U and V subsampled 2×2. Even width and height */
 };
 
 /* R'G'B' to Y'CbCr conversion. Required for YUYV, NV12 and I420, ignored otherwise. */
@@ -30,7 +30,7 @@ enum { ARHOST_YUV_MATRIX_BT601 = 1, ARHOST_YUV_MATRIX_BT709 = 2 };
 typedef int32_t arhost_yuv_range;
 enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 
-/* The clock of a capture time. */
+/* The clock that measured a capture time. */
 typedef int32_t arhost_clock;
 enum {
     ARHOST_CLOCK_MONOTONIC = 1, /* this machine's CLOCK_MONOTONIC; for cameras */
@@ -39,8 +39,8 @@ enum {
 
 enum { ARHOST_MAX_PLANES = 3, ARHOST_MAX_IMAGE_SIDE = 16384 };
 
-/* The layout of all frames of a source, constant from its start to its stop. The source sets the first group of
- * fields and calls arhost_frame_layout to fill in the second. */
+/* The layout of all frames of a source, constant from `start` to `stop`. The source sets the fields up to `fps` and
+ * calls arhost_frame_layout, which computes the fields from `plane_count` on. */
 typedef struct arhost_frame_format {
     uint32_t struct_size;
     arhost_pixel_format pixel_format;
@@ -53,12 +53,12 @@ typedef struct arhost_frame_format {
     uint32_t stride[ARHOST_MAX_PLANES]; /* bytes per row, a multiple of 64 */
     uint64_t offset[ARHOST_MAX_PLANES]; /* bytes from the start of the slot, a multiple of 64 */
     uint32_t grey_stride;
-    uint64_t grey_offset; /* of the grey plane: plane 0 if that is luma, else a separate plane that the
-                             worker fills once for all trackers */
+    uint64_t grey_offset; /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
+                             which the worker fills once for all trackers */
     uint64_t byte_size;   /* size of a slot */
 } arhost_frame_format;
 
-/* Fills in the second group of fields from the first. Returns 0 if the first group is invalid. */
+/* Computes the fields from `plane_count` on from the fields before it. Returns 1, or 0 if the latter are invalid. */
 static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     const uint64_t w = format->width, h = format->height;
     uint64_t row[ARHOST_MAX_PLANES] = {0, 0, 0};
@@ -120,10 +120,10 @@ typedef struct arhost_frame {
     uint32_t struct_size;
     arhost_clock clock;
     const arhost_frame_format *format;
-    const uint8_t *plane[ARHOST_MAX_PLANES]; /* NULL from format->plane_count on */
+    const uint8_t *plane[ARHOST_MAX_PLANES]; /* elements from format->plane_count on are NULL */
     const uint8_t *grey;                     /* full-range luma, format->grey_stride bytes per row */
     uint64_t sequence;                       /* frame number: 0, 1, 2, … */
-    int64_t capture_ns;                      /* ns of `clock`; the middle of the exposure, if known */
+    int64_t capture_ns;                      /* capture time in ns of `clock`; the middle of the exposure, if known */
 } arhost_frame;
 
 #ifdef __cplusplus

@@ -2,9 +2,9 @@
 /*
  * arhost/motion.h: the animated state of a scene at the time of one image.
  *
- * Part of each render request if the scene's duration_s is above 0. The worker evaluates it from the scene's nodes,
- * channels and skins, so ray tracers need not. All of it is valid only during the call. The array elements have no
- * struct_size and never grow: step by sizeof.
+ * Each render request contains an arhost_motion if the scene's duration_s is above 0. The worker computes it from the
+ * scene's nodes, channels and skins, so ray tracers need not do this. The struct and its arrays are valid only during
+ * the call. Array elements have no struct_size and never grow, so they are sizeof(element) bytes apart.
  */
 #ifndef ARHOST_MOTION_H
 #define ARHOST_MOTION_H
@@ -15,19 +15,21 @@
 extern "C" {
 #endif
 
-/* The transform of an object with `moves` set. One entry for each such object, in the scene's order. */
+/* The transform of an object whose `moves` is set. There is one entry for each such object, in the order of the
+ * scene's objects. */
 typedef struct arhost_moved_object {
-    uint32_t object;
+    uint32_t object;             /* index of the object in the scene */
     float world_from_object[12]; /* column-major 3×4, invertible; mm */
 } arhost_moved_object;
 
-/* The vertices of an object with `deforms` set. One entry for each such object, in the scene's order. Skinned
- * vertices are in world coordinates: their world_from_object is the identity. */
+/* The vertices of an object whose `deforms` is set. There is one entry for each such object, in the order of the
+ * scene's objects. Vertices of skinned objects are in world coordinates; the world_from_object of these objects is
+ * the identity. */
 typedef struct arhost_deformed_geometry {
-    uint32_t object;
-    uint32_t vertex_count;  /* equals that of the geometry in the arena */
-    const float *positions; /* 3 floats each; at least 16 readable bytes follow the last */
-    const float *normals;   /* 3 floats each, unit length; NULL if the geometry has none */
+    uint32_t object;        /* index of the object in the scene */
+    uint32_t vertex_count;  /* same as in the arena, positions.count of the geometry */
+    const float *positions; /* 3 floats per vertex; at least 16 readable bytes follow the last one */
+    const float *normals;   /* 3 floats per vertex, unit length; NULL if the geometry has no normals */
 } arhost_deformed_geometry;
 
 typedef struct arhost_motion {

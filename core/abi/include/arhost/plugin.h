@@ -2,8 +2,8 @@
 /*
  * arhost/plugin.h: discovery, version negotiation, description and lifetime of a plugin.
  *
- * A plugin is a shared object that exports one data symbol, `arhost_entry`. `arhost-worker` opens it, one process per
- * plugin; the host never does.
+ * A plugin is a shared object that exports one data symbol, `arhost_entry`. Each plugin is loaded by its own
+ * `arhost-worker` process; the host itself never loads a plugin.
  *
  * States of a plugin, and the calls that change them:
  *
@@ -12,24 +12,26 @@
  *                                   ◀──────────         ◀──────────
  *                                     destroy              stop
  *
- * A call that fails leaves the state unchanged, so `destroy` follows a failed `start` without `stop`. In the state
- * `started` the worker calls the per-frame function of the plugin's kind. A ray tracer may be started again after
- * `stop`; other kinds are started once. The process ends after `destroy`.
+ * A call that fails leaves the state unchanged, so after a failed `start` the worker calls `destroy` without
+ * `stop`. In the state `started` the worker calls the per-frame function of the plugin's kind. A ray tracer may be
+ * started again after `stop`; a plugin of any other kind is started only once. The worker process exits after
+ * `destroy`.
  *
  * The comment of each function begins with a tag: the thread that may call it and the state that it requires.
  *   [worker, STATE]  on the worker's main thread, which makes all calls into the plugin
- *   [worker]         on that thread, in the context that the comment describes
+ *   [worker]         on the same thread; the comment describes when
  *   [any]            on any thread, in any state
  *
  * Rules for every function, unless its comment says otherwise:
- * - Threads: a plugin may create threads and must join them in `destroy` at the latest. They may call only functions
- *   tagged [any].
+ * - Threads: a plugin may create threads and must join them no later than in `destroy`. These threads may call only
+ *   functions tagged [any].
  * - Ownership: a pointer passed in a call belongs to the caller and is valid until the call returns. Memory is never
  *   allocated on one side and freed on the other.
- * - Structs begin with `struct_size`, their size in bytes as known to the writer. Never access a field beyond it.
- *   Step through an array by the first element's `struct_size`; elements without one (arhost/motion.h,
- *   arhost/scene.h) never grow, so step by their sizeof.
- * - Strings are UTF-8 and NUL-terminated. Pointers are not NULL unless documented.
+ * - Each struct begins with `struct_size`: the size of the struct in bytes, as known to the side that fills it in.
+ *   Never access a field beyond this size. Consecutive elements of an array are as many bytes apart as the
+ *   `struct_size` of the first element says. Elements without a `struct_size` (arhost/motion.h, arhost/scene.h) never
+ *   grow, so they are sizeof(element) bytes apart.
+ * - Strings are UTF-8 and NUL-terminated. Pointers are not NULL unless documented otherwise.
  * - No function throws an exception or exits by longjmp.
  */
 #ifndef ARHOST_PLUGIN_H
@@ -43,7 +45,8 @@
 extern "C" {
 #endif
 
-/* 0 is the draft: loader and plugin must match exactly. docs/abi.md lists the guarantees of version 1. */
+/* Version 0 is the draft: loader and plugin must have exactly the same version. docs/abi.md lists the guarantees of
+ * version 1. */
 #define ARHOST_ABI_VERSION 0u
 
 #if defined(__GNUC__)
@@ -52,20 +55,20 @@ extern "C" {
 #define ARHOST_EXPORT
 #endif
 
-/* Positive: success. Negative: failure. 0 is invalid, so a missing return value is detected. */
+/* Positive values mean success, negative values failure. 0 is invalid, so a forgotten return value is detected. */
 typedef int32_t arhost_status;
 enum {
     ARHOST_STATUS_OK = 1,
-    ARHOST_STATUS_END = 2, /* success, end of the run: no more frames, or the user closed the sink's window */
+    ARHOST_STATUS_END = 2, /* success; ends the run: no more frames, or the user closed the window of the sink */
     ARHOST_STATUS_END_TRUNCATED = 3, /* the source's input is truncated; all readable frames were delivered */
 
-    ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* the caller violated the ABI's contract */
+    ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* contract violation by the caller */
     ARHOST_STATUS_ERROR_CONFIGURATION = -2,    /* unusable options, scene or calibration; not retried */
-    ARHOST_STATUS_ERROR_UNSUPPORTED = -3,      /* valid, but not supported by this plugin or machine; not retried */
+    ARHOST_STATUS_ERROR_UNSUPPORTED = -3,      /* valid, but unsupported by this plugin or machine; not retried */
     ARHOST_STATUS_ERROR_IO = -4,               /* file or device error */
     ARHOST_STATUS_ERROR_OUT_OF_MEMORY = -5,
     ARHOST_STATUS_ERROR_DEVICE_LOST = -6, /* camera unplugged, GPU reset; a restart may help */
-    ARHOST_STATUS_ERROR_CANCELLED = -7,   /* stopped early because host->cancelled returned non-zero */
+    ARHOST_STATUS_ERROR_CANCELLED = -7,   /* the call returned early because host->cancelled returned non-zero */
     ARHOST_STATUS_ERROR_INTERNAL = -8     /* a defect of the plugin, such as an unexpected exception */
 };
 
@@ -83,8 +86,8 @@ enum {
     ARHOST_SEVERITY_INFO = 2,
     ARHOST_SEVERITY_WARNING = 3,
     ARHOST_SEVERITY_ERROR = 4,
-    ARHOST_SEVERITY_HOST_MISBEHAVING = 5,  /* reported by a plugin: the host violated the contract */
-    ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 6 /* reported by the worker: the plugin violated it */
+    ARHOST_SEVERITY_HOST_MISBEHAVING = 5,  /* logged by a plugin: contract violation by the host */
+    ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 6 /* logged by the worker: contract violation by the plugin */
 };
 
 /* The host's callbacks. Valid until the process ends; no function is NULL. */
@@ -92,22 +95,24 @@ typedef struct arhost_host {
     uint32_t struct_size;
     uint32_t abi_version; /* the negotiated version */
     const char *name;     /* "arhost" */
-    const char *version;  /* of the host: "0.1.0" */
+    const char *version;  /* version of the host, such as "0.1.0" */
     void *context;        /* private to the host */
 
-    /* [any] Logs one message, without a trailing newline. Never blocks: drops the message if the host is behind. */
+    /* [any] Logs one message, without a trailing newline. Never blocks: drops the message if the host cannot
+     * keep up. */
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
-    /* [any] Reports progress and extends the start-up deadline: call it at least every few seconds in `create` and
-     * `start`. `fraction`: 0 to 1, or negative if unknown. `what`: the current step, for the user. */
+    /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`: call it at
+     * least every few seconds in these functions. `fraction`: the completed fraction, 0 to 1, or negative if unknown.
+     * `what`: describes the current step to the user. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
-    /* [any] Non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one atomic load;
-     * poll it in every loop that can take longer than 100 ms. */
+    /* [any] Returns non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one
+     * atomic load; poll it in every loop that can take longer than 100 ms. */
     int32_t (*cancelled)(const struct arhost_host *host);
 
-    /* [any] A host extension by id and revision ("arhost.host.something/1"); NULL if not supported, in which case the
-     * plugin must work without it. */
+    /* [any] Returns the host extension with this id and revision ("arhost.host.something/1"), or NULL if the host
+     * does not support it. A plugin must also work without the extension. */
     const void *(*get_extension)(const struct arhost_host *host, const char *id);
 } arhost_host;
 
@@ -122,15 +127,15 @@ enum {
     ARHOST_OPTION_OUTPUT_PATH = 6 /* arhost_option.text; absolute, resolved against the working directory */
 };
 
-/* Declares an option. The host validates the configuration against it before it calls `create`, and reports unknown
- * keys, wrong types and values out of range with their line in the YAML file. */
+/* Declares an option. Before `create` is called, the host checks the configuration against the declarations, and
+ * reports unknown keys, wrong types and values out of range with their line in the YAML file. */
 typedef struct arhost_option_descriptor {
     uint32_t struct_size;
     arhost_option_type type;
     const char *key;            /* key in the `options:` map */
     const char *default_value;  /* in YAML syntax; NULL: the option is required */
-    double minimum, maximum;    /* for INTEGER and REAL, inclusive; both 0: unbounded */
-    const char *const *choices; /* for TEXT: NULL-terminated list of the valid values; NULL: any */
+    double minimum, maximum;    /* inclusive range of an INTEGER or REAL; both 0: unbounded */
+    const char *const *choices; /* for TEXT: NULL-terminated list of the valid values; NULL: any text is valid */
     const char *help;           /* one sentence, including the unit */
 } arhost_option_descriptor;
 
@@ -142,10 +147,10 @@ typedef struct arhost_option {
     const char *key;
     int64_t integer;
     double real;
-    const char *text; /* not NULL, whatever the type */
+    const char *text; /* never NULL, also for types other than TEXT */
 } arhost_option;
 
-/* Finds an option passed to `create` by its key; NULL if there is none. */
+/* Returns the option with this key among those passed to `create`, or NULL if there is none. */
 static inline const arhost_option *arhost_find_option(const arhost_option *options, uint32_t option_count,
                                                       const char *key) {
     const char *at = (const char *)options;
@@ -158,10 +163,10 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
 
 /* Optional capabilities: bits of arhost_descriptor.capabilities. */
 enum {
-    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame, with identical frames from there on */
+    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same wherever it starts */
     ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
     ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
-    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4    /* sink: wants the latest frame rather than every frame */
+    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4    /* sink: needs only the latest frame */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096
@@ -171,7 +176,7 @@ typedef struct arhost_descriptor {
     arhost_kind kind;
     const char *id;      /* the file name without ".so": "rt_embree" */
     const char *name;    /* display name: "Embree ray tracer" */
-    const char *version; /* of the plugin: "1.2.0" */
+    const char *version; /* version of the plugin, such as "1.2.0" */
     const char *vendor;
     const char *licence;     /* SPDX identifier */
     const char *description; /* one sentence */
@@ -180,15 +185,16 @@ typedef struct arhost_descriptor {
     const arhost_option_descriptor *options; /* option_count elements; may be NULL if there are none */
     /* Permissions that the plugin needs from the sandbox, a NULL-terminated list; NULL: none. "video" (/dev/video*),
      * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "processes" (fork and exec). The configuration
-     * grants them (`allow: [video]`); the host rejects the plugin before `create` if one is not granted. */
+     * grants them (`allow: [video]`); the host rejects the plugin before `create` if one of them is not granted. */
     const char *const *needs;
 } arhost_descriptor;
 
 /* An instance of a plugin; opaque to the host. */
 typedef struct arhost_instance arhost_instance;
 
-/* The plugin's entry points. Static storage, including everything it points to; every negotiation returns the same.
- * The host rejects a plugin if a function here or in its kind's table is NULL, unless documented as optional. */
+/* The entry points of a plugin. This struct and everything it points to is in static storage; every call of
+ * `negotiate` returns the same pointer. The host rejects a plugin if a function in this struct or in `functions` is
+ * NULL, unless the function is documented as optional. */
 typedef struct arhost_plugin {
     uint32_t struct_size;
     const arhost_descriptor *descriptor;
@@ -196,24 +202,24 @@ typedef struct arhost_plugin {
     /* The function table of descriptor->kind: arhost_source, arhost_tracker, arhost_raytracer or arhost_sink. */
     const void *functions;
 
-    /* [worker, negotiated] Creates an instance; on success *instance is not NULL. On failure logs the reason with
-     * ARHOST_SEVERITY_ERROR, naming the option to change, and leaves *instance NULL. `host` outlives the instance;
+    /* [worker, negotiated] Creates an instance; on success *instance is not NULL. On failure, it logs the reason with
+     * ARHOST_SEVERITY_ERROR, names the option to change, and leaves *instance NULL. `host` outlives the instance;
      * `options` are valid only during the call. */
     arhost_status (*create)(const arhost_host *host, const arhost_option *options, uint32_t option_count,
                             arhost_instance **instance);
 
-    /* [worker, created] Joins the instance's threads and releases all its resources. Called once. */
+    /* [worker, created] Joins the instance's threads and releases all its resources. Called once per instance. */
     void (*destroy)(arhost_instance *instance);
 
-    /* [worker, negotiated or later] The function table of an extension, by id and revision ("arhost.devices/1"), in
-     * static storage; NULL if not supported. */
+    /* [worker, negotiated or later] Returns the function table of the extension with this id and revision
+     * ("arhost.devices/1"), in static storage, or NULL if the plugin does not support the extension. */
     const void *(*get_extension)(const char *id);
 } arhost_plugin;
 
-/* Version negotiation: what the loader offers, and what the plugin answers. */
+/* Version negotiation: the offer of the loader and the answer of the plugin. */
 typedef struct arhost_offer {
     uint32_t struct_size;
-    uint32_t oldest_abi_version; /* the versions that the loader supports, inclusive */
+    uint32_t oldest_abi_version; /* the range of versions that the loader supports, inclusive */
     uint32_t newest_abi_version;
 } arhost_offer;
 
@@ -226,8 +232,8 @@ typedef struct arhost_answer {
 typedef struct arhost_entry_point {
     uint32_t struct_size;
     /* [worker, loaded] Returns ARHOST_STATUS_OK and sets answer->abi_version, within the offered range, and
-     * answer->plugin; or returns ARHOST_STATUS_ERROR_UNSUPPORTED if no offered version is supported. The loader
-     * rejects a plugin that returns success with a NULL plugin or a version out of range. */
+     * answer->plugin; or returns ARHOST_STATUS_ERROR_UNSUPPORTED if the plugin supports no offered version. The
+     * loader rejects a plugin that returns success with a NULL plugin or a version out of range. */
     arhost_status (*negotiate)(const arhost_offer *offer, arhost_answer *answer);
 } arhost_entry_point;
 

@@ -16,26 +16,26 @@ extern "C" {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;              /* px, of the images to render */
+    uint32_t width, height;              /* size of the images to render, px */
     uint32_t reserved;                   /* 0 */
     const arhost_scene *scene;           /* read-only, valid until `stop`; validated by the host */
-    const arhost_intrinsics *intrinsics; /* equal in every request: precompute ray tables here */
+    const arhost_intrinsics *intrinsics; /* the same in every request; precompute ray tables here */
 } arhost_raytracer_setup;
 
 typedef struct arhost_render_request {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */
-    uint64_t sequence; /* of the video frame; use it to seed random numbers */
+    uint64_t sequence; /* number of the video frame; use it to seed random numbers */
     double time_s;     /* scene time, s */
     arhost_camera camera;
     const arhost_motion *motion; /* NULL if the scene's duration_s is 0 */
 } arhost_render_request;
 
 /* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is
- * exactly 0 where no ray hit (the colour is then ignored) and 255 on virtual objects. Near clip: 1e-4 × scene extent.
- * Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page and its last page is fully mapped, so a
- * GPU can import the memory; leave the bytes after the last row unchanged. Between `start` and `stop` at most 8
- * distinct addresses occur. */
+ * exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Near clip:
+ * 1e-4 × scene extent. Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page and its last page
+ * is fully mapped, so a GPU can import the memory; leave the bytes after the last row unchanged. Between `start` and
+ * `stop`, `rgba` takes at most 8 different values. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes per row, a multiple of 64 */
@@ -43,11 +43,12 @@ typedef struct arhost_image {
     uint8_t *rgba;
 } arhost_image;
 
-/* Optional results of `render`. Zeroed by the worker except for struct_size; leave it zeroed if nothing applies. */
+/* Optional results of `render`. Zeroed by the worker except for struct_size; leave fields zeroed that do not apply.
+ */
 typedef struct arhost_render_info {
     uint32_t struct_size;
-    int32_t has_region; /* non-zero: the region is set; 0: it is the whole image */
-    /* px; every alpha outside of this rectangle is 0, so the host skips those pixels. Width 0: empty. */
+    int32_t has_region; /* non-zero: the following four fields are set; 0: the region is the whole image */
+    /* Region, px. Outside it, alpha must be 0; the host skips these pixels. Width 0: the whole image is empty. */
     uint32_t region_x, region_y, region_width, region_height;
     uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
 } arhost_render_info;
@@ -55,11 +56,11 @@ typedef struct arhost_render_info {
 typedef struct arhost_raytracer {
     uint32_t struct_size;
 
-    /* [worker, created] Builds acceleration structures and compiles shaders; reports progress. May be called again
-     * after `stop`, with another scene and size. */
+    /* [worker, created] Builds acceleration structures and compiles shaders, and reports progress meanwhile. May be
+     * called again after `stop`, with another scene and image size. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
-    /* [worker, started] Renders one image. The same request gives identical bytes on any number of threads. */
+    /* [worker, started] Renders one image. Equal requests must give identical bytes, with any number of threads. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 

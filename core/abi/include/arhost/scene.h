@@ -2,12 +2,13 @@
 /*
  * arhost/scene.h: the scene as one flat, position-independent block of memory, the arena.
  *
- * The loader writes the arena; the host validates every offset, index and number once, then seals it; ray tracers
- * read it in place. Offsets are bytes from the start of the arena and multiples of 64. At least 16 readable bytes
- * follow every buffer of vertices and attributes. Little-endian.
+ * The loader writes the arena. The host validates every offset, index and number in it once and makes it read-only;
+ * ray tracers read it in place. Offsets are in bytes from the start of the arena and are multiples of 64. At least 16
+ * readable bytes follow every buffer of vertices and attributes. Little-endian.
  *
- * World coordinates are right-handed, in millimetres. All numbers are finite; absolute coordinates are at most 1e9,
- * in the world 4e9. Scenes may have any extent, so choose tolerances relative to it.
+ * World coordinates are right-handed, in millimetres. All numbers are finite. Coordinates have absolute values of at
+ * most 1e9, or 4e9 once transformed to world coordinates. Scenes may have any extent, so choose tolerances relative
+ * to the extent.
  */
 #ifndef ARHOST_SCENE_H
 #define ARHOST_SCENE_H
@@ -22,7 +23,7 @@ extern "C" {
 #define ARHOST_SCENE_VERSION 2u
 #define ARHOST_NONE 0xffffffffu
 
-/* An array in the arena: `count` elements, `stride` bytes apart. count 0: absent. */
+/* An array in the arena: `count` elements, `stride` bytes apart. If `count` is 0, the array is absent. */
 typedef struct arhost_buffer {
     uint64_t offset;
     uint32_t count;
@@ -31,7 +32,7 @@ typedef struct arhost_buffer {
 
 typedef int32_t arhost_axes;
 enum {
-    ARHOST_AXES_Z_UP = 1, /* x right, y back, z up: those of the marker */
+    ARHOST_AXES_Z_UP = 1, /* x right, y back, z up: the axes of the marker */
     ARHOST_AXES_Y_UP = 2  /* x right, y up, z front */
 };
 
@@ -44,16 +45,17 @@ enum {
 typedef struct arhost_geometry {
     arhost_geometry_type type;
     uint32_t reserved;
-    arhost_buffer positions; /* triangles: 3 floats per vertex; spheres: 4 floats, centre and radius. Object space;
-                                of a skinned mesh: bind pose. mm */
-    arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat */
+    arhost_buffer positions; /* triangles: 3 floats per vertex; spheres: 4 floats each, centre and radius. In object
+                                space, mm; a skinned mesh is in its bind pose */
+    arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat shading */
     arhost_buffer texcoords; /* 2 floats per vertex; (0, 0): top left corner of the texture, (1, 1): bottom right */
     arhost_buffer indices;   /* 3 uint32 per triangle, each < positions.count */
-    /* Only for deforming triangles, otherwise absent. Evaluated by the worker (arhost/motion.h). */
+    /* Present only in deforming triangle meshes. The worker evaluates these buffers (arhost/motion.h). */
     arhost_buffer joints;          /* 4 uint16 per vertex: indices into the skin's joints */
     arhost_buffer weights;         /* 4 floats per vertex, 0 to 1, sum 1 */
-    arhost_buffer morph_positions; /* 3 floats per vertex and target: displacements, all vertices of target 0 first */
-    arhost_buffer morph_normals;   /* likewise, or absent */
+    arhost_buffer morph_positions; /* displacements, 3 floats per vertex and morph target: first those of all vertices
+                                      for target 0, then for target 1, … */
+    arhost_buffer morph_normals;   /* changes of the normals, in the same order; may be absent */
 } arhost_geometry;
 
 /* ---- textures ---- */
@@ -73,7 +75,7 @@ typedef struct arhost_texture {
     arhost_texel_format format;
     uint32_t width, height; /* texels, 1 to 16384 */
     arhost_wrap wrap_u, wrap_v;
-    uint32_t name;        /* byte offset into `names`, of a NUL-terminated string */
+    uint32_t name;        /* of a NUL-terminated string: byte offset into `names` */
     arhost_buffer texels; /* width·height, top row first; stride 4 or 16 */
 } arhost_texture;
 
@@ -87,12 +89,13 @@ enum {
     ARHOST_MATERIAL_METAL = 4,    /* Lambert + Phong + perfect reflection · Schlick's Fresnel term with
                                      F0 = `reflectivity` */
     ARHOST_MATERIAL_GLASS = 5,    /* refraction and reflection weighted by a Fresnel term, absorption inside */
-    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX over Lambert */
+    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX specular over Lambert diffuse */
 };
 
-/* Colours are linear light, 0 to 1, Rec. 709 primaries. Textures are indices or ARHOST_NONE; a texture value
- * multiplies the constant next to it, and is 1 on a geometry without texcoords. A model ignores fields that do not
- * apply to it: mirror and glass have no diffuse colour and no emission. */
+/* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The
+ * texture's value multiplies the corresponding constant of the material; it counts as 1 on a geometry without
+ * texcoords. A model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no
+ * emission. */
 typedef struct arhost_material {
     arhost_material_model model;
     uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha is compared with alpha_cutoff */
@@ -102,26 +105,27 @@ typedef struct arhost_material {
     float exponent;          /* Phong exponent, >= 1 */
     float reflectivity[3];   /* Kr; glass: tint of reflected light */
     float emission[3];       /* emitted radiance, 0 to 1e6 */
-    float alpha_cutoff;      /* the surface is absent where colour_texture's alpha is lower; 0: nowhere */
+    float alpha_cutoff;      /* the surface is absent where the alpha of colour_texture is lower; 0: absent nowhere */
 
     /* Metallic-roughness. */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
-    uint32_t normal_texture;             /* tangent space, 2t − 1 each: R along +u, G along −v, B outwards */
+    uint32_t normal_texture; /* tangent-space normal = 2 · texel − 1: R along +u, G along −v, B outwards */
     uint32_t emission_texture;
 
     /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
-     * internal reflection; c is the cosine of the angle to the normal, of the incident or refracted ray, whichever is
-     * outside. */
+     * internal reflection. c is the cosine of the angle between the normal and the ray on the outside of the glass,
+     * which is either the incident or the refracted ray. */
     float index;                            /* refractive index relative to the outside, 1 to 4 */
     float fresnel_exponent;                 /* 0.01 to 100 */
     float fresnel_minimum, fresnel_maximum; /* 0 to 1 */
     float refraction[3];                    /* tint of refracted light */
     float extinction[3];         /* 1/mm, >= 0; transmittance is exp(−extinction · path length inside) */
-    float shadow_attenuation[3]; /* transmittance of shadow rays per surface, at normal incidence; 0 to 1 */
-    float cutoff_colour[3];      /* radiance assumed for rays that are cut off */
-    float importance_cutoff;     /* rays that contribute less than this are cut off; 0 to 1 */
-    uint32_t reflection_depth, refraction_depth; /* such rays are spawned only at a lower depth */
+    float shadow_attenuation[3]; /* transmittance of each surface for shadow rays at normal incidence, 0 to 1 */
+    float cutoff_colour[3];      /* radiance assumed for rays that are not traced because of importance_cutoff */
+    float importance_cutoff;     /* rays that would contribute less than this are not traced; 0 to 1 */
+    uint32_t reflection_depth, refraction_depth; /* reflected and refracted rays are traced only from hits whose
+                                                    depth is lower than this */
 } arhost_material;
 
 /* ---- objects ---- */
@@ -129,8 +133,8 @@ typedef struct arhost_material {
 typedef int32_t arhost_role;
 enum {
     ARHOST_ROLE_VIRTUAL = 1, /* virtual object: alpha 255 */
-    ARHOST_ROLE_CATCHER = 2, /* shadow catcher, proxy for real geometry: alpha only where shadowed. Visible to
-                                secondary rays; primary rays pass through its back faces */
+    ARHOST_ROLE_CATCHER = 2, /* shadow catcher, a proxy for real geometry: alpha is above 0 only where it is
+                                shadowed. Visible to secondary rays; primary rays pass through its back faces */
     ARHOST_ROLE_OCCLUDER = 3 /* proxy for real geometry that hides virtual objects behind it: alpha 0 */
 };
 
@@ -138,22 +142,25 @@ typedef struct arhost_object {
     uint32_t geometry, material; /* indices */
     arhost_role role;
     uint32_t name; /* byte offset into `names`, of a NUL-terminated string */
-    /* Column-major 3×4, invertible: the columns are the x, y, z axes and the origin, mm. Identity if the loader has
-     * transformed a static object's vertices to world coordinates. For a moving object: the transform at time 0. */
+    /* Column-major 3×4, invertible: the columns are the x, y and z axes and the origin, mm. The identity for a static
+     * object whose vertices the loader has transformed to world coordinates. For a moving object, the transform at
+     * time 0. */
     float world_from_object[12];
-    uint32_t moves;      /* non-zero: each request contains its transform (arhost/motion.h) */
-    uint32_t deforms;    /* non-zero: and its vertices; no other object shares its geometry */
-    uint32_t node, skin; /* indices or ARHOST_NONE; for the worker's animation */
+    uint32_t moves;      /* non-zero: each request contains the transform of the object (arhost/motion.h) */
+    uint32_t deforms;    /* non-zero: each request contains the vertices of the object (arhost/motion.h); no other
+                            object shares its geometry */
+    uint32_t node, skin; /* indices or ARHOST_NONE; used by the worker to animate the object */
 } arhost_object;
 
 /* ---- animation: evaluated by the worker (arhost/motion.h); ray tracers may ignore it ---- */
 
 /* A node of the transform hierarchy. */
 typedef struct arhost_node {
-    uint32_t parent;                             /* an index lower than its own; ARHOST_NONE: the world */
-    uint32_t animated;                           /* non-zero: use translation, rotation and scale instead of: */
+    uint32_t parent;                             /* index lower than that of this node; ARHOST_NONE: the world */
+    uint32_t animated;                           /* 0: use parent_from_node; otherwise use translation,
+                                                    rotation and scale */
     float parent_from_node[12];                  /* column-major 3×4 */
-    float translation[3], rotation[4], scale[3]; /* mm; unit quaternion x, y, z, w; factors */
+    float translation[3], rotation[4], scale[3]; /* mm; unit quaternion (x, y, z, w); scale factors */
     arhost_buffer morph_weights;                 /* floats, one per morph target of this node's geometry */
 } arhost_node;
 
@@ -168,7 +175,7 @@ typedef int32_t arhost_interpolation;
 enum {
     ARHOST_INTERPOLATION_STEP = 1,
     ARHOST_INTERPOLATION_LINEAR = 2, /* spherical (slerp) for rotations */
-    ARHOST_INTERPOLATION_CUBIC = 3   /* keys of in-tangent, value, out-tangent, as in glTF 2.0, appendix C */
+    ARHOST_INTERPOLATION_CUBIC = 3   /* each key has in-tangent, value, out-tangent, as in glTF 2.0, appendix C */
 };
 
 /* Animates one property of a node. */
@@ -177,8 +184,9 @@ typedef struct arhost_channel {
     arhost_channel_target target;
     arhost_interpolation interpolation;
     uint32_t reserved;
-    arhost_buffer times;  /* floats, s, ascending: one per key */
-    arhost_buffer values; /* floats: 3, 4 or one per morph weight for each key; CUBIC: three times that */
+    arhost_buffer times;  /* floats, one per key: time in s, ascending */
+    arhost_buffer values; /* floats, per key: 3 (translation, scale), 4 (rotation) or one per morph weight;
+                              three times as many for CUBIC */
 } arhost_channel;
 
 typedef struct arhost_skin {
@@ -203,18 +211,19 @@ enum {
     ARHOST_FALLOFF_INVERSE_SQUARE = 2 /* irradiance = intensity · cosθ / d², d in mm */
 };
 
-/* An area light is the mean over points distributed uniformly on it (on a sphere: over its visible disc), each a
- * light of `intensity`; in the limit of a small size it equals a point light. */
+/* An area light illuminates like the mean of point lights with this `intensity` that are distributed uniformly over
+ * its area (for a sphere: over its visible disc). A very small area light therefore equals a point light. */
 typedef struct arhost_light {
     arhost_light_type type;
-    arhost_falloff falloff;           /* directional: NONE */
-    float position[3];                /* mm */
-    float direction[3];               /* unit length, pointing away from the light */
-    float intensity[3];               /* linear RGB; see arhost_falloff */
-    float axis_u[3], axis_v[3];       /* mm; half sides, perpendicular to each other and to `direction` */
-    float radius;                     /* mm */
-    float cosine_inner, cosine_outer; /* cosines of a spot's half angles: full intensity inside inner, none outside
-                                         outer, smooth in between; inner >= outer */
+    arhost_falloff falloff;     /* NONE for directional lights */
+    float position[3];          /* mm */
+    float direction[3];         /* unit length, pointing away from the light */
+    float intensity[3];         /* linear RGB; see arhost_falloff */
+    float axis_u[3], axis_v[3]; /* mm; half sides, perpendicular to each other and to `direction` */
+    float radius;               /* mm */
+    /* Cosines of the half angles of a spot light: full intensity inside the inner cone, 0 outside the outer cone,
+     * smooth in between; cosine_inner >= cosine_outer. */
+    float cosine_inner, cosine_outer;
 } arhost_light;
 
 /* Environment map in equirectangular projection: a unit direction (x, y, z) in environment coordinates, y up, maps to
@@ -223,9 +232,10 @@ typedef struct arhost_environment {
     uint32_t texture;                /* index, RGBA32F; ARHOST_NONE: no environment */
     float intensity;                 /* multiplies the texels */
     float environment_from_world[9]; /* rotation, column-major 3×3 */
-    /* CDFs for importance sampling with a density proportional to luminance · sin(πv); floats, the last one is 1. */
-    arhost_buffer rows;    /* marginal: `height` values */
-    arhost_buffer columns; /* conditional: `width` values for each row */
+    /* CDFs (floats, the last of each CDF is 1) for importance sampling with a density proportional to
+     * luminance · sin(πv). */
+    arhost_buffer rows;    /* marginal CDF: one value per row of the texture */
+    arhost_buffer columns; /* conditional CDFs: for each row, one value per column */
 } arhost_environment;
 
 /* The header at the start of the arena. */
@@ -233,16 +243,16 @@ typedef struct arhost_scene {
     uint64_t magic;   /* ARHOST_SCENE_MAGIC */
     uint32_t version; /* ARHOST_SCENE_VERSION */
     uint32_t struct_size;
-    uint64_t byte_size; /* of the arena, including this header and the 16 bytes after the last buffer */
+    uint64_t byte_size; /* size of the arena, including this header and the 16 bytes after the last buffer */
     arhost_axes axes;
     uint32_t max_depth;  /* maximum number of bounces after the primary ray */
     float ambient[3];    /* ambient light, linear RGB */
-    float background[3]; /* radiance of secondary rays that hit nothing, without an environment; primary rays
-                            that hit nothing: alpha 0 */
+    float background[3]; /* radiance of secondary rays that hit nothing, if there is no environment; primary rays
+                            that hit nothing give alpha 0 */
     float bounds_min[3], bounds_max[3]; /* world bounding box of all objects at time 0; animation may exceed it */
-    float shadow_alpha_opaque, shadow_alpha_translucent; /* of full shadows on catchers; by default 0.6 and 0.3 */
+    float shadow_alpha_opaque, shadow_alpha_translucent; /* alpha of full shadows on catchers; defaults 0.6 and 0.3 */
     uint32_t coloured_shadows;                           /* non-zero: glass casts coloured shadows on catchers */
-    float duration_s;                                    /* period of the animation, which repeats; 0: static */
+    float duration_s;                                    /* period of the repeating animation, s; 0: static scene */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
     arhost_buffer textures;   /* arhost_texture */

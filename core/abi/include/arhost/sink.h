@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/sink.h: receives augmented frames: writes a video, images or poses, or shows a window.
+ * arhost/sink.h: a sink receives augmented frames. It writes a video, images or poses, or shows a window.
  */
 #ifndef ARHOST_SINK_H
 #define ARHOST_SINK_H
@@ -16,24 +16,24 @@ extern "C" {
 
 typedef struct arhost_sink_setup {
     uint32_t struct_size;
-    uint32_t width, height; /* px, of the images */
+    uint32_t width, height; /* size of the frames, px */
     uint32_t reserved;      /* 0 */
     double fps;             /* nominal frame rate, 1/s; 0: unknown */
     /* Sequence number of the first frame: 0 on a fresh start, higher after a restart. Keep the output for earlier
-     * frames; replace that for this frame and later ones. */
+     * frames; replace the output for this frame and later ones. */
     uint64_t first_sequence;
-    const arhost_intrinsics *intrinsics; /* of every camera in the records; NULL if unknown */
+    const arhost_intrinsics *intrinsics; /* the same for every camera in the records; NULL if unknown */
 } arhost_sink_setup;
 
 /* The origin of a frame's overlay. */
 typedef int32_t arhost_overlay;
 enum {
     ARHOST_OVERLAY_RENDERED = 1, /* rendered from this frame's pose */
-    ARHOST_OVERLAY_HELD = 2,     /* rendered from the last known pose, within the configured hold time */
-    ARHOST_OVERLAY_NONE = 3      /* plain video: no marker in view, or a component is down */
+    ARHOST_OVERLAY_HELD = 2,     /* rendered from the last known pose; used for the configured hold time */
+    ARHOST_OVERLAY_NONE = 3      /* no overlay, only video: no marker in view, or a component is not running */
 };
 
-/* Metadata of a frame. All values that are set are finite. */
+/* Metadata of a frame. All numbers that are set are finite. */
 typedef struct arhost_record {
     uint32_t struct_size;
     arhost_clock clock;
@@ -63,22 +63,23 @@ typedef struct arhost_sink {
     uint32_t struct_size;
 
     /* [worker, created] Fails if the output cannot be written. Must leave existing files unchanged until the first
-     * `write`, because another component may still reject the run. Output survives a kill of the process: it is
-     * written immediately or can be completed afterwards. A file appears under its final name only once it is
-     * complete, unless it is valid at every moment. */
+     * `write`, because another component may still reject the run. The output must survive a kill of the process: the
+     * sink writes it immediately, or completes it after a restart. A file gets its final name only when it is
+     * complete, unless it is a valid file at every moment. */
     arhost_status (*start)(arhost_instance *instance, const arhost_sink_setup *setup);
 
-    /* [worker, started] Takes one frame; sequence numbers ascend. After ARHOST_STATUS_OK the frame is not sent again,
-     * so it must survive a kill of the process. Frames within a file are in order; if each frame has its own numbered
-     * file, the numbers ascend. Returns ARHOST_STATUS_END to end the run: the user closed the window. */
+    /* [worker, started] Takes one frame; sequence numbers ascend. After ARHOST_STATUS_OK the host does not send the
+     * frame again, so it must survive a kill of the process. The frames in a file are in ascending order; if each
+     * frame has its own numbered file, the numbers ascend. Returns ARHOST_STATUS_END if the user closed the window,
+     * which ends the run. */
     arhost_status (*write)(arhost_instance *instance, const arhost_output *output);
 
-    /* [worker, started] Called about 30 times per second while no frame arrives, to process window events. Results as
-     * for `write`. Optional: may be NULL. */
+    /* [worker, started] Called about 30 times per second while no frame arrives, to process window events. Returns
+     * the same values as `write`. Optional: may be NULL. */
     arhost_status (*idle)(arhost_instance *instance);
 
-    /* [worker, started] Called once, after a successful `start`; completes the files. Returns an error if they are
-     * incomplete. */
+    /* [worker, started] Called once, after a successful `start`; completes the files. Returns an error if a file
+     * remains incomplete. */
     arhost_status (*stop)(arhost_instance *instance);
 } arhost_sink;
 

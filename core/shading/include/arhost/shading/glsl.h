@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/glsl.h: the leaf functions of leaf/*.h for shaders (GLSL 4.50 or newer). The shader must enable
+// arhost/shading/glsl.h: compiles the functions of leaf/*.h for shaders (GLSL 4.50 or newer). The shader must enable
 // GL_GOOGLE_include_directive, and core/shading/include must be in the include path (glslangValidator -I…,
 // glslc -I …).
 #ifndef ARHOST_SHADING_GLSL_H

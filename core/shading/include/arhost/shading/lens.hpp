@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/lens.hpp: the lens of arhost/camera.h, from rays to pixels and back. In double precision; meant for
-// precomputing ray tables, not for per-frame evaluation.
+// arhost/shading/lens.hpp: converts rays to pixels and pixels to rays for the lens models of arhost/camera.h, in
+// double precision. Intended for precomputing ray tables; too slow for every frame.
 //
 // Axes: x right, y down, z forward (OpenCV). The image plane is z = 1.
 #pragma once
@@ -23,7 +23,7 @@ struct Point2 {
     double x, y;
 };
 
-// Distortion coefficients for leaf/lens.h; those beyond coefficient_count are 0.
+// Returns the distortion coefficients for leaf/lens.h; coefficients beyond coefficient_count are 0.
 inline std::array<double, ARHOST_MAX_DISTORTION> coefficients_of(const arhost_intrinsics &intrinsics) {
     std::array<double, ARHOST_MAX_DISTORTION> k{};
     std::copy_n(intrinsics.coefficients, std::min<std::size_t>(intrinsics.coefficient_count, k.size()), k.begin());
@@ -44,8 +44,9 @@ public:
         : intrinsics_(intrinsics), brown_(brown_conrady_of(intrinsics)), fisheye_(kannala_brandt_of(intrinsics)),
           limit_(monotonic_limit()) {}
 
-    // Image point (x'', y'') of a direction. None behind the camera (unless fisheye), or beyond the angle where the
-    // distortion polynomial stops increasing and image points would fold back inwards.
+    // Returns the image point (x'', y'') of a direction. Returns nullopt behind the camera (except for fisheye
+    // lenses) and beyond the angle at which the distortion polynomial stops increasing, because image points would
+    // fold back inwards.
     std::optional<Point2> distort(Vec3T<double> d) const {
         if (intrinsics_.distortion == ARHOST_DISTORTION_FISHEYE) {
             if (std::atan2(std::hypot(d.x, d.y), d.z) > limit_)
@@ -68,8 +69,8 @@ public:
         return Point2{intrinsics_.fx * p->x + intrinsics_.cx, intrinsics_.fy * p->y + intrinsics_.cy};
     }
 
-    // The direction seen at a pixel, to 1e-9: on the image plane, or of unit length for a fisheye lens. None if no
-    // direction maps to the pixel.
+    // Returns the direction seen at a pixel, accurate to 1e-9: with z = 1, or with unit length for a fisheye lens.
+    // Returns nullopt if no direction maps to the pixel.
     std::optional<Vec3T<double>> ray(Point2 pixel) const {
         const Point2 p{(pixel.x - intrinsics_.cx) / intrinsics_.fx, (pixel.y - intrinsics_.cy) / intrinsics_.fy};
         switch (intrinsics_.distortion) {
@@ -83,7 +84,7 @@ public:
     }
 
 private:
-    static constexpr double tolerance = 1e-11; // of x'', y''
+    static constexpr double tolerance = 1e-11; // maximum error of x'', y''
     static constexpr int max_steps = 100;
 
     Point2 brown(Point2 p) const {
@@ -91,8 +92,9 @@ private:
         return {q.x, q.y};
     }
 
-    // The radius on the image plane (Brown) or the angle (fisheye) up to which the radial curve increases: beyond it,
-    // two directions would share a pixel. A step of 0.001 is far finer than the features of any lens' curve.
+    // Returns the undistorted radius (Brown) or the angle (fisheye) up to which the distorted radius increases:
+    // beyond it, two directions would map to the same pixel. The search step of 0.001 is far finer than the features
+    // of any distortion curve.
     double monotonic_limit() const {
         if (intrinsics_.distortion == ARHOST_DISTORTION_NONE)
             return 1e30;
@@ -134,7 +136,7 @@ private:
             for (double scale = 1; scale > 1e-4 && !better; scale /= 2) {
                 const Point2 next{p.x - scale * move.x, p.y - scale * move.y};
                 const Point2 next_error = error_at(next);
-                // Beyond the limit lies another solution, which is not physical.
+                // Beyond limit_ there may be another solution, but it is not physical.
                 if (size(next) <= limit_ && size(next_error) < size(error)) {
                     p = next;
                     error = next_error;
@@ -149,7 +151,7 @@ private:
         return Vec3T<double>{p.x, p.y, 1};
     }
 
-    // Bracketed Newton's method: always converges, as the curve increases up to the limit.
+    // Newton's method with bracketing. It always converges, because the distorted radius increases up to limit_.
     std::optional<Vec3T<double>> undistort_fisheye(Point2 target) const {
         const double r = std::hypot(target.x, target.y);
         double low = 0, high = limit_;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/scalar.hpp: the leaf functions of leaf/*.h for scalars.
+// arhost/shading/scalar.hpp: compiles the functions of leaf/*.h for scalars.
 //
-// A leaf file is written in the common subset of C++ and GLSL, without branches or an include guard. It is included
-// in a namespace that defines
+// A leaf file is written in the common subset of C++ and GLSL, without branches or an include guard, so that scalars
+// (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders (glsl.h) share the formulas. It must be
+// included in a namespace that defines
 //   ARHOST_LEAF            function prefix: "inline", or nothing in GLSL
-//   Float, Bool, Vec3      a number, a comparison's result, three numbers; of one lane or many
+//   Float, Bool, Vec3      a number, the result of a comparison, three numbers; for one SIMD lane or many
 //   vec3(x, y, z), select(b, yes, no) of Float and of Vec3
 //   abs, min, max, floor, pow, exp2, sqrt of Float; dot, cross, length, normalize of Vec3
-//   cosine_of_turn(t), sine_of_turn(t)   of an angle of t full turns
+//   cosine_of_turn(t), sine_of_turn(t)   cosine and sine of an angle of t full turns
 //   turn_of(x, y)                        the angle of (x, y) from the y axis towards the x axis in turns, −½ to ½
-// so that scalars (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders (glsl.h) share the formulas.
-// A leaf file must be included after those that it uses.
+// Include a leaf file after the leaf files whose functions it calls.
 #pragma once
 
 #include "vec3.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/srgb8.hpp: linear light to 8-bit sRGB, equal to the rounded exact formula, by one table look-up and
-// one comparison.
+// arhost/shading/srgb8.hpp: converts linear light to 8-bit sRGB with one table look-up and one comparison. The result
+// equals the rounded result of the exact formula.
 #pragma once
 
 #include "scalar.hpp"
@@ -13,18 +13,19 @@
 
 namespace arhost::shading {
 
-// 128 cells per power of two from 2^-13 (code 0) to 1: fine enough that a cell spans at most two codes. Floats in a
-// cell differ only in their low 16 bits.
+// Divides each power of two from 2^-13 (code 0) to 1 into 128 cells, so that a cell contains at most two codes. The
+// floats in a cell differ only in their low 16 bits.
 struct Srgb8Table {
     static constexpr float smallest = 0x1p-13f;
     static constexpr std::int32_t first_bits = (127 - 13) << 23, shift = 16, cell_count = 13 * 128 + 1;
-    // Cell layout: the code at the cell's start, above the low-bits threshold from which the code is one higher
-    // (1 << 16: none).
+    // A cell contains two numbers. Upper bits, from code_shift on: the code of the smallest float in the cell. Lower
+    // bits: the threshold; floats whose low 16 bits are at least the threshold have the next code. A threshold of
+    // 1 << 16 means that all floats in the cell have the same code.
     static constexpr std::int32_t code_shift = 17, threshold_mask = (1 << code_shift) - 1, low_mask = 0xffff;
     std::int32_t cells[cell_count];
 
     std::int32_t operator()(float linear) const {
-        const float x = linear > smallest ? (linear < 1 ? linear : 1.0f) : smallest; // NaN: black
+        const float x = linear > smallest ? (linear < 1 ? linear : 1.0f) : smallest; // NaN becomes black
         const auto bits = std::bit_cast<std::int32_t>(x);
         const std::int32_t cell = cells[(bits - first_bits) >> shift];
         return (cell >> code_shift) + ((bits & low_mask) >= (cell & threshold_mask));
@@ -36,7 +37,7 @@ inline std::int32_t srgb8_exact(double linear) {
 }
 
 inline Srgb8Table make_srgb8_table() {
-    // The smallest float of each code: the formula's inverse, then single steps to the exact value.
+    // Finds the smallest float of each code: starts at the inverse of the formula and steps to neighbouring floats.
     std::int32_t first_of_code[257] = {};
     first_of_code[256] = std::numeric_limits<std::int32_t>::max();
     for (std::int32_t code = 1; code <= 255; ++code) {

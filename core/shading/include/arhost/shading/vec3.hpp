@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost/shading/vec3.hpp: a 3-vector of any Float type.
+// arhost/shading/vec3.hpp: a vector of three components of any type Float.
 #pragma once
 
 namespace arhost::shading {

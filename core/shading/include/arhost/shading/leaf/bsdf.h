@@ -7,7 +7,7 @@ ARHOST_LEAF Float lambert(Vec3 normal, Vec3 to_light) {
     return max(dot(normal, to_light), Float(0.0));
 }
 
-// For interpolated normals: 0 for light from behind the facet.
+// Lambert's law with an interpolated `normal`: 0 if the light is behind the triangle. `facet`: geometric normal.
 ARHOST_LEAF Float lambert_on_facet(Vec3 normal, Vec3 facet, Vec3 to_light) {
     return select(dot(facet, to_light) > Float(0.0), lambert(normal, to_light), Float(0.0));
 }
@@ -17,7 +17,7 @@ ARHOST_LEAF Float lambert_on_facet(Vec3 normal, Vec3 facet, Vec3 to_light) {
 ARHOST_LEAF Float phong(Vec3 normal, Vec3 to_light, Vec3 to_eye, Float exponent) {
     Float cosine = dot(normal, to_light);
     Vec3 reflected = normal * (Float(2.0) * cosine) - to_light;
-    // The clamp avoids pow(0, n); the result is still below any colour step.
+    // The clamp avoids pow(0, n). Its effect on the colour is smaller than any colour step.
     Float lobe = pow(max(dot(reflected, to_eye), Float(1e-6)), exponent);
     return select(cosine > Float(0.0), lobe, Float(0.0));
 }
@@ -27,7 +27,8 @@ ARHOST_LEAF Vec3 mirror_direction(Vec3 incident, Vec3 normal) {
     return incident - normal * (Float(2.0) * dot(normal, incident));
 }
 
-// For interpolated normals: uses the facet's normal if the reflected ray would enter the facet.
+// Mirror direction with an interpolated `normal`: uses the geometric normal `facet` instead if the reflected ray
+// would enter the surface.
 ARHOST_LEAF Vec3 mirror_direction_off_facet(Vec3 incident, Vec3 normal, Vec3 facet) {
     Vec3 by_normal = mirror_direction(incident, normal);
     return select(dot(by_normal, facet) > Float(0.0), by_normal, mirror_direction(incident, facet));
@@ -42,26 +43,26 @@ ARHOST_LEAF Vec3 schlick(Vec3 f0, Float cosine) {
     return f0 * (Float(1.0) - grazing) + vec3(grazing, grazing, grazing);
 }
 
-// Glass: Schlick's term with configurable exponent and limits (the dissertation's table 2).
+// Reflectance of glass: Schlick's term with configurable exponent and limits (table 2 of the dissertation).
 ARHOST_LEAF Float glass_reflectance(Float cosine, Float exponent, Float minimum, Float maximum) {
     // The clamp avoids pow(0, n).
     Float c = max(Float(1.0) - min(max(cosine, Float(0.0)), Float(1.0)), Float(1e-6));
     return min(max(minimum + (Float(1.0) - minimum) * pow(c, exponent), minimum), maximum);
 }
 
-// Snell's law: squared cosine of the refracted ray; negative for total internal reflection. `ratio`: refractive index
-// of the incident side divided by that of the transmitted side.
+// Snell's law: squared cosine of the angle of refraction; negative for total internal reflection. `cosine`: of the
+// angle of incidence; `ratio`: refractive index of the incident side divided by that of the transmitted side.
 ARHOST_LEAF Float refracted_cosine_squared(Float cosine, Float ratio) {
     return Float(1.0) - ratio * ratio * (Float(1.0) - cosine * cosine);
 }
 
-// Direction of the refracted ray. Both cosines are positive; `normal` faces the incident ray's origin.
+// Direction of the refracted ray. Both cosines are positive; `normal` points to the side of the incident ray.
 ARHOST_LEAF Vec3 refracted_direction(Vec3 incident, Vec3 normal, Float ratio, Float cosine, Float refracted_cosine) {
     return incident * ratio + normal * (ratio * cosine - refracted_cosine);
 }
 
-// Reflectance of a glass surface: 1 for total internal reflection, otherwise from the cosine on the outside.
-// `refracted_squared`: squared cosine of the refracted ray.
+// Reflectance of a glass surface: 1 for total internal reflection, otherwise glass_reflectance of the cosine on the
+// outside. `cosine`: of the angle of incidence; `refracted_squared`: squared cosine of the angle of refraction.
 ARHOST_LEAF Float glass_reflected_fraction(Bool from_inside, Float cosine, Float refracted_squared, Float exponent,
                                            Float minimum, Float maximum) {
     Float refracted = sqrt(max(refracted_squared, Float(0.0)));
@@ -72,17 +73,17 @@ ARHOST_LEAF Float glass_reflected_fraction(Bool from_inside, Float cosine, Float
 // Bouguer–Lambert–Beer law: transmittance exp(−extinction · distance); `extinction` in 1/mm, `distance` in mm
 // (Bouguer, Essai d'optique sur la gradation de la lumière, 1729; Lambert 1760, Beer 1852).
 ARHOST_LEAF Vec3 bouguer(Vec3 extinction, Float distance) {
-    Vec3 power = extinction * (distance * Float(-1.44269504088896)); // base 2
+    Vec3 power = extinction * (distance * Float(-1.44269504088896)); // exp(x) = exp2(x / ln 2)
     return vec3(exp2(power.x), exp2(power.y), exp2(power.z));
 }
 
-// Metallic-roughness (glTF 2.0, appendix B.3). Reflectance at normal incidence: dielectrics 4 %, metals the base
-// colour.
+// Metallic-roughness material (glTF 2.0, appendix B.3). Reflectance at normal incidence: 4 % for dielectrics, the
+// base colour for metals.
 ARHOST_LEAF Vec3 metallic_reflectance(Vec3 base_colour, Float metallic) {
     Float dielectric = Float(0.04) * (Float(1.0) - metallic);
     return vec3(dielectric, dielectric, dielectric) + base_colour * metallic;
 }
-// Diffuse colour: metals have none.
+// Diffuse colour of a metallic-roughness material: black for metals.
 ARHOST_LEAF Vec3 metallic_diffuse(Vec3 base_colour, Float metallic) {
     return base_colour * (Float(1.0) - metallic);
 }
@@ -108,13 +109,15 @@ ARHOST_LEAF Float ggx_visibility(Float cosine_light, Float cosine_eye, Float alp
     return Float(0.5) / max(light + eye, Float(1e-7));
 }
 
-// Smith's masking function G1: the unmasked fraction for a direction with this cosine.
+// Smith's masking function G1: the fraction of the microfacets that is visible from a direction. `cosine`: of the
+// angle between this direction and the normal.
 ARHOST_LEAF Float ggx_masking(Float cosine, Float alpha) {
     Float a2 = alpha * alpha;
     return Float(2.0) * cosine / max(cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine), Float(1e-7));
 }
 
-// Specular lobe without the Fresnel term. Lamp intensities include Lambert's factor π.
+// GGX specular reflection without the Fresnel term. The factor π is needed because lamp intensities include Lambert's
+// 1/π.
 ARHOST_LEAF Float ggx_lobe(Float cosine_light, Float cosine_eye, Float cosine_half, Float alpha) {
     return Float(3.14159265358979) * cosine_light * ggx_distribution(cosine_half, alpha) *
            ggx_visibility(cosine_light, max(cosine_eye, Float(1e-4)), alpha);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lens distortion, from directions to image points; axes x right, y down, z forward (OpenCV). An image point is
-// (x'', y'', 1), which focal lengths and principal point map to a pixel. A leaf file: see ../scalar.hpp.
+// Lens distortion: maps directions to image points. Axes: x right, y down, z forward (OpenCV). An image point is
+// (x'', y'', 1); focal lengths and principal point map it to a pixel. A leaf file: see ../scalar.hpp.
 //
-// The inverse has no closed form; ../lens.hpp solves it iteratively. Shaders read a precomputed ray table.
+// The inverse has no closed form: ../lens.hpp computes it iteratively. Shaders read a ray table that was computed
+// with it.
 
-// In OpenCV's order.
+// Coefficients in OpenCV's order.
 struct BrownConrady {
     Float k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4;
 };
@@ -19,7 +20,7 @@ ARHOST_LEAF Float brown_conrady_radial(BrownConrady k, Float r2) {
            (Float(1.0) + r2 * (k.k4 + r2 * (k.k5 + r2 * k.k6)));
 }
 
-// Image point of p = (x, y, 1), with tangential and thin-prism distortion.
+// Image point of the direction p = (x, y, 1), with radial, tangential and thin-prism distortion.
 ARHOST_LEAF Vec3 brown_conrady(BrownConrady k, Vec3 p) {
     Float r2 = p.x * p.x + p.y * p.y;
     Float scale = brown_conrady_radial(k, r2);
@@ -36,7 +37,7 @@ ARHOST_LEAF Float kannala_brandt_radius(KannalaBrandt k, Float angle) {
     return angle * (Float(1.0) + a2 * (k.k1 + a2 * (k.k2 + a2 * (k.k3 + a2 * k.k4))));
 }
 
-// Derivative of the radius with respect to the angle.
+// Derivative of kannala_brandt_radius with respect to the angle.
 ARHOST_LEAF Float kannala_brandt_slope(KannalaBrandt k, Float angle) {
     Float a2 = angle * angle;
     return Float(1.0) +

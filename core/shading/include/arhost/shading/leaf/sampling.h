@@ -13,8 +13,8 @@ ARHOST_LEAF Vec3 bitangent_axis(Vec3 n) {
     return vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y);
 }
 
-// Samples a GGX microfacet normal visible from `to_eye`, in axes with the surface normal along z
-// (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF 42(8), 2023, listing 1).
+// Samples the normal of a GGX microfacet that is visible from `to_eye`, in coordinates with the surface normal along
+// z (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF 42(8), 2023, listing 1).
 ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) {
     Vec3 stretched = vec3(to_eye.x * alpha, to_eye.y * alpha, to_eye.z);
     stretched = stretched * (Float(1.0) / sqrt(max(dot(stretched, stretched), Float(1e-12))));
@@ -25,7 +25,7 @@ ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) 
     return n * (Float(1.0) / sqrt(dot(n, n)));
 }
 
-// The same in world axes, for any unit normal.
+// Like ggx_visible_normal, but in world coordinates with any unit normal of the surface.
 ARHOST_LEAF Vec3 ggx_half_vector(Vec3 normal, Vec3 to_eye, Float alpha, Float u, Float v) {
     Vec3 x = tangent_axis(normal);
     Vec3 y = bitangent_axis(normal);
@@ -34,19 +34,20 @@ ARHOST_LEAF Vec3 ggx_half_vector(Vec3 normal, Vec3 to_eye, Float alpha, Float u,
     return x * facet.x + y * facet.y + normal * facet.z;
 }
 
-// Vector to a point of a rectangle; `axis_u` and `axis_v` are half-side vectors.
+// Vector to the point (u, v) of a rectangle. `to_centre`: vector to its centre; `axis_u`, `axis_v`: half sides.
 ARHOST_LEAF Vec3 vector_to_rectangle(Vec3 to_centre, Vec3 axis_u, Vec3 axis_v, Float u, Float v) {
     return to_centre + axis_u * (u * Float(2.0) - Float(1.0)) + axis_v * (v * Float(2.0) - Float(1.0));
 }
 
-// Vector to a point of the disc through a sphere's centre that faces the origin of `to_centre`.
+// Vector to a point of the disc through the centre of a sphere. `to_centre`: vector to the centre, perpendicular to
+// the disc.
 ARHOST_LEAF Vec3 vector_to_disc(Vec3 to_centre, Float radius, Float u, Float v) {
     Vec3 n = normalize(to_centre);
     Float r = radius * sqrt(u);
     return to_centre + tangent_axis(n) * (r * cosine_of_turn(v)) + bitangent_axis(n) * (r * sine_of_turn(v));
 }
 
-// Position of `value` between a cumulative sum and the next one, which is larger by `step`: 0 to 1.
+// Relative position (0 to 1) of `value` between the cumulative sums `sum_before` and sum_before + step.
 ARHOST_LEAF Float fraction_of_step(Float value, Float sum_before, Float step) {
     return min((value - sum_before) / max(step, Float(1e-12)), Float(1.0));
 }

@@ -6,17 +6,18 @@ ARHOST_LEAF Float largest(Vec3 a) {
     return max(max(abs(a.x), abs(a.y)), abs(a.z));
 }
 
-// Unit vector along `a`, even if its squared length underflows; `fallback` if `a` is 0.
+// Unit vector along `a`, correct also if the squared length of `a` underflows; `fallback` if `a` is 0.
 ARHOST_LEAF Vec3 normalize_or(Vec3 a, Vec3 fallback) {
     Vec3 scaled = a * (Float(1.0) / max(largest(a), Float(1e-37)));
     Vec3 long_enough = select(dot(a, a) > Float(1e-30), a, scaled);
     return select(dot(scaled, scaled) > Float(0.5), normalize(long_enough), fallback);
 }
 
-// Distance from the facet at which secondary rays start, to avoid self-intersection. The error of a hit is a few
-// times 2^-24 of the magnitudes that it was computed from: `position`, `ray` (from its origin to the hit) and
-// `reach`, the largest offsets of the geometry along each axis. `reach` is weighted by the unit normal: only errors
-// along the normal matter, so a level floor is exact in height, however large. World space, mm.
+// Distance from the surface at which secondary rays start, to avoid self-intersection; world space, mm. The error of
+// a hit point is a few times 2^-24 of the magnitudes from which it was computed: `position` (the hit point), `ray`
+// (from the ray's origin to the hit point) and `reach` (the largest offsets of the geometry along each axis). `reach`
+// is weighted by the unit `normal`, because only errors along the normal matter: the height of a level floor, for
+// example, is exact however large the floor is.
 ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 ray, Vec3 normal, Vec3 reach) {
     Float along_normal = abs(normal.x) * reach.x + abs(normal.y) * reach.y + abs(normal.z) * reach.z;
     return (largest(position) + largest(ray) + along_normal) * Float(1.0 / 524288.0);
@@ -27,14 +28,16 @@ ARHOST_LEAF Vec3 facing(Vec3 normal, Vec3 to) {
     return select(dot(normal, to) < Float(0.0), -normal, normal);
 }
 
-// Unit shading normal on the side of the unit normal `facet`; `facet` if the vertex normals cancel out.
+// Unit shading normal on the side of the geometric normal `facet` (unit length); `facet` itself if the interpolated
+// vertex normals cancel out.
 ARHOST_LEAF Vec3 shading_normal(Vec3 interpolated, Vec3 facet) {
     Vec3 n = select(dot(interpolated, interpolated) > Float(1e-12), normalize(interpolated), facet);
     return facing(n, facet);
 }
 
-// Directions of increasing texture u and v in a triangle, from two edges and the changes of u and v along them; not
-// normalized (E. Lengyel, Mathematics for 3D Game Programming and Computer Graphics, 2012, section 7.8).
+// Directions in which the texture coordinates u and v of a triangle increase; not normalized. Computed from two edges
+// and the changes of u and v along these edges (E. Lengyel, Mathematics for 3D Game Programming and Computer
+// Graphics, 2012, section 7.8).
 ARHOST_LEAF Vec3 tangent_along_u(Vec3 edge_1, Vec3 edge_2, Float u1, Float u2, Float v1, Float v2) {
     return (edge_1 * v2 - edge_2 * v1) * select(u1 * v2 < u2 * v1, Float(-1.0), Float(1.0));
 }
@@ -42,8 +45,9 @@ ARHOST_LEAF Vec3 tangent_along_v(Vec3 edge_1, Vec3 edge_2, Float u1, Float u2, F
     return (edge_2 * u1 - edge_1 * u2) * select(u1 * v2 < u2 * v1, Float(-1.0), Float(1.0));
 }
 
-// Applies a normal map's texel to `normal`. The tangent is orthogonalized against the normal; green points against v
-// (glTF 2.0, section 3.9.3). Returns `normal` if the result would point into the facet or there is no tangent.
+// Perturbs `normal` by the `texel` of a normal map. Makes the tangent orthogonal to the normal; the green axis points
+// in the direction of decreasing v (glTF 2.0, section 3.9.3). Returns `normal` unchanged if the result would point
+// into the surface or if there is no tangent. `facet`: geometric normal.
 ARHOST_LEAF Vec3 perturbed_normal(Vec3 normal, Vec3 facet, Vec3 along_u, Vec3 along_v, Vec3 texel) {
     Vec3 n = normalize(normal);
     Vec3 tangent = along_u - n * dot(n, along_u);
