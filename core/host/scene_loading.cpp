@@ -53,7 +53,7 @@ void SceneLoading::on_message(Message &message) {
 
 void SceneLoading::restart_deadline() {
     deadline_ = context_.reactor.at(Reactor::Clock::now() + timeout_, [this] {
-        process_->end("the scene loader made no progress for " + std::to_string(timeout_.count()) +
+        process_->end("made no progress for " + std::to_string(timeout_.count()) +
                       " ms (raytracer.start_deadline_ms)");
     });
 }

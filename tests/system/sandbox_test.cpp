@@ -485,7 +485,7 @@ TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {
     ArhostRun run;
     run.run({"plugins"});
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*cannot open shared object file.*"
-                                            "'--reads FOLDER' of plugins and conform"));
+                                            "'--reads FOLDER' to plugins and conform"));
     run.run({"plugins", "--reads", ARHOST_BINARY_DIRECTORY "/tests/elsewhere"});
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*exports no symbol 'arhost_entry'"));
 }

@@ -149,7 +149,7 @@ TEST_F(RenderScene, ReportsErrorsOfThePluginAndItsOptions) {
                 HasSubstr("is not an arhost plugin"));
     EXPECT_THAT(refused("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
     EXPECT_THAT(refused("--set samples=1000"), HasSubstr("--set: samples: "));
-    EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: must be key=value"));
+    EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: the argument must be key=value"));
     EXPECT_THAT(refused("--raytracer " + counter, "--samples 2"), HasSubstr("--samples: samples: unknown key"));
     // The plugin's log message, followed by the failed call.
     EXPECT_THAT(

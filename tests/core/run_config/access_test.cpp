@@ -141,7 +141,7 @@ TEST_F(Access, WarnsIfAnOutputMayWriteToHomeOrTheWorkingDirectory) {
     EXPECT_THAT(warning(home + "/film.mp4"),
                 HasSubstr("run.yaml:1:7: path: 'my_sink' may write to everything in and below '" + home + "'"));
     EXPECT_THAT(warning("film.mp4"), HasSubstr("give this output its own folder, as in 'path: output/film.mp4'"));
-    EXPECT_THAT(warning("/film.mp4"), HasSubstr("all of '/'"));
+    EXPECT_THAT(warning("/film.mp4"), HasSubstr("everything in and below '/'"));
     EXPECT_EQ(warning("out/film.mp4"), "");
     EXPECT_EQ(warning((folder / "film.mp4").string()), "");
 }

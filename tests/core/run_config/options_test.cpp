@@ -53,5 +53,5 @@ TEST(Options, ReportErrorsWithTheirPosition) {
     EXPECT_THAT(error_of("{path: x, options: {tread: 1}}"),
                 HasSubstr("options.tread: unknown key; did you mean 'threads'?"));
     EXPECT_THAT(error_of("{options: {}}"), HasSubstr("tracker_x needs 'path': The file."));
-    EXPECT_THAT(error_of("{path: x, options: {path: y}}"), HasSubstr("keep one of them"));
+    EXPECT_THAT(error_of("{path: x, options: {path: y}}"), HasSubstr("remove one of them"));
 }

@@ -447,7 +447,7 @@ TEST(SceneErrors, NameTheMeshAndTheSceneLine) {
     };
     const std::string where = (folder.path() / "scene.yaml").string() + ":6:11: objects[0].mesh: ";
     const std::string mesh = (folder.path() / "mesh.obj").string();
-    EXPECT_EQ(error_with("v 0 0\n"), where + mesh + ":1: a vertex needs 3 numbers, has 2");
+    EXPECT_EQ(error_with("v 0 0\n"), where + mesh + ":1: a vertex needs 3 numbers, but has 2");
     EXPECT_EQ(error_with("v 1e10 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 3\n"),
               where + "extends beyond 1e9 mm after its transform");
     EXPECT_EQ(error_with("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 1e10\nf 1/1 2/1 3/1\n"),

@@ -928,7 +928,7 @@ TEST_F(RejectedInput, OfNonFiniteNumbers) {
     EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, nan, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("not finite"));
+    EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("must be finite"));
 }
 
 TEST_F(RejectedInput, OfIntrinsicsOtherThanAtStart) {

@@ -224,8 +224,8 @@ TEST_F(SinkImages, ConflictingOptionsAreRefused) {
     };
     for (const Case &c :
          {Case{"a.bmp", {}, "must end in .png, .jpg or .jpeg"}, Case{"a", {}, "must end in .png, .jpg or .jpeg"},
-          Case{"%s.png", {}, "%05d"}, Case{"%d.png", {{"frame", "3"}}, "frame: selects one"},
-          Case{"a.png", {{"every", "2"}}, "every: needs"}}) {
+          Case{"%s.png", {}, "%05d"}, Case{"%d.png", {{"frame", "3"}}, "frame: is only allowed if"},
+          Case{"a.png", {{"every", "2"}}, "every: is only allowed if"}}) {
         SinkUnderTest s = sink(c.path, c.options);
         EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << c.path;
         EXPECT_THAT(s.log(), HasSubstr(c.message));

@@ -170,7 +170,7 @@ TEST_F(SinkVideo, AnInvalidFrameRateIsRefused) {
     for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_ERROR_CONFIGURATION) << fps;
-        EXPECT_THAT(s.log(), HasSubstr("set the source's fps"));
+        EXPECT_THAT(s.log(), HasSubstr("set 'fps' of the source"));
     }
 }
 

@@ -171,7 +171,7 @@ TEST(ImageSequence, EndsBeforeAMissingFileWithAWarning) {
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
     EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end status
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("image_0003.png' is missing"));
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to number 5"));
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to 5"));
 }
 
 TEST(ImageSequence, UsesTheConfiguredRate) {
