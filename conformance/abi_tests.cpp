@@ -190,7 +190,8 @@ void descriptor(Context &context) {
     }
 }
 
-// For example, a capability must not disappear once the host relies on it.
+// negotiate must return the same plugin and descriptor at any time: the host relies, for example, on the capabilities
+// that it has read.
 void same_answer(Context &context) {
     const arhost_plugin &plugin = context.library.plugin();
     const ipc::Json descriptor = ipc::to_json(*plugin.descriptor);

@@ -89,7 +89,7 @@ struct PolicyOptions {
             return app.option(name, values, help).one_value_each();
         };
         const std::vector<std::string> known(sandbox::allowances.begin(), sandbox::allowances.end());
-        add("--allow", allow, "Allow the plugin a resource, as 'allow' in the configuration (repeatable)")
+        add("--allow", allow, "Allow the plugin a resource, like 'allow' in the configuration (repeatable)")
             .type_name("RESOURCE")
             .separator(',')
             .one_of(known);

@@ -50,7 +50,8 @@ void blur(Context &context) {
 }
 
 void noise(Context &context) {
-    expect_found_in(context, "with noise of 7 codes", [&](const Grey &image) { return noisy(image, 7, context); });
+    expect_found_in(context, "with Gaussian noise (σ = 7 grey levels)",
+                    [&](const Grey &image) { return noisy(image, 7, context); });
 }
 
 void exposure(Context &context) {
@@ -59,8 +60,8 @@ void exposure(Context &context) {
         double gain, offset, slope; // codes are gain · code + offset, times 1 ± slope from left to right
     };
     for (const Light &light :
-         {Light{"in the dark, codes up to 66", 0.3, 0, 0}, Light{"overexposed", 1.35, 0, 0},
-          Light{"behind haze, codes 133 to 199", 0.35, 122, 0}, Light{"lit from the side", 0.8, 0, 0.45}})
+         {Light{"in the dark, grey levels up to 66", 0.3, 0, 0}, Light{"overexposed", 1.35, 0, 0},
+          Light{"behind haze, grey levels 133 to 199", 0.35, 122, 0}, Light{"lit from the side", 0.8, 0, 0.45}})
         expect_found_in(context, light.name, [&](const Grey &image) {
             return filled(image.width, image.height, [&](auto x, auto y) {
                 const double side = 2.0 * x / image.width - 1;
@@ -297,7 +298,8 @@ constexpr const char *gate = "tracker.track", *pose_gate = "tracker.millimetres"
 constexpr Test tests[] = {
     {"tracker.blur", "A marker blurred by 1.5 px is detected, accurate to 3° and 2 % of the distance.", kind,
      pose_gate, 20s, blur},
-    {"tracker.noise", "A marker in noise of 7 codes is detected, accurate to 3° and 2 % of the distance.", kind,
+    {"tracker.noise",
+     "A marker in Gaussian noise (σ = 7 grey levels) is detected, accurate to 3° and 2 % of the distance.", kind,
      pose_gate, 20s, noise},
     {"tracker.exposure",
      "A marker is detected with a correct pose in the dark, overexposed, behind haze and lit from the side.", kind,

@@ -152,7 +152,7 @@ Size size_of(const Node &root, std::optional<Size> expected) {
 std::optional<Size> size_next_to_file(const Node &node) {
     const auto width = node.find("width"), height = node.find("height");
     if (width.has_value() != height.has_value())
-        node.fail("width and height must be set together; set both or neither");
+        node.fail("set both width and height, or neither");
     if (!width)
         return std::nullopt;
     return Size{side(*width), side(*height)};

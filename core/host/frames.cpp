@@ -27,7 +27,7 @@ const char *problem_with(const arhost_marker &marker) {
             return "a coordinate of a marker's corner is not finite";
     if (!all_finite(marker.mt_alternative) || !std::isfinite(marker.reprojection_px) ||
         !std::isfinite(marker.ambiguity))
-        return "a marker's number is not finite";
+        return "a marker's alternative pose, reprojection error or ambiguity is not finite";
     return camera::problem_with(marker.mt);
 }
 

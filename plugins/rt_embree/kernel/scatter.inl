@@ -144,7 +144,8 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
                 reflected_throughput, reflects);
 }
 
-// Rough reflections below this throughput change no 8-bit code by half a step.
+// Rough reflections with a throughput of at most this value are not traced: at a radiance of 1 they would add about
+// half a step of 1/255 in linear light.
 constexpr float min_throughput = 2e-3f;
 
 // Queues rays that are reflected off a randomly sampled microfacet.

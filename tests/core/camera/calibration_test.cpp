@@ -299,7 +299,7 @@ TEST(CameraBlock, RequiresWidthAndHeightTogether) {
     const std::string file = (folder.path() / "camera.yaml").string();
     std::ofstream(file) << "{}\n";
     EXPECT_EQ(error_of([&] { parsed("{file: " + file + ", width: 640}"); }),
-              "lab.yaml:1:1: width and height must be set together; set both or neither");
+              "lab.yaml:1:1: set both width and height, or neither");
 }
 
 // Tests the examples in docs/camera.md.

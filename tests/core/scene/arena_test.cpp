@@ -320,10 +320,10 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"NormalNotANumber", [](Arena &a) { normals(a)[11] = nan_value; },
                    "normal 3 is not of unit length"},
         Corruption{"TexcoordNotANumber", [](Arena &a) { texcoords(a)[4] = nan_value; },
-                   "texcoord 2 has the coordinate nan"},
+                   "texcoord 2 has the invalid coordinate nan"},
         Corruption{"SphereRadiusZero", [](Arena &a) { ball(a)[3] = 0; },
-                   "geometry 1 (object 1 'ball'): sphere 0 has the radius 0"},
-        Corruption{"SphereNotANumber", [](Arena &a) { ball(a)[1] = nan_value; }, "sphere 0 has the coordinate nan"},
+                   "geometry 1 (object 1 'ball'): sphere 0 has the invalid radius 0"},
+        Corruption{"SphereNotANumber", [](Arena &a) { ball(a)[1] = nan_value; }, "sphere 0 has the invalid coordinate nan"},
         Corruption{"SpheresWithIndices",
                    [](Arena &a) {
                        geometries(a)[1].indices = {0, 0, 12};

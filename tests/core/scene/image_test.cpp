@@ -114,7 +114,7 @@ TEST(Textures, WithFloatsAreLinearAndClamped) {
     const Arena arena =
         Scene("a.exr", exr({0.5f, std::nanf("")}, {-1, 2e6f}, {3, INFINITY})).load_texture("a.exr", callbacks);
     EXPECT_THAT(floats(arena), ElementsAre(3, 0, 0.5f, 1, 1e6f, 1e6f, 0, 1));
-    EXPECT_THAT(info, testing::Contains(HasSubstr("a.exr: 4 values below 0, above 1e6 or NaN")));
+    EXPECT_THAT(info, testing::Contains(HasSubstr("a.exr: 4 values were below 0, above 1e6 or NaN")));
 }
 
 TEST(Textures, HaveWrapModeAndEncoding) {
