@@ -323,7 +323,8 @@ INSTANTIATE_TEST_SUITE_P(
                    "texcoord 2 has the invalid coordinate nan"},
         Corruption{"SphereRadiusZero", [](Arena &a) { ball(a)[3] = 0; },
                    "geometry 1 (object 1 'ball'): sphere 0 has the invalid radius 0"},
-        Corruption{"SphereNotANumber", [](Arena &a) { ball(a)[1] = nan_value; }, "sphere 0 has the invalid coordinate nan"},
+        Corruption{"SphereNotANumber", [](Arena &a) { ball(a)[1] = nan_value; },
+                   "sphere 0 has the invalid coordinate nan"},
         Corruption{"SpheresWithIndices",
                    [](Arena &a) {
                        geometries(a)[1].indices = {0, 0, 12};
