@@ -70,6 +70,10 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     }
 }
 
+// Parts of the messages of glibc's dlopen if it can obtain no memory: which one depends on how far it got.
+constexpr const char *dlopen_memory_errors[] = {"annot allocate ", "cannot create ", "cannot map zero-fill pages",
+                                                "cannot change memory protections", "failed to map segment"};
+
 } // namespace
 
 const arhost_entry_point &open_library(const std::filesystem::path &file) {
@@ -82,7 +86,7 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
             hint =
                 " (if the sandbox hides the folder of that file, set 'reads: [FOLDER]' in the configuration or pass "
                 "'--reads FOLDER' to plugins and conform)";
-        else if (mentions("failed to map segment") || mentions("cannot allocate memory"))
+        else if (std::ranges::any_of(dlopen_memory_errors, mentions))
             hint = " (out of memory: 'memory_mb' may be too small)";
         refuse(file, "cannot be loaded: " + reason + hint);
     }
