@@ -99,7 +99,7 @@ struct PolicyOptions {
         add("--environment", environment, "Pass an environment variable to the plugin (repeatable)")
             .type_name("NAME")
             .check(invalid_variable);
-        app.option("--sandbox", sandbox, "Sandbox mode: permissive, strict or none")
+        app.option("--sandbox", sandbox, "Sandbox mode: standard, permissive, strict or none")
             .type_name("MODE")
             .one_of(std::vector<std::string>(sandbox::modes.begin(), sandbox::modes.end()));
     }

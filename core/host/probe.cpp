@@ -35,7 +35,7 @@ std::string query(supervise::Context &context, const std::filesystem::path &plug
         dead = true;
     };
     supervise::Process process(context, plugin.stem().string(), std::move(callbacks),
-                               encode(messages::Open{plugin.string(), policy}));
+                               messages::Open{plugin.string(), policy});
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + timeout, [&] {
         process.end(late + " within " + std::to_string(timeout.count()) + " s");

@@ -33,7 +33,7 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
     process_callbacks.result = [](const Result &) {};
     process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
     process_ = std::make_unique<supervise::Process>(context, "scene", std::move(process_callbacks),
-                                                    encode(messages::Load{scene_, policy_of(sandbox)}));
+                                                    messages::Load{scene_, policy_of(sandbox)});
     restart_deadline();
 }
 

@@ -28,7 +28,8 @@ ThreadStarter::~ThreadStarter() {
         thread.join();
 }
 
-supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, const supervise::LogFunction &) {
+supervise::Spawned ThreadStarter::spawn(const std::filesystem::path &, supervise::Isolation,
+                                        const supervise::LogFunction &) {
     supervise::Spawned spawned;
     ipc::Channel theirs;
     std::tie(spawned.channel, theirs) = ipc::Channel::make_pair();

@@ -19,8 +19,9 @@ public:
     ThreadStarter(const ThreadStarter &) = delete;
     ThreadStarter &operator=(const ThreadStarter &) = delete;
 
-    // `program` is ignored.
-    supervise::Spawned spawn(const std::filesystem::path &program, const supervise::LogFunction &log) override;
+    // Ignores its parameters.
+    supervise::Spawned spawn(const std::filesystem::path &program, supervise::Isolation isolation,
+                             const supervise::LogFunction &log) override;
     supervise::Exit wait_exit(pid_t pid) override;
 
 private:

@@ -51,7 +51,7 @@ struct RaytracerConfiguration : ComponentConfiguration {
 struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
-    sandbox::Mode sandbox = sandbox::Mode::permissive;
+    sandbox::Mode sandbox = sandbox::Mode::standard;
     std::uint64_t frames = 0;                       // maximum number of frames; 0: no limit
     std::optional<SourceConfiguration> source{};    // nullopt only with a trajectory; the frames are then black
     std::optional<camera::Trajectory> trajectory{}; // camera poses to use instead of the tracker's

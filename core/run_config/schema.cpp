@@ -55,10 +55,12 @@ std::vector<Key> make_table() {
         {"sandbox",
          text,
          false,
-         "permissive",
-         "`permissive`: every layer that the machine supports. `strict`: all layers; the run fails if one is "
-         "missing. `none`: no sandbox, for debuggers.",
-         {"permissive", "strict", "none"}},
+         "standard",
+         "`standard`: every layer that the machine supports; without namespaces and Landlock, which limit the files "
+         "that a plugin can read, only arhost's own plugins run. `permissive`: every layer that the machine "
+         "supports. "
+         "`strict`: all layers; the run fails if one is missing. `none`: no sandbox, for debuggers.",
+         {"standard", "permissive", "strict", "none"}},
         {"frames", integer, false, "0", "Stop after this many frames; 0: stop at the end of the source."},
         {"plugin_path", list, false, "", "Folders to search for plugins before the folder of built-in plugins."},
     };

@@ -118,7 +118,7 @@ Layer enter_landlock(const Policy &policy) {
         layer.active += ", TCP";
     if (attributes.scoped)
         layer.active += ", signals";
-    else if (may_start_processes(policy)) // otherwise seccomp blocks signals
+    else if (may_start_processes(policy) && !has_pid_namespace()) // otherwise seccomp or the namespace blocks signals
         layer.missing = "blocking signals to other processes (needs version 6)";
     return layer;
 }

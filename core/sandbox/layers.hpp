@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <unistd.h>
 
 // Code built with sanitizers needs exceptions: sanitizers reserve terabytes of address space and start processes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -48,9 +49,15 @@ inline bool has_memory_limit(const Policy &policy) {
     return !under_sanitizer && !policy.allows("gpu"); // GPU drivers map large regions
 }
 
+// Whether arhost-launcher has started this process in a PID namespace, which its parent is outside of.
+inline bool has_pid_namespace() {
+    return ::getppid() == 0;
+}
+
 void drop_environment(const Policy &policy); // cannot fail
 Layer raise_oom_score();                     // the OOM killer kills workers first; must run while /proc is writable
 Layer enter_namespaces(const Policy &policy);
+bool enter_root(const Policy &policy); // part of enter_namespaces; on failure returns false and sets errno
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();
 Layer enter_landlock(const Policy &policy); // this layer and the next one require no_new_privs
@@ -59,6 +66,7 @@ Layer filter_system_calls(const Policy &policy);
 // The paths to which a policy grants access, with wildcards expanded. Patterns that match nothing are omitted.
 struct Paths {
     std::vector<std::filesystem::path> readable, devices; // devices may be read, written and controlled with ioctl
+    std::vector<std::filesystem::path> sockets;           // of the X or Wayland server
 };
 Paths paths_of(const Policy &policy);
 

@@ -49,6 +49,8 @@ Layer set_limits(const Policy &policy) {
     // limit, and a plugin must not exhaust it: the host and the scene loader need it, too.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
+    lower(layer, "stack", RLIMIT_STACK, 8 << 20);   // RLIMIT_DATA does not count the stack of the main thread
+    lower(layer, "timers", RLIMIT_SIGPENDING, 256); // POSIX timers and queued signals are counted per user
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);

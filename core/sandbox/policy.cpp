@@ -71,7 +71,7 @@ constexpr Allowance granted[] = {
      {"/etc/resolv.conf", "/etc/hosts", "/etc/host.conf", "/etc/nsswitch.conf", "/etc/gai.conf", "/etc/services",
       "/etc/protocols", "/etc/ssl", "/etc/ca-certificates", "/run/systemd/resolve"},
      {}},
-    {"processes", {"/etc/passwd", "/etc/group", "/etc/nsswitch.conf"}, {"/dev/tty"}},
+    {"processes", {"/etc/passwd", "/etc/group", "/etc/nsswitch.conf"}, {}},
 };
 
 void append(std::vector<fs::path> &paths, PathList patterns) {
@@ -83,13 +83,32 @@ void append(std::vector<fs::path> &paths, PathList patterns) {
     }
 }
 
-// Appends the folders in a colon-separated environment variable.
-void append_folders(std::vector<fs::path> &paths, const char *variable) {
-    const char *value = std::getenv(variable);
+// Appends the shared libraries in the folders of LD_LIBRARY_PATH. The folders may contain other files, too.
+void append_library_path(std::vector<fs::path> &paths) {
+    const char *value = std::getenv("LD_LIBRARY_PATH");
     std::istringstream list(value ? value : "");
+    std::error_code ignored;
     for (std::string folder; std::getline(list, folder, ':');)
-        if (!folder.empty())
-            paths.emplace_back(folder);
+        if (fs::path(folder).is_absolute())
+            for (const auto &entry : fs::directory_iterator(folder, ignored))
+                if (entry.path().filename().string().find(".so") != std::string::npos &&
+                    entry.is_regular_file(ignored))
+                    paths.push_back(entry.path());
+}
+
+// Appends the sockets of the X and Wayland servers, and the file with the X server's cookie.
+void append_display(Paths &paths) {
+    const auto variable = [](const char *name) -> std::string {
+        const char *value = std::getenv(name);
+        return value ? value : "";
+    };
+    const std::string display = variable("DISPLAY"); // ":0" or ":0.0"; other forms use TCP
+    if (const auto number = display.substr(0, display.find('.')); number.starts_with(':'))
+        paths.sockets.push_back("/tmp/.X11-unix/X" + number.substr(1));
+    if (const fs::path wayland = variable("WAYLAND_DISPLAY"); !wayland.empty()) // a name, or an absolute path
+        paths.sockets.push_back(variable("XDG_RUNTIME_DIR") / wayland);
+    const fs::path authority = variable("XAUTHORITY");
+    paths.readable.push_back(authority.empty() ? variable("HOME") / fs::path(".Xauthority") : authority);
 }
 
 } // namespace
@@ -98,18 +117,14 @@ Paths paths_of(const Policy &policy) {
     Paths paths;
     append(paths.readable, system_readable);
     append(paths.devices, system_devices);
-    append_folders(paths.readable, "LD_LIBRARY_PATH");
+    append_library_path(paths.readable);
     for (const Allowance &allowance : granted)
         if (policy.allows(allowance.name)) {
             append(paths.readable, allowance.readable);
             append(paths.devices, allowance.devices);
         }
-    if (policy.allows("display")) {
-        if (const char *authority = std::getenv("XAUTHORITY"))
-            paths.readable.emplace_back(authority);
-        else if (const char *home = std::getenv("HOME"))
-            paths.readable.push_back(fs::path(home) / ".Xauthority");
-    }
+    if (policy.allows("display"))
+        append_display(paths);
     paths.readable.insert(paths.readable.end(), policy.readable.begin(), policy.readable.end());
     return paths;
 }
@@ -140,7 +155,8 @@ void allow_read_files(Policy &policy, const fs::path &file_or_pattern) {
 }
 
 Mode mode_of(std::string_view text) {
-    return text == "strict" ? Mode::strict : text == "none" ? Mode::none : Mode::permissive;
+    const auto found = std::ranges::find(modes, text);
+    return static_cast<Mode>(found == modes.end() ? 1 : found - modes.begin() + 1);
 }
 
 nlohmann::json to_json(const Policy &policy) {

@@ -28,6 +28,21 @@ void add_shader_cache(Policy &policy, const std::filesystem::path &plugin) {
         ::setenv(variable, folder.c_str(), 1);
 }
 
+// Returns the folder of the plugins that are installed with this program, which are trusted.
+std::filesystem::path own_plugin_folder() {
+    std::error_code ignored;
+    return std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path().parent_path() /
+           "lib/arhost/plugins";
+}
+
+// Whether a layer limits which files can be read.
+bool confines_files(const Level &level) {
+    return std::any_of(level.begin(), level.end(), [](const Layer &layer) {
+        return (layer.name == "namespaces" && layer.active.find("mount") != std::string::npos) ||
+               (layer.name == "landlock" && !layer.active.empty());
+    });
+}
+
 } // namespace
 
 bool complete(const Level &level) {
@@ -71,10 +86,17 @@ Level enter(const Policy &policy) {
 
 Level enter_for(const std::filesystem::path &plugin, Policy policy) {
     std::error_code ignored;
-    policy.readable.push_back(plugin.parent_path());
-    policy.readable.push_back(std::filesystem::weakly_canonical(plugin, ignored).parent_path());
+    const auto own_folder = own_plugin_folder();
+    const bool is_own = contains(own_folder, std::filesystem::weakly_canonical(plugin, ignored));
+    policy.readable.push_back(plugin);
+    policy.readable.push_back(own_folder);
     add_shader_cache(policy, plugin);
-    return enter(policy);
+    Level level = enter(policy);
+    if (policy.mode == Mode::standard && !is_own && !confines_files(level))
+        throw std::runtime_error("sandbox: " + to_text(level) +
+                                 "; this machine can confine no files, so only the plugins in " +
+                                 own_folder.string() + " may run: fix this or set 'sandbox: permissive'");
+    return level;
 }
 
 } // namespace arhost::sandbox

@@ -21,13 +21,14 @@ namespace arhost::sandbox {
 constexpr std::array<std::string_view, 6> allowances = {"video", "usb", "gpu", "display", "network", "processes"};
 
 enum class Mode {
-    permissive = 1, // applies every layer that the machine supports
-    strict,         // applies all layers; throws if one is incomplete
-    none            // no sandbox, for debuggers
+    standard = 1, // like permissive, but opens only arhost's own plugins if no layer limits which files can be read
+    permissive,   // applies every layer that the machine supports
+    strict,       // applies all layers; throws if one is incomplete
+    none          // no sandbox, for debuggers
 };
 
 struct Policy {
-    Mode mode = Mode::permissive;
+    Mode mode = Mode::standard;
     std::set<std::string, std::less<>> allow{}; // elements of `allowances`
     // Absolute paths; a folder includes its contents. System libraries and settings are always readable.
     std::vector<std::filesystem::path> readable{};
@@ -48,7 +49,7 @@ bool allow_read(Policy &policy, const std::filesystem::path &file);
 // Like allow_read. If the path is a printf pattern (frame-%04d.png), grants access to its folder.
 void allow_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);
 
-constexpr std::array<std::string_view, 3> modes = {"permissive", "strict", "none"};
+constexpr std::array<std::string_view, 4> modes = {"standard", "permissive", "strict", "none"};
 Mode mode_of(std::string_view text);
 
 nlohmann::json to_json(const Policy &policy);
@@ -69,12 +70,16 @@ bool complete(const Level &level);
 // Returns, for example, "no_new_privs: yes; namespaces: user, net; … MISSING landlock: not in this kernel".
 std::string to_text(const Level &level);
 
+// Enters a user namespace that maps only the calling user; in it, the process has all capabilities. Returns an empty
+// string, or why this is impossible and what an administrator can change. The process must be single-threaded.
+std::string enter_user_namespace();
+
 // Permanently sandboxes the calling process, which must be single-threaded. Returns the state of each layer; throws
 // std::runtime_error if a layer is incomplete and the mode is strict. Mode::none does nothing.
 Level enter(const Policy &policy);
 
-// Like enter, for a process that will open `plugin`. Also makes the folder of `plugin` readable, and, if `plugin` is
-// a link, the folder of its target.
+// Like enter, for a process that will open `plugin`. Also makes readable the file `plugin` and the folder of the
+// plugins that are installed with this program.
 Level enter_for(const std::filesystem::path &plugin, Policy policy);
 
 } // namespace arhost::sandbox

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// seccomp filter (libseccomp): system calls that no plugin needs fail with EPERM. This is a deny list, because an
-// allow list would break with new drivers and C libraries.
+// Two seccomp filters (libseccomp), of which the stricter result counts. The first denies system calls and arguments
+// that could harm others, with EPERM. The second allows only the calls that plugins and their libraries need; others
+// fail with ENOSYS, so that libraries use older calls instead.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
@@ -20,7 +21,8 @@ namespace {
 
 // System calls that Debian 12's libseccomp does not know by name. Their numbers are the same on all architectures.
 constexpr std::pair<const char *, int> newer_calls[] = {
-    {"fchmodat2", 452}, {"setxattrat", 463}, {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
+    {"fchmodat2", 452},     {"setxattrat", 463},     {"getxattrat", 464},  {"listxattrat", 465},
+    {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
 
 constexpr const char *denied[] = {
     // access to other processes
@@ -41,19 +43,89 @@ constexpr const char *denied[] = {
     "utime", "utimes", "futimesat", "truncate", // ftruncate needs a writable descriptor
     // machine-wide settings and IPC
     "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
-    "stime", "sethostname", "setdomainname", "vhangup", "mq_open", "msgget", "semget"};
+    "stime", "sethostname", "setdomainname", "vhangup", "mq_open",
+    // System V objects and other objects that are counted per user, or that name paths outside of the sandbox
+    "msgget", "msgsnd", "msgrcv", "msgctl", "semget", "semop", "semtimedop", "semtimedop_time64", "semctl", "shmget",
+    "shmat", "shmctl", "shmdt", "inotify_init", "inotify_init1", "inotify_add_watch", "io_setup", "io_submit",
+    "getxattr", "lgetxattr", "fgetxattr", "listxattr", "llistxattr", "flistxattr", "getxattrat", "listxattrat"};
+
+// Calls that any plugin may need.
+constexpr const char *allowed[] = {
+    // files and folders, for reading, and open descriptors
+    "access", "close", "close_range", "dup", "dup2", "dup3", "faccessat", "faccessat2", "fadvise64", "fadvise64_64",
+    "fchdir", "chdir", "fcntl", "fcntl64", "flock", "fstat", "fstat64", "fstatat64", "fstatfs", "fstatfs64", "getcwd",
+    "getdents", "getdents64", "ioctl", "lseek", "_llseek", "lstat", "lstat64", "newfstatat", "open", "openat",
+    "openat2", "pread64", "preadv", "preadv2", "read", "readahead", "readlink", "readlinkat", "readv", "stat",
+    "stat64", "statfs", "statfs64", "statx", "umask", "write", "writev", "pwrite64", "pwritev", "pwritev2",
+    // pipes, events and waiting
+    "epoll_create", "epoll_create1", "epoll_ctl", "epoll_pwait", "epoll_pwait2", "epoll_wait", "eventfd", "eventfd2",
+    "pipe", "pipe2", "poll", "ppoll", "ppoll_time64", "pselect6", "pselect6_time64", "select", "_newselect",
+    "signalfd", "signalfd4", "timerfd_create", "timerfd_gettime", "timerfd_gettime64", "timerfd_settime",
+    "timerfd_settime64",
+    // connected sockets
+    "getpeername", "getsockname", "getsockopt", "recv", "recvfrom", "recvmmsg", "recvmmsg_time64", "recvmsg", "send",
+    "sendmmsg", "sendmsg", "sendto", "setsockopt", "shutdown", "socket", "socketpair",
+    // memory
+    "brk", "get_mempolicy", "madvise", "membarrier", "memfd_create", "mincore", "mlock", "mlock2", "mmap", "mmap2",
+    "mprotect", "mremap", "msync", "munlock", "munmap", "pkey_alloc", "pkey_free", "pkey_mprotect",
+    // threads and processors
+    "clone", "exit", "exit_group", "futex", "futex_time64", "futex_waitv", "get_robust_list", "getcpu", "getpriority",
+    "gettid", "rseq", "sched_get_priority_max", "sched_get_priority_min", "sched_getaffinity", "sched_getattr",
+    "sched_getparam", "sched_getscheduler", "sched_setaffinity", "sched_setparam", "sched_setscheduler",
+    "sched_yield", "set_robust_list", "set_tid_address", "setpriority",
+    // signals
+    "kill", "pause", "restart_syscall", "rt_sigaction", "rt_sigpending", "rt_sigprocmask", "rt_sigqueueinfo",
+    "rt_sigreturn", "rt_sigsuspend", "rt_sigtimedwait", "rt_sigtimedwait_time64", "rt_tgsigqueueinfo", "sigaltstack",
+    "sigreturn", "tgkill",
+    // clocks and timers
+    "alarm", "clock_getres", "clock_getres_time64", "clock_gettime", "clock_gettime64", "clock_nanosleep",
+    "clock_nanosleep_time64", "getitimer", "gettimeofday", "nanosleep", "setitimer", "time", "timer_create",
+    "timer_delete", "timer_getoverrun", "timer_gettime", "timer_gettime64", "timer_settime", "timer_settime64",
+    "times",
+    // this process
+    "arch_prctl", "capget", "getegid", "getegid32", "geteuid", "geteuid32", "getgid", "getgid32", "getgroups",
+    "getgroups32", "getpgid", "getpgrp", "getpid", "getppid", "getrandom", "getresgid", "getresgid32", "getresuid",
+    "getresuid32", "getrlimit", "getrusage", "getsid", "getuid", "getuid32", "prctl", "prlimit64", "riscv_hwprobe",
+    "set_tls", "setrlimit", "sysinfo", "ugetrlimit", "uname"};
+
+// Calls that only plugins with a writable folder need.
+constexpr const char *allowed_to_writers[] = {
+    "copy_file_range", "fallocate",  "fdatasync",       "fsync",           "ftruncate",        "ftruncate64",
+    "mkdir",           "mkdirat",    "rename",          "renameat",        "renameat2",        "rmdir",
+    "sendfile",        "sendfile64", "splice",          "sync_file_range", "sync_file_range2", "unlink",
+    "unlinkat",        "utimensat",  "utimensat_time64"};
+
+// Calls that an entry of `allow` adds.
+struct CallsOf {
+    std::string_view allowance;
+    std::initializer_list<const char *> calls;
+};
+constexpr CallsOf allowed_by[] = {
+    {"usb", {"bind"}}, // netlink, for hot-plug events
+    {"display", {"connect"}},
+    {"network", {"accept", "accept4", "bind", "connect", "listen"}},
+    {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid", "waitpid"}},
+};
 
 class Filter {
 public:
-    Filter() : context_(seccomp_init(SCMP_ACT_ALLOW)) {
+    // The filter applies `default_action` to calls without a rule.
+    explicit Filter(std::uint32_t default_action) : context_(seccomp_init(default_action)) {
         if (!context_)
             return;
         (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // binary search
         (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1);    // all threads
     }
-    bool valid() const { return context_ && !failed_; }
-
     void deny(const char *name, std::initializer_list<scmp_arg_cmp> when = {}, int error = EPERM) {
+        add(SCMP_ACT_ERRNO(static_cast<unsigned>(error)), name, when);
+    }
+    void allow(const char *name) { add(SCMP_ACT_ALLOW, name, {}); }
+    bool load() const { return context_ && !failed_ && seccomp_load(context_.get()) == 0; }
+
+private:
+    void add(std::uint32_t action, const char *name, std::initializer_list<scmp_arg_cmp> when) {
+        if (!context_)
+            return;
         int call = seccomp_syscall_resolve_name(name);
         if (call == __NR_SCMP_ERROR)
             for (const auto &[newer, number] : newer_calls)
@@ -61,12 +133,10 @@ public:
                     call = number;
         if (call == __NR_SCMP_ERROR)
             return;
-        failed_ |= seccomp_rule_add_array(context_.get(), SCMP_ACT_ERRNO(static_cast<unsigned>(error)), call,
-                                          static_cast<unsigned>(when.size()), when.begin()) != 0;
+        failed_ |= seccomp_rule_add_array(context_.get(), action, call, static_cast<unsigned>(when.size()),
+                                          when.begin()) != 0;
     }
-    bool load() const { return seccomp_load(context_.get()) == 0; }
 
-private:
     struct Release {
         void operator()(void *context) const { seccomp_release(context); }
     };
@@ -154,19 +224,23 @@ void deny_sockets(Filter &filter, const Policy &policy) {
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
 }
 
+// Denies larger buffers in the kernel than the default; RLIMIT_DATA does not count them.
+void deny_uncounted_buffers(Filter &filter) {
+    for (const int option : {SO_SNDBUF, SO_RCVBUF, SO_SNDBUFFORCE, SO_RCVBUFFORCE})
+        filter.deny("setsockopt", {equals(1, SOL_SOCKET), equals(2, static_cast<unsigned>(option))});
+    filter.deny("fcntl", {equals(1, F_SETPIPE_SZ)});
+}
+
 // Denies calls that allocate memory that RLIMIT_DATA does not count.
 void deny_uncounted_memory(Filter &filter) {
-    for (const char *call : {"memfd_create", "memfd_secret", "shmget"})
+    for (const char *call : {"memfd_create", "memfd_secret"})
         filter.deny(call);
     filter.deny("mmap", {has_bits(3, MAP_SHARED | MAP_ANONYMOUS, MAP_SHARED | MAP_ANONYMOUS)});
     filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // such a mapping would count as stack
 }
 
-} // namespace
-
-Layer filter_system_calls(const Policy &policy) {
-    Layer layer{"seccomp", "", ""};
-    Filter filter;
+bool deny_harmful_calls(const Policy &policy) {
+    Filter filter(SCMP_ACT_ALLOW);
     for (const char *call : denied)
         if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
             filter.deny(call);
@@ -174,12 +248,39 @@ Layer filter_system_calls(const Policy &policy) {
     deny_reaching_others(filter, may_start_processes(policy));
     deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);
+    deny_uncounted_buffers(filter);
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);
-    if (!filter.valid() || !filter.load())
+    return filter.load();
+}
+
+// Does not apply to GPU drivers, whose needs vary, nor to sanitizers.
+bool allow_needed_calls(const Policy &policy) {
+    Filter filter(SCMP_ACT_ERRNO(ENOSYS));
+    for (const char *call : allowed)
+        filter.allow(call);
+    if (!policy.writable.empty() || policy.makes_shared_memory)
+        for (const char *call : allowed_to_writers)
+            filter.allow(call);
+    for (const CallsOf &added : allowed_by)
+        if (policy.allows(added.allowance))
+            for (const char *call : added.calls)
+                filter.allow(call);
+    return filter.load();
+}
+
+} // namespace
+
+Layer filter_system_calls(const Policy &policy) {
+    Layer layer{"seccomp", "", ""};
+    if (!deny_harmful_calls(policy))
         layer.missing = error_text("cannot load the filter");
+    else if (policy.allows("gpu") || policy.allows("display") || under_sanitizer)
+        layer.active = "deny list";
+    else if (!allow_needed_calls(policy))
+        layer.missing = error_text("cannot load the allow list");
     else
-        layer.active = "yes";
+        layer.active = "allow list";
     return layer;
 }
 

@@ -2,15 +2,23 @@
 //
 // arhost-launcher: started by the host (supervise/launcher.hpp) with a socket to the host as descriptor 3. Starts
 // workers, reports how they exited, and kills the processes that they leave behind.
+//
+// Each isolated worker is PID 2 of its own PID namespace, so that it can receive all signals. (The kernel discards
+// signals to PID 1 from its own namespace.)
 #include "base/exec.hpp"
 #include "base/orphans.hpp"
+#include "sandbox/sandbox.hpp"
 #include "supervise/launcher_protocol.hpp"
 
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <fcntl.h>
+#include <linux/capability.h>
+#include <map>
+#include <optional>
 #include <poll.h>
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
@@ -23,12 +31,45 @@ using namespace arhost::supervise;
 using arhost::base::kill_orphans;
 using arhost::base::UniqueFd;
 
+// The first process of a worker's PID namespace, PID 1. The destructor ends it, and the kernel then kills all other
+// processes in the namespace.
+struct Init {
+    pid_t pid = -1;
+    UniqueFd lifeline; // PID 1 exits when this end of the pipe is closed, also if the launcher is killed
+};
+
+// The workers that have not exited. A worker without a PID namespace has no Init.
+using Workers = std::map<pid_t, std::optional<Init>>;
+
+[[noreturn]] void run_init(int pipe) {
+    ::prctl(PR_SET_NAME, "arhost-init");
+    ::signal(SIGCHLD, SIG_IGN); // the kernel reaps orphans
+    ::dup2(pipe, 0);
+    ::syscall(SYS_close_range, 1u, ~0u, 0u);
+    char byte;
+    while (::read(0, &byte, 1) < 0 && errno == EINTR) {
+    }
+    ::_exit(0);
+}
+
+// Lets the program that this process executes keep CAP_SYS_ADMIN in its user namespace, to enter its sandbox.
+void keep_capability() {
+    if (::geteuid() == 0)
+        return;
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    __user_cap_data_struct data[2] = {};
+    ::syscall(SYS_capget, &header, data);
+    data[0].inheritable |= 1u << CAP_SYS_ADMIN;
+    ::syscall(SYS_capset, &header, data);
+    ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE, CAP_SYS_ADMIN, 0, 0);
+}
+
 // Runs in the child after fork. Executes arhost-worker, with the control channel as descriptor 3 and the doorbell as
-// descriptor 4.
-[[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t launcher) {
-    // A separate process group, so that a kill of the group reaches the processes that the worker forks, and Ctrl-C
-    // in the terminal reaches only the host.
-    ::setpgid(0, 0);
+// descriptor 4. `parent`: the value of getppid(2).
+[[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t parent) {
+    // A separate session, so that the worker has no controlling terminal, a kill of the process group reaches the
+    // processes that the worker forks, and Ctrl-C in the terminal reaches only the host.
+    ::setsid();
     ::signal(SIGINT, SIG_IGN);
     ::signal(SIGTERM, SIG_DFL);
     ::signal(SIGHUP, SIG_IGN);
@@ -36,15 +77,60 @@ using arhost::base::UniqueFd;
     const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
     char *const argv[] = {const_cast<char *>(program), nullptr};
     const int output = fds[2].get();
-    arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, launcher);
+    arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, parent);
     const char message[] = "arhost-worker cannot be executed; is it installed in the same folder as arhost?\n";
     (void)!::write(STDERR_FILENO, message, sizeof message - 1);
     ::_exit(127);
 }
 
-void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds, std::set<pid_t> &spawned) {
+// Like fork(2), but the parent of the child is the parent of this process.
+pid_t fork_sibling() {
+    return static_cast<pid_t>(::syscall(SYS_clone, CLONE_PARENT | SIGCHLD, 0, 0, 0, 0));
+}
+
+// Starts a worker as PID 2 of a new PID namespace, as a child of this process. A helper process creates the
+// namespace, because a process without privileges cannot leave the user namespace that it needs to do so. Returns -1
+// if the namespaces are unavailable.
+pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, std::optional<Init> &init) {
+    int life[2], result[2];
+    if (::pipe2(life, O_CLOEXEC) != 0)
+        return -1;
+    const UniqueFd init_end(life[0]);
+    UniqueFd lifeline(life[1]);
+    if (::pipe2(result, O_CLOEXEC) != 0)
+        return -1;
+    const UniqueFd result_end(result[0]);
+    UniqueFd helper_end(result[1]);
+    const pid_t helper = ::fork();
+    if (helper == 0) {
+        pid_t pids[2] = {-1, -1}; // of PID 1 and the worker
+        if ((::geteuid() == 0 || arhost::sandbox::enter_user_namespace().empty()) && ::unshare(CLONE_NEWPID) == 0) {
+            if ((pids[0] = fork_sibling()) == 0)
+                run_init(init_end.get());
+            if (pids[0] > 0 && (pids[1] = fork_sibling()) == 0) {
+                keep_capability();
+                exec_worker(request.program, fds, 0); // 0: the parent is outside of the namespace
+            }
+        }
+        (void)!::write(helper_end.get(), pids, sizeof pids);
+        ::_exit(0);
+    }
+    helper_end.reset();
+    pid_t pids[2] = {-1, -1};
+    (void)!::read(result_end.get(), pids, sizeof pids);
+    if (helper > 0)
+        ::waitpid(helper, nullptr, 0);
+    if (pids[1] > 0)
+        init = Init{pids[0], std::move(lifeline)};
+    return pids[1];
+}
+
+void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds, Workers &workers) {
     const pid_t launcher = ::getpid();
-    const pid_t pid = ::fork();
+    std::optional<Init> init;
+    pid_t pid = request.isolated ? fork_isolated(request, fds, init) : -1;
+    if (pid < 0)
+        pid = ::fork();
     if (pid == 0)
         exec_worker(request.program, fds, launcher);
     Reply reply{};
@@ -65,15 +151,15 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
         return;
     }
     reply.kind = Reply::spawned;
-    spawned.insert(pid);
+    workers.emplace(pid, std::move(init));
     send_struct(socket, reply, {pidfd.get()});
 }
 
 // Called after the host has exited. Kills the workers and their children, and exits. Uses _exit, because the leak
 // check of a sanitizer would stop this process at a normal exit, which conflicts with the SIGCONT that a waiting host
 // sends.
-[[noreturn]] void end_all(const std::set<pid_t> &spawned) {
-    for (const pid_t worker : spawned)
+[[noreturn]] void end_all(const Workers &workers) {
+    for (const auto &[worker, init] : workers)
         ::kill(-worker, SIGKILL);
     for (int i = 0; i < 500; ++i) { // gives up after half a second, because a process may hang in the kernel
         kill_orphans({});
@@ -87,17 +173,28 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
     ::_exit(0);
 }
 
-void reap(int socket, std::set<pid_t> &spawned) {
+// Kills children that are neither workers nor the first process of a worker's namespace.
+void kill_other_children(const Workers &workers) {
+    std::set<pid_t> kept;
+    for (const auto &[worker, init] : workers) {
+        kept.insert(worker);
+        if (init)
+            kept.insert(init->pid);
+    }
+    kill_orphans(kept);
+}
+
+void reap(int socket, Workers &workers) {
     for (;;) {
         Reply reply{};
         rusage usage{};
         reply.kind = Reply::exited;
         reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
         if (reply.exit.pid <= 0)
-            return (void)kill_orphans(spawned);
-        if (spawned.erase(reply.exit.pid) == 0)
-            continue;                     // an orphan of a worker
-        ::kill(-reply.exit.pid, SIGKILL); // kill_orphans kills children that have left the group
+            return kill_other_children(workers);
+        if (workers.erase(reply.exit.pid) == 0)
+            continue;                     // an orphan of a worker, or the first process of a namespace
+        ::kill(-reply.exit.pid, SIGKILL); // kill_other_children kills children that have left the group
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -127,7 +224,7 @@ int main() {
     ::sigaddset(&child, SIGCHLD);
     ::sigprocmask(SIG_BLOCK, &child, nullptr);
     const UniqueFd signals(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK));
-    std::set<pid_t> spawned;
+    Workers workers;
     for (;;) {
         pollfd ready[2] = {{launcher_fd, POLLIN, 0}, {signals.get(), POLLIN, 0}};
         if (::poll(ready, 2, -1) < 0)
@@ -136,14 +233,14 @@ int main() {
             signalfd_siginfo info;
             while (::read(signals.get(), &info, sizeof info) > 0) {
             }
-            reap(launcher_fd, spawned);
+            reap(launcher_fd, workers);
         }
         if (ready[0].revents) {
             Request request;
             std::vector<UniqueFd> fds;
             if (!receive_struct(launcher_fd, request, fds) || fds.size() != 3)
-                end_all(spawned);
-            spawn(launcher_fd, request, fds, spawned);
+                end_all(workers);
+            spawn(launcher_fd, request, fds, workers);
         }
     }
 }

@@ -60,7 +60,7 @@ void Component::spawn() {
     callbacks.died = [this](const Death &death) { on_died(death); };
     try {
         process_ = std::make_unique<Process>(context_, name_, std::move(callbacks),
-                                             encode(messages::Open{plugin().string(), sandbox_}));
+                                             messages::Open{plugin().string(), sandbox_});
     } catch (const std::exception &error) { // handled like the death of a process
         state_ = State::waiting;
         return restart(error.what());

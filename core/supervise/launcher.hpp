@@ -37,13 +37,18 @@ struct Spawned {
 
 struct Reply;
 
+enum class Isolation {
+    none,
+    pid_namespace // where the machine supports it; the worker then keeps CAP_SYS_ADMIN until it enters its sandbox
+};
+
 // Starts workers. Implemented by Launcher, and by replacements in core/inprocess and tests.
 class Starter {
 public:
     virtual ~Starter() = default;
 
     // Throws std::runtime_error if no process can be started.
-    virtual Spawned spawn(const std::filesystem::path &program, const LogFunction &log) = 0;
+    virtual Spawned spawn(const std::filesystem::path &program, Isolation isolation, const LogFunction &log) = 0;
 
     // Waits for the exit status of a process that has exited already (its pidfd is readable).
     virtual Exit wait_exit(pid_t pid) = 0;
@@ -60,7 +65,7 @@ public:
     Launcher(const Launcher &) = delete;
     Launcher &operator=(const Launcher &) = delete;
 
-    Spawned spawn(const std::filesystem::path &program, const LogFunction &log) override;
+    Spawned spawn(const std::filesystem::path &program, Isolation isolation, const LogFunction &log) override;
     Exit wait_exit(pid_t pid) override;
 
 private:

@@ -12,6 +12,7 @@ namespace arhost::supervise {
 
 struct Request {
     char program[PATH_MAX]; // accompanied by the descriptors of control channel, doorbell and output
+    bool isolated;          // Isolation::pid_namespace
 };
 
 struct Reply {

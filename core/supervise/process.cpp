@@ -21,9 +21,9 @@ bool signal_process(const base::UniqueFd &pidfd, int signal) {
 
 } // namespace
 
-Process::Process(Context &context, std::string name, Callbacks callbacks, const Json &first)
+Process::Process(Context &context, std::string name, Callbacks callbacks, const Json &first, Isolation isolation)
     : context_(context), name_(std::move(name)), callbacks_(std::move(callbacks)),
-      spawned_(context.launcher.spawn(context.worker_program, context.log)),
+      spawned_(context.launcher.spawn(context.worker_program, isolation, context.log)),
       host_memory_(SharedMemory::create("arhost-host-page", sizeof(HostPage))),
       worker_memory_(SharedMemory::create("arhost-worker-page", sizeof(WorkerPage))),
       host_page_(host_memory_.map(Access::read_write)), worker_page_(worker_memory_.map(Access::read_only)),

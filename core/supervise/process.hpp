@@ -42,8 +42,11 @@ public:
         std::function<void(const Death &)> died;
     };
 
-    // Starts a worker and sends it the pages with `first`, the encoded messages::Open or messages::Load.
-    Process(Context &context, std::string name, Callbacks callbacks, const ipc::Json &first);
+    // Starts a worker and sends it the pages with `first`, a messages::Open or messages::Load.
+    template <class T>
+    Process(Context &context, std::string name, Callbacks callbacks, const T &first)
+        : Process(context, std::move(name), std::move(callbacks), ipc::encode(first),
+                  first.sandbox.mode == sandbox::Mode::none ? Isolation::none : Isolation::pid_namespace) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;
@@ -68,6 +71,7 @@ public:
     double cpu_seconds() const; // used so far
 
 private:
+    Process(Context &context, std::string name, Callbacks callbacks, const ipc::Json &first, Isolation isolation);
     void send_json(const ipc::Json &body, std::initializer_list<int> fds);
     void send_json_ordered(const ipc::Json &body, std::initializer_list<int> fds);
     void receive_messages(int max_messages);

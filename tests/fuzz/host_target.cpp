@@ -280,7 +280,8 @@ private:
 
 class SimulatedWorkers final : public supervise::Starter {
 public:
-    supervise::Spawned spawn(const std::filesystem::path &, const supervise::LogFunction &) override {
+    supervise::Spawned spawn(const std::filesystem::path &, supervise::Isolation,
+                             const supervise::LogFunction &) override {
         supervise::Spawned spawned;
         Channel theirs;
         std::tie(spawned.channel, theirs) = Channel::make_pair();

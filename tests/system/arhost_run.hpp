@@ -113,8 +113,9 @@ public:
     std::vector<pid_t> workers() const {
         std::vector<pid_t> all;
         for (const pid_t launcher : children(pid_))
-            for (const pid_t worker : children(launcher))
-                all.push_back(worker);
+            for (const pid_t child : children(launcher))
+                if (name_of(child) != "arhost-init") // the first process of a worker's PID namespace
+                    all.push_back(child);
         return all;
     }
 

@@ -5,8 +5,10 @@
 
 #include <gmock/gmock.h>
 
+#include <cctype>
 #include <iterator>
 #include <random>
+#include <set>
 
 using namespace arhost::test;
 using testing::HasSubstr;
@@ -45,9 +47,30 @@ bool is_dead(pid_t pid) {
     return !lives();
 }
 
+// Returns the processes that tracker_counter has forked. It writes their pids in its own PID namespace.
 std::vector<pid_t> forked_children(const ArhostRun &run) {
+    const auto pid_namespace = [](const std::string &pid) {
+        std::error_code ignored;
+        return std::filesystem::read_symlink("/proc/" + pid + "/ns/pid", ignored);
+    };
+    const auto pid_in_it = [](const std::string &pid) {
+        const std::string text = read_file("/proc/" + pid + "/status"), key = "NSpid:";
+        std::istringstream line(text.substr(std::min(text.find(key), text.size())));
+        std::string last, word;
+        for (line >> word; line >> word && word.back() != ':';)
+            last = word;
+        return last;
+    };
     std::istringstream text(run.read("children.txt"));
-    return {std::istream_iterator<pid_t>(text), {}};
+    const std::set<std::string> written{std::istream_iterator<std::string>(text), {}};
+    const auto expected = pid_namespace(std::to_string(run.worker("tracker_counter")));
+    std::vector<pid_t> found;
+    for (const auto &entry : std::filesystem::directory_iterator("/proc")) {
+        const std::string pid = entry.path().filename();
+        if (std::isdigit(pid.front()) && pid_namespace(pid) == expected && written.contains(pid_in_it(pid)))
+            found.push_back(std::stoi(pid));
+    }
+    return found;
 }
 
 } // namespace

@@ -21,7 +21,7 @@ struct FakeLoader final : supervise::Starter {
     Channel channel;
     base::UniqueFd death;
 
-    supervise::Spawned spawn(const fs::path &, const supervise::LogFunction &) override {
+    supervise::Spawned spawn(const fs::path &, supervise::Isolation, const supervise::LogFunction &) override {
         supervise::Spawned spawned;
         std::tie(spawned.channel, channel) = Channel::make_pair();
         spawned.doorbell = make_doorbell().host;

@@ -89,7 +89,10 @@ struct Sandbox : testing::Test {
 
 } // namespace
 
-TEST_F(Sandbox, NamespacesMakeEverythingReadOnlyExceptTheFolders) {
+TEST_F(Sandbox, NamespacesHideAllPathsThatAreNotGranted) {
+    fs::create_symlink(outside / "old", scratch.path() / "link");
+    std::ofstream(outside / "hidden") << "hidden";
+    policy.readable = {scratch.path() / "link"};
     EXPECT_CHECKS(in_child([&] {
         if (enter_namespaces(policy).active.find("mount") == std::string::npos)
             return layer_is_missing;
@@ -100,6 +103,14 @@ TEST_F(Sandbox, NamespacesMakeEverythingReadOnlyExceptTheFolders) {
         check.that(!opens(outside / "old", O_WRONLY));
         check.that(::chmod((outside / "old").c_str(), 0700) != 0);
         check.that(opens(outside / "old", O_RDONLY));
+        check.that(opens(scratch.path() / "link", O_RDONLY));
+        struct stat status {};
+        check.that(::lstat((outside / "hidden").c_str(), &status) != 0 && errno == ENOENT);
+        check.that(::lstat("/home", &status) != 0 && errno == ENOENT);
+        check.that(opens("/usr/bin/env", O_RDONLY));
+        check.that(opens("/lib64", O_RDONLY | O_DIRECTORY) || !fs::exists("/usr/lib64"));
+        check.that(opens("/proc/self/status", O_RDONLY));
+        check.that(opens("/dev/fd/0", O_RDONLY) || errno != ENOENT);
         check.that(opens("/dev/null", O_WRONLY));
         return check.result();
     }));
@@ -114,7 +125,7 @@ TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
         check.that(!opens("/dev/ptmx", O_RDWR | O_NOCTTY));
         check.that(opens("/dev/null", O_RDWR));
         check.that(opens("/dev/urandom", O_RDONLY));
-        check.that(opens("/dev/zero", O_RDONLY));
+        check.that(!opens("/dev/zero", O_RDWR));
         return check.result();
     }));
 }

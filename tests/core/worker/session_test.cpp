@@ -26,7 +26,7 @@ struct Conversation {
         : process(context, plugin,
                   {[this](Message &message) { received.push_back(message.body); }, [](const Result &) {},
                    [this](const supervise::Death &how) { death = how.how; }},
-                  encode(messages::Open{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so", sandbox::Policy{}})) {}
+                  messages::Open{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so", sandbox::Policy{}}) {}
 
     // Returns the next message of the worker, which must be a T, or nullopt if the worker has died.
     template <class T> std::optional<T> next() {

@@ -16,15 +16,23 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/inotify.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/mount.h>
+#include <sys/msg.h>
 #include <sys/ptrace.h>
 #include <sys/resource.h>
+#include <sys/sem.h>
+#include <sys/shm.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/uio.h>
 #include <sys/un.h>
 #include <sys/wait.h>
+#include <sys/xattr.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { control = 3, doorbell = 4 };
@@ -68,6 +76,46 @@ static void read_files(const tracker *self) {
     report(self, "the host's addresses", opens(file, O_RDONLY));
 }
 
+/* Names, sizes and attributes of files that the plugin may not read. */
+static void read_metadata(const tracker *self) {
+    char other[1100], text[64];
+    struct stat status;
+    report(self, "a file's size", stat(self->target, &status) == 0);
+    report(self, "whether a file exists", access(self->target, F_OK) == 0);
+    report(self, "a link's target", readlink(strcat(strcpy(other, self->target), ".alias"), text, sizeof text) > 0);
+    report(self, "attributes", listxattr(self->target, text, sizeof text) >= 0);
+    report(self, "an attribute", getxattr(self->target, "user.none", text, sizeof text) >= 0 || errno == ENODATA);
+    report(self, "the names in a folder", opens(getenv("HOSTILE_FOLDER"), O_RDONLY | O_DIRECTORY));
+    report(self, "the names in the root folder", opens("/", O_RDONLY | O_DIRECTORY) && access("/home", F_OK) == 0);
+    report(self, "watch a folder", inotify_add_watch(inotify_init1(0), getenv("HOSTILE_FOLDER"), IN_ALL_EVENTS) >= 0);
+}
+
+/* System V objects that the test has created. */
+static void reach_system_v_objects(const tracker *self) {
+    const int shared = atoi(getenv("HOSTILE_SHM")), queue = atoi(getenv("HOSTILE_QUEUE")),
+              semaphores = atoi(getenv("HOSTILE_SEMAPHORES"));
+    struct msqid_ds about_queue;
+    struct shmid_ds about;
+    report(self, "attach memory", shmat(shared, NULL, 0) != (void *)-1);
+    report(self, "memory's owner", shmctl(shared, IPC_STAT, &about) == 0);
+    report(self, "list memory", shmctl(0, SHM_INFO, &about) >= 0);
+    report(self, "a queue's owner", msgctl(queue, IPC_STAT, &about_queue) == 0);
+    report(self, "send a message",
+           msgsnd(queue, &(struct {
+                      long type;
+                      char text[8];
+                  }){1, "x"},
+                  1, IPC_NOWAIT) == 0);
+    report(self, "read a message",
+           msgrcv(queue, &(struct {
+                      long type;
+                      char text[64];
+                  }){0, ""},
+                  64, 0, IPC_NOWAIT) >= 0);
+    report(self, "a semaphore", semctl(semaphores, 0, GETVAL) >= 0);
+    report(self, "new memory", shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600) >= 0);
+}
+
 /* Each attempt uses a different file name, so that a successful attempt does not affect the next one. */
 static void write_files(const tracker *self) {
     char other[1100];
@@ -84,13 +132,12 @@ static void write_files(const tracker *self) {
     report(self, "unlink", unlink(strcat(strcpy(other, self->target), ".other")) == 0);
 }
 
-/* Tries to open the devices that exist on this machine. */
+/* Not every machine has all of these devices. */
 static void open_devices(const tracker *self) {
     const char *const devices[] = {"/dev/ptmx", "/dev/kmsg", "/dev/fuse", "/dev/mem", "/dev/loop0", "/dev/video0"};
     size_t i;
     for (i = 0; i < sizeof devices / sizeof *devices; ++i)
-        if (access(devices[i], F_OK) == 0)
-            report(self, devices[i], opens(devices[i], O_RDONLY | O_NOCTTY));
+        report(self, devices[i], opens(devices[i], O_RDONLY | O_NOCTTY));
 }
 
 static int file_has(const char *file, const char *text) {
@@ -135,6 +182,50 @@ static void open_sockets(const tracker *self) {
     report(self, "a path", connects(self, 0));
     report(self, "an abstract name", connects(self, 1));
     report(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
+}
+
+/* The terminal that arhost was started in. */
+static void use_terminal(const tracker *self) {
+    const int terminal = open("/dev/tty", O_RDWR | O_NOCTTY | O_CLOEXEC);
+    int fd, inherited = 0;
+    report(self, "open the terminal", terminal >= 0);
+    for (fd = 0; fd < 16; ++fd)
+        inherited |= isatty(fd);
+    report(self, "an inherited terminal", inherited);
+    report(self, "type", ioctl(terminal, TIOCSTI, "x") == 0);
+    report(self, "the foreground group", tcsetpgrp(terminal, getpgrp()) == 0);
+    report(self, "another session's group", getsid(0) != getpid() && getpgrp() != getpid());
+}
+
+/* Calls that reach the kernel or change the view of the file system. */
+static void enter_kernel(const tracker *self) {
+    static const struct {
+        const char *name;
+        long number, arguments[3];
+    } calls[] = {
+        {"a user namespace", SYS_unshare, {CLONE_NEWUSER, 0, 0}},
+        {"a mount namespace", SYS_unshare, {CLONE_NEWNS, 0, 0}},
+        {"chroot", SYS_chroot, {(long)"/", 0, 0}},
+        {"bpf", SYS_bpf, {0, 0, 0}},
+        {"userfaultfd", SYS_userfaultfd, {1, 0, 0}},
+        {"io_uring", SYS_io_uring_setup, {1, 0, 0}},
+        {"perf_event_open", SYS_perf_event_open, {0, 0, 0}},
+        {"a keyring", SYS_keyctl, {0, -3, 1}},
+        {"the kernel's log", SYS_syslog, {10, 0, 0}},
+        {"a file by handle", SYS_open_by_handle_at, {-1, 0, 0}},
+        {"a quota", SYS_quotactl, {0, 0, 0}},
+        {"another personality", SYS_personality, {0x0040000, 0, 0}},
+        {"a fanotify group", SYS_fanotify_init, {0, 0, 0}},
+        {"a mount", SYS_mount, {(long)"none", (long)"/tmp", (long)"tmpfs"}},
+        {"a module", SYS_finit_module, {-1, (long)"", 0}},
+        {"an undefined call", 1000, {0, 0, 0}},
+    };
+    size_t i;
+    for (i = 0; i < sizeof calls / sizeof *calls; ++i) {
+        const long result =
+            syscall(calls[i].number, calls[i].arguments[0], calls[i].arguments[1], calls[i].arguments[2], 0, 0, 0);
+        report(self, calls[i].name, result >= 0 || (errno != EPERM && errno != ENOSYS && errno != EACCES));
+    }
 }
 
 static void make_processes(const tracker *self) {
@@ -243,6 +334,42 @@ static void fill_memory(const tracker *self) {
     while (threads < 1000 && pthread_create(&thread, NULL, wait_forever, NULL) == 0)
         ++threads;
     report(self, "a thousand threads", threads == 1000);
+}
+
+/* Resources that the kernel counts per user, and memory in the kernel. */
+static void exhaust_user(const tracker *self) {
+    enum { many = 3000, big = 8 << 20 };
+    const struct rlimit endless = {RLIM_INFINITY, RLIM_INFINITY}, more = {4096, 4096};
+    const int size = big;
+    int ends[2], made, found;
+    unsigned long io = 0;
+    socklen_t length = sizeof found;
+    timer_t timer;
+    union sigval value = {0};
+    sigset_t blocked;
+    for (made = 0; made < many && inotify_init1(0) >= 0;)
+        ++made;
+    report(self, "inotify instances", made > 0);
+    for (made = 0; made < many && timer_create(CLOCK_MONOTONIC, NULL, &timer) == 0;)
+        ++made;
+    report(self, "timers", made == many);
+    sigemptyset(&blocked);
+    sigaddset(&blocked, SIGRTMIN + 5);
+    pthread_sigmask(SIG_BLOCK, &blocked, NULL);
+    for (made = 0; made < many && sigqueue(getpid(), SIGRTMIN + 5, value) == 0;)
+        ++made;
+    report(self, "queued signals", made == many);
+    report(self, "AIO events", syscall(SYS_io_setup, 10000, &io) == 0);
+    report(self, "a larger pipe", pipe(ends) == 0 && fcntl(ends[1], F_SETPIPE_SZ, 1 << 20) >= 1 << 20);
+    report(self, "a larger socket buffer",
+           socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0 &&
+               setsockopt(ends[0], SOL_SOCKET, SO_SNDBUF, &size, sizeof size) == 0 &&
+               getsockopt(ends[0], SOL_SOCKET, SO_SNDBUF, &found, &length) == 0 && found > 212992);
+    report(self, "a larger stack", setrlimit(RLIMIT_STACK, &endless) == 0);
+    report(self, "more descriptors", setrlimit(RLIMIT_NOFILE, &more) == 0);
+    report(self, "real-time priority",
+           sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){.sched_priority = 1}) == 0);
+    report(self, "a higher priority", setpriority(PRIO_PROCESS, 0, -5) == 0);
 }
 
 static void fill_disk(const tracker *self) {
@@ -394,6 +521,16 @@ static void attack(const tracker *self) {
     size_t i;
     if (!strcmp(name, "read"))
         read_files(self);
+    else if (!strcmp(name, "metadata"))
+        read_metadata(self);
+    else if (!strcmp(name, "system_v"))
+        reach_system_v_objects(self);
+    else if (!strcmp(name, "terminal"))
+        use_terminal(self);
+    else if (!strcmp(name, "kernel"))
+        enter_kernel(self);
+    else if (!strcmp(name, "exhaust"))
+        exhaust_user(self);
     else if (!strcmp(name, "write"))
         write_files(self);
     else if (!strcmp(name, "devices"))
