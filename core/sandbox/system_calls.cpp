@@ -86,7 +86,7 @@ constexpr const char *allowed[] = {
     "arch_prctl", "capget", "getegid", "getegid32", "geteuid", "geteuid32", "getgid", "getgid32", "getgroups",
     "getgroups32", "getpgid", "getpgrp", "getpid", "getppid", "getrandom", "getresgid", "getresgid32", "getresuid",
     "getresuid32", "getrlimit", "getrusage", "getsid", "getuid", "getuid32", "prctl", "prlimit64", "riscv_hwprobe",
-    "set_tls", "setrlimit", "sysinfo", "ugetrlimit", "uname"};
+    "seccomp", "set_tls", "setrlimit", "sysinfo", "ugetrlimit", "uname"};
 
 // Calls that only plugins with a writable folder need.
 constexpr const char *allowed_to_writers[] = {
