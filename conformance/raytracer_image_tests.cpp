@@ -69,8 +69,9 @@ void region(Context &context) {
             const int alpha = picture.alpha(x, y);
             return inside || alpha <= 2
                        ? ""
-                       : fmt::format("outside the reported region, {}×{} at ({}, {}), alpha is {}", info.region_width,
-                                     info.region_height, info.region_x, info.region_y, alpha);
+                       : fmt::format(
+                             "alpha is {} outside the reported region ({}×{} at ({}, {})); expected at most 2", alpha,
+                             info.region_width, info.region_height, info.region_x, info.region_y);
         });
     }
     if (!reported)

@@ -276,7 +276,7 @@ void out_of_order(Context &context) {
 
 constexpr double orthonormal = 1e-9; // arhost/tracker.h
 
-// Describes why a matrix is not a rigid transform, as the end of a sentence; empty if it is one.
+// Returns why the matrix is not a rigid transform, as a predicate ("is not finite"); empty if it is rigid.
 std::string not_rigid(const double *m, double tolerance) {
     if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
         return "is not finite";

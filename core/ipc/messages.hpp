@@ -111,9 +111,9 @@ struct Devices {
 // The plugin has started.
 struct Ready {
     static constexpr const char *type = "ready";
-    std::optional<arhost_frame_format> format;   // only of a source
-    std::uint64_t frame_count = 0;               // only of a source; 0: unknown
-    std::optional<arhost_intrinsics> intrinsics; // only of a source that knows its camera
+    std::optional<arhost_frame_format> format;   // set only by a source
+    std::uint64_t frame_count = 0;               // set only by a source; 0: unknown
+    std::optional<arhost_intrinsics> intrinsics; // set only by a source that knows its camera
 };
 
 struct Attached {

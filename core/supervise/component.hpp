@@ -44,7 +44,7 @@ public:
         // Called when the plugin has started. Returns the layout of its output slots (count 0: no slots); throws if
         // the values in `ready` are unsuitable.
         std::function<ipc::SlotLayout(const ipc::messages::Ready &ready)> ready;
-        std::function<void()> running; // commands may be submitted
+        std::function<void()> running; // called when the component accepts commands
         std::function<void(const ipc::Command &, const ipc::Result &)> result;
         // Called when the process has died. `unanswered`: the commands without a result, oldest first; the worker was
         // executing the first one.

@@ -46,7 +46,7 @@ void check_setup(const arhost_raytracer_setup &setup) {
     if (!all_finite({in.coefficients, count}))
         refuse("the distortion coefficients must be finite");
     if (setup.scene->magic != ARHOST_SCENE_MAGIC)
-        refuse("the scene is not an arena: its magic number is wrong (arhost/scene.h)");
+        refuse("the scene does not begin with ARHOST_SCENE_MAGIC (arhost/scene.h)");
     if (setup.scene->version != ARHOST_SCENE_VERSION)
         refuse("the scene's arena has version " + std::to_string(setup.scene->version) + ", but version " +
                std::to_string(ARHOST_SCENE_VERSION) + " is required");

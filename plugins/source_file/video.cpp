@@ -199,7 +199,8 @@ int Decoder::quarter_turns() const {
     const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
     if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      name_ + " is marked as " + (mirrored ? "mirrored" : "rotated by an angle") +
+                      name_ + " is marked as " +
+                          (mirrored ? "mirrored" : "rotated by an angle that is no multiple of 90°") +
                           ", which is unsupported; convert it with ffmpeg -i … -c:v libx264 …");
     return (static_cast<int>(quarters) + 4) % 4;
 }
@@ -268,7 +269,7 @@ void Video::check_size() const {
                           "×" + std::to_string(height_));
 }
 
-// Warns once, although a loop reaches the same position repeatedly.
+// Warns only once per fault: a video that is played in a loop has the same fault in each pass.
 void Video::warn_once(const std::string &fault, bool &warned) const {
     if (fault.empty() || warned)
         return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Compares the brightness of a white plane under each type of light with the light's formula.
+// For each type of light, compares the brightness of a lit white plane with the analytic value.
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>

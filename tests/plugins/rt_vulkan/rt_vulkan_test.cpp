@@ -141,7 +141,7 @@ TEST_F(RichScene, RepeatedGivesTheSameBytes) {
     EXPECT_EQ(tracer.render(from_the_side(small)).pixels(), first);
 }
 
-// ---- Each path -------------------------------------------------------------------------------------
+// ---- Each traversal path ---------------------------------------------------------------------------
 
 namespace {
 
@@ -379,7 +379,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
               std::tuple(tight.x, tight.y, x1, y1));
 }
 
-// ---- Loader, device, path and cache ----------------------------------------------------------------
+// ---- Vulkan loader, device, traversal path, pipeline cache -----------------------------------------
 
 TEST(Loader, ReportsAMissingLibrary) {
     LoggingHost logging;

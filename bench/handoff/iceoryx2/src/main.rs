@@ -113,7 +113,7 @@ fn run_server(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Err
         Receiver::open(&node, "forward", run)?,
         Sender::open(&node, "backward", run)?,
     );
-    println!("ready"); // messages sent before the receiver exists would be lost
+    println!("ready"); // the client waits for this line: messages sent before the receiver exists would be lost
     for _ in 0..=rounds {
         let request = requests.receive(polling)?;
         let forward_ns = now_ns() - request.sent_ns;
