@@ -44,22 +44,27 @@ struct ListDevices {
     static constexpr const char *type = "list-devices";
 };
 
+// `kind` names the setup in Create's JSON.
 struct SourceSetup {
+    static constexpr const char *kind = "source";
     std::uint64_t first_sequence = 0;
     double fps = 0;
     bool paced = false;
     std::optional<arhost_intrinsics> intrinsics;
 };
 struct TrackerSetup {
+    static constexpr const char *kind = "tracker";
     arhost_frame_format format{};
     arhost_intrinsics intrinsics{};
     std::vector<arhost_marker_config> markers;
 };
 struct RaytracerSetup {
+    static constexpr const char *kind = "raytracer";
     std::uint32_t width = 0, height = 0;
     arhost_intrinsics intrinsics{};
 };
 struct SinkSetup {
+    static constexpr const char *kind = "sink";
     std::uint32_t width = 0, height = 0;
     double fps = 0;
     std::uint64_t first_sequence = 0;
