@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The result of a test.
+// The result of a test, and the exceptions by which it ends.
 #pragma once
 
+#include "conformance/picture.hpp"
 #include "ipc/channel.hpp"
 
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace arhost::conformance {
@@ -27,6 +30,29 @@ inline constexpr std::array<std::string_view, 8> verdict_texts = {"",        "pa
 inline std::string_view to_text(Verdict verdict) {
     return verdict_texts[static_cast<std::size_t>(verdict)];
 }
+
+// The plugin violates the requirement: a sentence with numbers, and images that show the violation. Any other
+// std::exception is an error of the suite.
+class Failure : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+    Failure with(std::string label, const Picture &picture) && {
+        pictures.emplace_back(std::move(label), picture);
+        return std::move(*this);
+    }
+    Failure at(unsigned x, unsigned y) && {
+        wrong_pixel = {x, y};
+        return std::move(*this);
+    }
+    std::vector<std::pair<std::string, Picture>> pictures;
+    std::optional<std::array<unsigned, 2>> wrong_pixel;
+};
+struct Skip : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+struct Warning : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
 
 // An image for the report.
 struct ReportImage {
