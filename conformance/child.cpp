@@ -5,6 +5,7 @@
 #include "conformance/test.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -78,8 +79,8 @@ Result run(const Test &test, const Subject &subject, Context &context) {
     try {
         const sandbox::Level level = enter_sandbox(test, subject);
         run_in_sandbox(test, context);
-        if (!context.facts.empty())
-            context.facts["sandbox"] = sandbox::to_text(level);
+        if (context.facts)
+            context.facts->sandbox = sandbox::to_text(level);
         result.verdict = Verdict::pass;
         result.message = context.note;
     } catch (const Failure &failure) {
@@ -161,10 +162,18 @@ int run_child(const std::string &name, const Subject &subject) {
     return EXIT_FAILURE;
 }
 
+ipc::Json to_json(const std::optional<Facts> &facts) {
+    if (!facts)
+        return ipc::Json::object();
+    ipc::Json json = ipc::to_json(facts->descriptor);
+    json["sandbox"] = facts->sandbox;
+    return json;
+}
+
 ipc::Json to_json(const Result &result) {
-    ipc::Json json = {{"test", result.test},       {"verdict", to_text(result.verdict)},
-                      {"message", result.message}, {"seconds", result.seconds},
-                      {"facts", result.facts},     {"images", ipc::Json::array()}};
+    ipc::Json json = {
+        {"test", result.test},       {"verdict", to_text(result.verdict)}, {"message", result.message},
+        {"seconds", result.seconds}, {"facts", to_json(result.facts)},     {"images", ipc::Json::array()}};
     for (const ReportImage &image : result.images)
         json["images"].push_back(
             {{"label", image.label}, {"width", image.width}, {"height", image.height}, {"png", image.png}});
@@ -182,9 +191,8 @@ Result result_from_json(const ipc::Json &json) {
         throw std::runtime_error("unknown verdict");
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
     result.message = json.at("message").get<std::string>();
-    result.facts = json.at("facts");
-    if (result.facts != ipc::Json::object())
-        ipc::description_from_json(result.facts); // throws if invalid
+    if (const ipc::Json &facts = json.at("facts"); facts != ipc::Json::object())
+        result.facts = {ipc::description_from_json(facts), facts.at("sandbox").get<std::string>()};
     for (const ipc::Json &image : json.at("images"))
         result.images.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
                                  image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});

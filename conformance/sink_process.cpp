@@ -4,6 +4,7 @@
 #include "conformance/child.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <csignal>
 #include <deque>

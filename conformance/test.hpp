@@ -20,12 +20,12 @@ namespace arhost::conformance {
 // Input of a test.
 struct Context {
     PluginLibrary &library;
-    std::filesystem::path reference;       // the ray tracer to compare images with
-    std::mt19937_64 random;                // seeded the same for every test
-    ipc::Json facts = ipc::Json::object(); // set by abi.load: the plugin's description
-    std::string note{};                    // reported with a pass: measurements
-    double timeout_factor = 1;             // multiplies each time limit
-    PrintFiles prints{};                   // markers that the tracker detects; empty: the suite's tags
+    std::filesystem::path reference; // the ray tracer to compare images with
+    std::mt19937_64 random;          // seeded the same for every test
+    std::optional<Facts> facts{};
+    std::string note{};        // reported with a pass: measurements
+    double timeout_factor = 1; // multiplies each time limit
+    PrintFiles prints{};       // markers that the tracker detects; empty: the suite's tags
 
     double uniform(double low, double high) {
         // std::uniform_real_distribution differs between standard libraries.

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "conformance/picture.hpp"
-#include "ipc/channel.hpp"
+#include "ipc/json_abi.hpp"
 
 #include <array>
 #include <cstddef>
@@ -61,6 +61,12 @@ struct ReportImage {
     unsigned width = 0, height = 0;
 };
 
+// Set by abi.load.
+struct Facts {
+    ipc::PluginDescription descriptor;
+    std::string sandbox; // active and missing layers, from sandbox::to_text
+};
+
 struct Result {
     std::string test;
     Verdict verdict = Verdict::error;
@@ -68,7 +74,7 @@ struct Result {
     double seconds = 0;
     std::vector<ReportImage> images{};
     std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the images
-    ipc::Json facts = ipc::Json::object();                // set by abi.load: the descriptor
+    std::optional<Facts> facts{};
 };
 
 } // namespace arhost::conformance

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "ipc/json_abi.hpp"
+#include "ipc/message.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <stdexcept>
