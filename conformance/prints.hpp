@@ -21,11 +21,12 @@
 
 namespace arhost::conformance {
 
-// The printed square between a marker's corners.
+// A square print of a marker.
 struct Print {
     int id;
     std::uint32_t side;             // of `grey`, in pixels
     std::vector<std::uint8_t> grey; // 0 ink, 255 paper; the first row is the print's top
+    std::uint32_t border = 0;       // pixels of `grey` outside the square between the marker's corners, on each side
 
     Print mirrored() const;
 };
@@ -70,8 +71,8 @@ struct Placed {
 
 inline constexpr int paper_code = 220, ink_code = 30, background_code = 140;
 
-// Draws the prints, each on white paper with a margin of an eighth of its side. Each pixel is the mean of 32 rays
-// through the lens: nothing is resampled, and edges are exact to 1/64 px.
+// Draws the prints, each on white paper with a margin of at least an eighth of the marker's side. Each pixel is the
+// mean of 32 rays through the lens: nothing is resampled, and edges are exact to 1/64 px.
 Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers);
 inline Grey draw(const arhost_intrinsics &camera, const Placed &marker) {
     return draw(camera, std::span(&marker, 1));
