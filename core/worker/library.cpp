@@ -70,7 +70,7 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     }
 }
 
-// Parts of the messages of glibc's dlopen if it can obtain no memory: which one depends on how far it got.
+// Substrings of dlopen's out-of-memory messages; the message depends on the step that failed.
 constexpr const char *dlopen_memory_errors[] = {"annot allocate ", "cannot create ", "cannot map zero-fill pages",
                                                 "cannot change memory protections", "failed to map segment"};
 

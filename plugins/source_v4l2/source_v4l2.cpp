@@ -203,7 +203,7 @@ private:
         format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     }
 
-    // Waits for a picture and describes its format. Only a picture tells the chroma subsampling.
+    // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
         for (const auto give_up = Clock::now() + silence_limit;;) {
             host_.progress(-1, "waiting for the camera's first picture");

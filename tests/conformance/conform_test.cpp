@@ -292,7 +292,7 @@ TEST(Conform, PassesNoDescriptorsToThePlugin) {
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
 }
 
-// The process that rt_hangs_beside_a_process started.
+// Returns the pid of the process that rt_hangs_beside_a_process started.
 pid_t wait_for_process(const ConformRun &run) {
     const std::string label = "process ";
     for (int i = 0; i < 5000; ++i) {
@@ -308,7 +308,7 @@ pid_t wait_for_process(const ConformRun &run) {
 TEST(Conform, KillsProcessesStartedByATest) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
-                       "processes"}), // no timeout factor: abi.load must end in time
+                       "processes"}), // default timeout factor, because abi.load must not time out
               1);
     EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
     EXPECT_FALSE(is_alive(wait_for_process(run)));

@@ -151,7 +151,7 @@ TEST_F(RenderScene, ReportsErrorsOfThePluginAndItsOptions) {
     EXPECT_THAT(refused("--set samples=1000"), HasSubstr("--set: samples: "));
     EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: the argument must be key=value"));
     EXPECT_THAT(refused("--raytracer " + counter, "--samples 2"), HasSubstr("--samples: samples: unknown key"));
-    // The plugin's log message, followed by the failed call.
+    // Expects the plugin's log message, then the failed call.
     EXPECT_THAT(
         refused("--set refuse=true --raytracer " + counter),
         HasSubstr(

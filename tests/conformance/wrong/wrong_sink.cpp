@@ -221,7 +221,7 @@ private:
                     fs::rename(part, name);
                 throw;
             }
-            // Before the rename: after a kill between the two, the files must equal those after some frame.
+            // Swap before the rename, so that a kill between the two leaves the files of a completed frame.
             if (has("exchanges_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
@@ -231,7 +231,7 @@ private:
             write_file(part, frame.pixels, O_TRUNC);
             fs::rename(part, path + std::to_string(number + 1));
         }
-        if (has("writes_more_files")) // their names sort first
+        if (has("writes_more_files")) // file names that sort before the frames' files
             for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
                 write_file(part, frame.line, O_TRUNC);
                 fs::rename(part, fs::path(path).replace_filename(more));
