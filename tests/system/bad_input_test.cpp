@@ -370,7 +370,7 @@ TEST(BadCommandLine, IsRejected) {
     }
 }
 
-TEST(FullDisk, OnStandardOutputIsAnError) {
+TEST(FullDisk, FailsIfStandardOutputCannotBeWritten) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);
     for (const std::vector<std::string> &arguments :

@@ -86,7 +86,7 @@ TEST(Motion, IsRenderedAtTheFramesTime) {
     EXPECT_GT(different_pixels("0020.png"), 200);
 }
 
-TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
+TEST(VideoFile, ATruncatedInputSetsTheExitStatus) {
     ArhostRun run(film_yaml("- {plugin: sink_video, path: film.mkv}\n"));
     ASSERT_EQ(run.run(), 0) << run.output();
     ASSERT_EQ(frames_of(run.path("film.mkv")), 40);
@@ -106,7 +106,7 @@ TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
     EXPECT_EQ(run.stats()["frames"]["composited"], kept);
 }
 
-TEST(Film, OnAFullDiskFailsButOtherOutputsContinue) {
+TEST(VideoFile, AFullDiskFailsItButOtherOutputsContinue) {
     ArhostRun run(film_yaml("- {plugin: sink_video, path: full/film.mp4}\n"
                             "- {plugin: sink_images, path: \"full/%04d.png\"}\n"
                             "- {plugin: sink_images, path: \"%04d.png\"}\n"));

@@ -61,7 +61,7 @@ TEST_F(RenderScene, ShowsMovingObjectsAtTheGivenTime) {
     EXPECT_EQ(picture("moving", ""), picture("moving", "--time 0"));
 }
 
-TEST_F(RenderScene, RefusesToOverwriteSceneInputs) {
+TEST_F(RenderScene, RejectsAnOutputThatIsASceneInput) {
     const fs::path scene = folder() / "wood.png";
     std::ofstream(scene) << "version: 1\n";
     const std::string named = " " + scene.string() + " --output " + (folder() / "link.png").string();

@@ -92,13 +92,13 @@ protected:
 TEST_F(RichScene, MatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {});
 }
-TEST_F(RichScene, WithSeveralSamplesMatchesRtEmbree) {
+TEST_F(RichScene, SeveralSamplesMatchRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {{"samples", "3"}, {"light_samples", "2"}});
 }
-TEST_F(RichScene, WithOnePathThroughGlassMatchesRtEmbree) {
+TEST_F(RichScene, OnePathThroughGlassMatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {{"glass", "path"}});
 }
-TEST_F(RichScene, ThroughALensMatchesRtEmbree) {
+TEST_F(RichScene, LensMatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
     expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})),
                               {{"samples", "2"}});
@@ -470,7 +470,7 @@ TEST(Path, IsChosenFromThoseTheDeviceSupports) {
     EXPECT_EQ(chosen("pipeline"), Paths{Path::pipeline});
 }
 
-TEST(Device, UnknownNameIsRefused) {
+TEST(Device, RejectsAnUnknownName) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
     EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -497,7 +497,7 @@ TEST(Device, IsListedByTheHost) {
     }
 }
 
-TEST(Device, LackingARequirementIsRefused) {
+TEST(Device, RejectsADeviceThatLacksARequirement) {
     ARHOST_REQUIRE_VULKAN();
     LoggingHost logging;
     const Host host(&logging.host);
@@ -657,7 +657,7 @@ protected:
     std::optional<Tracer> tracer;
 };
 
-TEST_F(InvalidInput, CamerasAreRefused) {
+TEST_F(InvalidInput, CamerasAreRejected) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
@@ -670,7 +670,7 @@ TEST_F(InvalidInput, CamerasAreRefused) {
     EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(InvalidInput, IntrinsicsAreRefused) {
+TEST_F(InvalidInput, IntrinsicsAreRejected) {
     arhost_intrinsics in = small;
     in.fx = 0;
     EXPECT_EQ(tracer->start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);

@@ -166,7 +166,7 @@ TEST_F(SinkVideo, FrameNumbersAreRecoveredAtHighAndLowRates) {
     }
 }
 
-TEST_F(SinkVideo, AnInvalidFrameRateIsRefused) {
+TEST_F(SinkVideo, AnInvalidFrameRateIsRejected) {
     for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_ERROR_CONFIGURATION) << fps;
@@ -191,14 +191,14 @@ TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
 }
 
-TEST_F(SinkVideo, SeveralThreadsGiveDeterministicFilms) {
+TEST_F(SinkVideo, SeveralThreadsGiveDeterministicVideos) {
     run(sink({{"threads", "3"}}), 0, 10);
     run(sink({{"threads", "3"}, {"path", path("again.mp4").string()}}), 0, 10);
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 10));
 }
 
-TEST_F(SinkVideo, AHigherCrfGivesASmallerFilm) {
+TEST_F(SinkVideo, AHigherCrfGivesASmallerVideo) {
     for (const std::string codec : {"h264", "mpeg4"}) {
         run(sink({{"codec", codec}, {"path", path("fine.mp4").string()}}), 0, 5);
         run(sink({{"codec", codec}, {"crf", "40"}, {"path", path("coarse.mp4").string()}}), 0, 5);
@@ -223,7 +223,7 @@ TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
     }
 }
 
-TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
+TEST_F(SinkVideo, ManyRestartsGiveOneVideo) {
     run_and_die(0, 1);
     run_and_die(1, 2);
     run_and_die(2, 2); // the sink was killed before it wrote a frame
@@ -239,7 +239,7 @@ TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, ARestartWithoutFurtherFramesStillWritesTheFilm) {
+TEST_F(SinkVideo, ARestartWithoutFurtherFramesStillWritesTheVideo) {
     run_and_die(0, 5);
     run(sink(), 5, 5);
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 5));
@@ -293,7 +293,7 @@ TEST_F(SinkVideo, AnEmptySegmentHasNoFrames) {
     EXPECT_THAT(read_film(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
 }
 
-TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeFilm) {
+TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeVideo) {
     run_and_die(0, 5);
     run_and_die(5, 8);
     const std::string first = read_text(path(".demo.mp4.from0.mkv")), second = read_text(path(".demo.mp4.from5.mkv"));
@@ -335,7 +335,7 @@ TEST_F(SinkVideo, ARunThatFailsToStartKeepsEarlierSegments) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
-TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsComplete) {
+TEST_F(SinkVideo, AnOlderVideoStaysUntilTheNewOneIsComplete) {
     run(sink(), 0, 3);
     const std::string old = read_text(path());
     run_and_die(0, 5);
@@ -363,7 +363,7 @@ TEST_F(SinkVideo, SegmentsWithOtherOptionsAreNotJoined) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // the segments are kept
 }
 
-TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
+TEST_F(SinkVideo, NoFramesGiveAWarningAndNoVideo) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
@@ -373,7 +373,7 @@ TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
 
 // ---- Errors ----------------------------------------------------------------------------------------
 
-TEST_F(SinkVideo, AnUnknownExtensionIsRefused) {
+TEST_F(SinkVideo, AnUnknownExtensionIsRejected) {
     for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
         SinkUnderTest s = sink({{"path", path(name).string()}});
         EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -395,7 +395,7 @@ TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndEarlierFramesAreKept) {
     EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
 }
 
-TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderFilm) {
+TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderVideo) {
     run(sink(), 0, 2);
     const std::string old = read_text(path());
     {
@@ -431,14 +431,14 @@ TEST_F(SinkVideo, MissingFoldersAreCreated) {
     EXPECT_EQ(read_film(path("a/b/demo.mp4")).numbers(), numbers(0, 2));
 }
 
-TEST_F(SinkVideo, AFolderAsPathIsRefused) {
+TEST_F(SinkVideo, AFolderAsPathIsRejected) {
     std::filesystem::create_directory(path());
     SinkUnderTest s = sink();
     EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("is a folder"));
 }
 
-TEST_F(SinkVideo, AFrameOfAnotherSizeIsRefused) {
+TEST_F(SinkVideo, AFrameOfAnotherSizeIsRejected) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.write(Picture(width - 2, height, 0), make_record(0)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);

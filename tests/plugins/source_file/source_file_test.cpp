@@ -185,7 +185,7 @@ TEST(ImageSequence, UsesTheConfiguredRate) {
     EXPECT_EQ(source.read(2).info.capture_ns, 250'000'000);
 }
 
-TEST(ImageSequence, RefusesAChangedSizeAndNamesTheFile) {
+TEST(ImageSequence, RejectsAChangedSizeAndNamesTheFile) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
     write_images(folder.path(), {2}, 50, 32);
@@ -620,7 +620,7 @@ TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
 }
 
-TEST(Video, WithOneFrameDeliversOneFrame) {
+TEST(Video, DeliversASingleFrame) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("one.mp4", h264, "96x64", 1);
     SourceUnderTest source("source_file");
@@ -678,7 +678,7 @@ TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
-TEST(Video, WithoutIndexNamesWhatIsMissing) {
+TEST(Video, NamesAMissingIndex) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mp4", h264); // the file's index is at its end
     Bytes half = bytes_of(video.file());
@@ -703,7 +703,7 @@ TEST(Video, DamagedInTheMiddleContinuesWithAWarningAndSeeksToTheSameBytes) {
     EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
 }
 
-TEST(Video, RefusesAChangedSize) {
+TEST(Video, RejectsAChangedSize) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile small("a.ts", "-c:v libx264", "96x64", 10), large("b.ts", "-c:v libx264", "128x96", 10);
     Bytes both = bytes_of(small.file());

@@ -153,7 +153,7 @@ TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
 
 // ---- Motion-JPEG -----------------------------------------------------------------------------------
 
-TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
+TEST(Jpeg, Chroma420BecomesI420WithoutConversion) {
     const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
@@ -171,7 +171,7 @@ TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
         }
 }
 
-TEST(Jpeg, WithOtherSubsamplingsOrOddSizesBecomesBgr) {
+TEST(Jpeg, OtherSubsamplingsAndOddSizesBecomeBgr) {
     struct Case {
         int width, height, subsampling;
     };
@@ -202,7 +202,7 @@ TEST(Jpeg, GreyStaysGrey) {
         }
 }
 
-TEST(Jpeg, WithoutHuffmanTablesUsesTheStandardTables) {
+TEST(Jpeg, UsesTheStandardTablesIfItHasNoHuffmanTables) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_420), bare = without_segments(whole, 0xc4);
     ASSERT_LT(bare.size(), whole.size());
     const Decoded expected = decode(whole, whole), frame = decode(bare, whole);
@@ -212,7 +212,7 @@ TEST(Jpeg, WithoutHuffmanTablesUsesTheStandardTables) {
             ASSERT_EQ(frame.at(0, x, y), expected.at(0, x, y));
 }
 
-TEST(Jpeg, WithPaddingAroundItsEndIsIntact) {
+TEST(Jpeg, IsIntactIfItsEndIsPadded) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_422);
     Bytes padded = whole;
     padded.insert(padded.end() - 2, 5, 0);
@@ -233,7 +233,7 @@ TEST(Jpeg, TruncatedAnywhereIsDamaged) {
     }
 }
 
-TEST(Jpeg, WithChangedSizeOrSubsamplingIsDamaged) {
+TEST(Jpeg, IsDamagedIfItsSizeOrSubsamplingChanges) {
     const Bytes first = make_jpeg(96, 64, TJSAMP_420);
     EXPECT_THAT(decode(make_jpeg(80, 64, TJSAMP_420), first).fault, HasSubstr("80×64"));
     EXPECT_THAT(decode(make_jpeg(192, 128, TJSAMP_420), first).fault, HasSubstr("192×128"));
