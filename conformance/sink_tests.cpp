@@ -281,7 +281,7 @@ std::map<std::string, Number> numbers_in(const std::string &path) {
 }
 
 // Replaces one frame at a time and finds where the files change. This works for files of constant size, and for one
-// file per frame with numbered names.
+// file per frame with numbered file names.
 void order(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 6;

@@ -145,7 +145,7 @@ private:
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
         if (set.pixelformat != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          camera + " refuses " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                          camera + " rejects " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
                               ", although it lists " + device_->describe_formats());
         if (demanded && size != Size{set.width, set.height})
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,

@@ -22,7 +22,7 @@ Failure write_failure(const std::string &file) {
     return Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + file + ": " + std::strerror(errno));
 }
 
-// Unbuffered.
+// Writes to a file without buffering.
 void write_file(const std::string &file, const std::string &bytes, int flags) {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
     if (fd < 0)

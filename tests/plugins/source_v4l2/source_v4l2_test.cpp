@@ -27,7 +27,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 namespace {
 
-std::string refusal(const std::map<std::string, std::string> &options, arhost_status expected) {
+std::string rejection(const std::map<std::string, std::string> &options, arhost_status expected) {
     SourceUnderTest source("source_v4l2");
     EXPECT_EQ(source.start(options), expected) << source.log();
     const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
@@ -101,8 +101,8 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 
 // ---- Messages --------------------------------------------------------------------------------------
 
-TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
-    const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+TEST(V4l2Rejection, NamesAMissingDeviceAndAlternatives) {
+    const std::string text = rejection({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(text, HasSubstr("device: '/dev/video-none' does not exist"));
     if (fs::exists("/dev/video0")) {
         EXPECT_THAT(text, HasSubstr("/dev/video0"));
@@ -113,18 +113,18 @@ TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
     }
 }
 
-TEST(V4l2Refusal, ReportsADeviceThatIsNotAVideoDevice) {
-    EXPECT_THAT(refusal({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+TEST(V4l2Rejection, ReportsADeviceThatIsNotAVideoDevice) {
+    EXPECT_THAT(rejection({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("'/dev/null' is not a video device"));
     ScratchFolder folder;
     std::ofstream(folder.path() / "file") << "text";
-    EXPECT_THAT(refusal({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+    EXPECT_THAT(rejection({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is not a video device"));
-    EXPECT_THAT(refusal({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+    EXPECT_THAT(rejection({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is a folder"));
 }
 
-TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
+TEST(V4l2Rejection, NamesTheGroupThatMayOpenACamera) {
     ScratchFolder folder;
     std::ofstream(folder.path() / "video0") << "";
     fs::permissions(folder.path() / "video0", fs::perms::none);
@@ -132,13 +132,13 @@ TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
     const bool root = geteuid() == 0;
     ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // permissions do not limit root
     const std::string text =
-        refusal({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+        rejection({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
     EXPECT_THAT(text, HasSubstr("group 'video'"));
 }
 
-TEST(V4l2Refusal, RequiresBothSidesOfASizeOrNeither) {
-    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
+TEST(V4l2Rejection, RequiresBothSidesOfASizeOrNeither) {
+    EXPECT_THAT(rejection({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
 }
 
 TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
