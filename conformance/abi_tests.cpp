@@ -255,7 +255,7 @@ void two_instances(Context &context) {
 void create_repeatedly(Context &context) {
     using Clock = std::chrono::steady_clock;
     constexpr int warm_up = 20, min_count = 100, max_count = 1000;
-    constexpr auto time_limit = 20s; // once min_count is reached
+    constexpr auto time_limit = 20s; // stop after this time, but not before min_count cycles
     constexpr long allowed_kib = 4096;
     const auto create_and_destroy = [&] {
         Instance instance(context.library);

@@ -29,7 +29,7 @@ CallPage map_call_page() {
     return CallPage(ipc::Mapping(static_cast<std::byte *>(address), sizeof(ipc::Call)));
 }
 
-// As arhost-worker does before it opens a plugin. A sink writes to the scratch folder.
+// Enters the sandbox as arhost-worker does before it opens a plugin. The scratch folder is writable.
 sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     sandbox::Policy policy = subject.policy;
     policy.writable.push_back(subject.scratch);
@@ -42,7 +42,7 @@ sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
 
 constexpr off_t min_space_mib = 16;
 
-// 0 if the folder's file system has min_space_mib free; otherwise an errno.
+// Returns 0 if min_space_mib are free on the folder's file system, otherwise an errno.
 int check_space(const std::filesystem::path &folder) {
     const std::filesystem::path file = folder / "space";
     const base::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
@@ -97,8 +97,8 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message = warning.what();
     } catch (const std::exception &error) {
         const auto *system = dynamic_cast<const std::system_error *>(&error);
-        const bool out_of_descriptors =
-            system && system->code() == std::errc::too_many_files_open; // the suite itself uses few
+        // Attributed to the plugin, because the suite opens only a few descriptors.
+        const bool out_of_descriptors = system && system->code() == std::errc::too_many_files_open;
         result.verdict = out_of_descriptors ? Verdict::fail : Verdict::error;
         result.message =
             out_of_descriptors ? "it leaks descriptors until the limit of open files is reached" : error.what();

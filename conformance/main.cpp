@@ -185,7 +185,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
     return {};
 }
 
-// Unbuffered. A full disk or a closed pipe ends the run.
+// Writes to stdout without buffering. A write error ends the run.
 void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);

@@ -23,7 +23,7 @@ struct Context {
     std::filesystem::path reference; // the ray tracer to compare images with
     std::mt19937_64 random;          // seeded the same for every test
     std::optional<Facts> facts{};
-    std::string note{};        // reported with a pass: measurements
+    std::string note{};        // measurements, reported if the test passes
     double timeout_factor = 1; // multiplies each time limit
     PrintFiles prints{};       // markers that the tracker detects; empty: the suite's tags
 

@@ -110,7 +110,7 @@ private:
     void stop_when_idle();
     void record_crash(Crash crash);
     void restart(const std::string &reason);
-    void give_up(const std::string &reason, bool is_configuration_error);
+    void fall_back_or_disable(const std::string &reason, bool is_configuration_error);
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
     void set_frame_deadline();

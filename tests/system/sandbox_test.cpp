@@ -254,7 +254,7 @@ TEST(Sandbox, BlocksSignals) {
 }
 
 // A plugin with `processes` may signal its children; before Landlock version 6, it can signal any process.
-TEST(Sandbox, WithProcessesSignalsReachOthersOnlyOnOldKernels) {
+TEST(Sandbox, SignalsOfPluginsWithProcessesReachOthersOnlyOnOldKernels) {
     REQUIRE_NO_SANITIZER();
     REQUIRE_LAYER("seccomp");
     const bool scoped = has("signals");

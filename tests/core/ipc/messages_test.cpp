@@ -119,7 +119,7 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
 }
 
-TEST(Messages, WithMissingOrMistypedFieldsViolateTheProtocol) {
+TEST(Messages, MissingOrMistypedFieldsViolateTheProtocol) {
     EXPECT_THAT(violation<messages::Log>({{"severity", 1}}), HasSubstr("malformed message 'log': "));
     EXPECT_THAT(violation<messages::Log>({{"severity", "high"}, {"text", ""}}), HasSubstr("malformed message 'log'"));
     EXPECT_THAT(violation<messages::Hello>({{"descriptor", 5}, {"sandbox", ""}}), HasSubstr("'hello'"));

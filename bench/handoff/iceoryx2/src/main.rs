@@ -92,7 +92,8 @@ impl Receiver {
     fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
         let end = Instant::now() + Duration::from_secs(10); // the other side may have died
         while Instant::now() < end {
-            // Consume the event first, which follows its message: a leftover event would end the next wait.
+            // Consume the event before the message. The sender signals after sending; a leftover event would end the
+            // next wait early.
             if !polling {
                 self.listener.timed_wait_one(Duration::from_secs(1))?;
             }
